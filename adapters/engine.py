@@ -1,0 +1,200 @@
+"""The plugin line: what an engine promises and what a simulation gives back.
+
+An adapter is one file with one final subclass of `Engine` and one of `Simulation`. It translates, refuses what
+it cannot honour (`Engine.refuses`), and reads back what the engine now holds. It never approximates in silence,
+never sees a scene's truth, and contains no loop over steps: the only one is `adapters.stepping.run`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.needs import Needs
+from adapters.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class EngineError(RuntimeError):
+    """An engine refused or failed; the message is one line for the row of that cell."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One parameter of a profile: what it is set to, why, and where that is known from."""
+
+    name: str
+    value: Any
+    because: str
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Quirk:
+    """A habit of an engine that the adapter had to deal with."""
+
+    what: str
+    what_we_do: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """In which order an engine moves bodies; the discrete oracle selects on it, never on an engine's name.
+
+    Parameters
+    ----------
+    order
+        Phases of a step, for people.
+    position_offset
+        Free fall from rest is sampled at ``x(t) + position_offset * g * t * dt / 2`` along gravity: +1 velocity
+        first (semi-implicit Euler falls too far), -1 position first (lags behind), 0 second order.
+    """
+
+    order: str
+    position_offset: int
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a profile claims to realise on a probe: a value and the band it may lie in (same unit)."""
+
+    value: float
+    band: float
+    because: str = ""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contacts of one instant as arrays over k contacts; NaN where the engine does not say.
+
+    ``a``, ``b``: body indices of the scene (k,); ``point``, ``normal`` (from a to b), ``impulse`` on b of the
+    last step in world axes [N s]: (k, d); ``gap`` [m], < 0 is overlap: (k,).
+    """
+
+    a: NDArray[np.int64]
+    b: NDArray[np.int64]
+    point: Array
+    normal: Array
+    impulse: Array
+    gap: Array
+
+    @classmethod
+    def from_rows(cls, rows: Sequence[tuple[int, int, Any, Any, Any, float]], dimension: int) -> Contacts:
+        """Build from ``(a, b, point, normal, impulse, gap)`` rows; pairs are turned so that a < b."""
+        k = len(rows)
+        a, b = np.zeros(k, np.int64), np.zeros(k, np.int64)
+        point, normal, impulse = (np.zeros((k, dimension)) for _ in range(3))
+        gap = np.zeros(k)
+        for row, (i, j, p, n, f, g) in enumerate(rows):
+            sign = 1.0 if i < j else -1.0
+            a[row], b[row], gap[row] = min(i, j), max(i, j), g
+            point[row], normal[row], impulse[row] = p, np.multiply(sign, n), np.multiply(sign, f)
+        return cls(a, b, point, normal, impulse, gap)
+
+
+class Simulation(ABC):
+    """One built world. Built fresh for every run, never reset. What is missing is an error, not a zero."""
+
+    #: What the adapter had to change in the scene's start state, in words; shown beside the result.
+    initial_change: tuple[str, ...] = ()
+
+    @abstractmethod
+    def advance(self, steps: int) -> None:
+        """Make ``steps`` steps of the dt given to `Engine.build`."""
+
+    @abstractmethod
+    def pose(self) -> Array:
+        """Poses of all bodies in the scene's order, (n, 3) planar or (n, 7) spatial, at this instant."""
+
+    @abstractmethod
+    def twist(self) -> Array:
+        """Twists of all bodies, (n, 3) or (n, 6), as the engine reports them at this instant."""
+
+    @abstractmethod
+    def contacts(self) -> Contacts:
+        """Contacts with the impulses of the last step made."""
+
+    @abstractmethod
+    def readback(self) -> dict[str, Any]:
+        """What the engine now holds (masses, materials, dt, solver settings), read from the engine."""
+
+    def certificate(self) -> dict[str, Any]:
+        """How well the last answer solves its own equations; empty where an engine does not say."""
+        return {}
+
+    def close(self) -> None:  # noqa: B027  (most engines hold nothing that needs closing)
+        """Release what the engine holds."""
+
+
+ProfileRule = Callable[[Needs, float], list[Setting]]
+
+
+@dataclass(frozen=True)
+class EngineFacts:
+    """Constant facts of an engine, shown by ``crosscheck describe`` and in the fairness sheet."""
+
+    name: str
+    title: str
+    package: str
+    dimensions: frozenset[int]
+    scheme: Scheme
+    customary_dt: float
+    quirks: tuple[Quirk, ...] = ()
+    known_bad_versions: Mapping[str, str] = field(default_factory=dict)
+
+
+class Engine(ABC):
+    """A physics engine behind the plugin line; subclasses are final and hold no state."""
+
+    facts: EngineFacts
+    #: Profile name -> rule that chooses the settings from a scene's needs and the step.
+    profiles: Mapping[str, ProfileRule]
+
+    @property
+    def name(self) -> str:
+        """Short name used on the command line."""
+        return self.facts.name
+
+    @abstractmethod
+    def version(self) -> str:
+        """Version of the engine that is installed."""
+
+    @abstractmethod
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Why this engine cannot honour ``scene``, or None; the scene has a dimension the engine knows."""
+
+    @abstractmethod
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world; ``settings`` holds every setting of the profile by name, ``iterations`` included."""
+
+    @abstractmethod
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """What the profile realises on the probes where that differs from what a scene asks for.
+
+        Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
+        """
+
+    def settings(self, profile: str, needs: Needs, dt: float, iterations: int | None = None) -> list[Setting]:
+        """Settings of ``profile``; ``iterations`` replaces the profile's own count.
+
+        Raises
+        ------
+        EngineError
+            For an unknown profile, or if the profile has no iteration count to replace.
+        """
+        if profile not in self.profiles:
+            raise EngineError(f"profile: {self.name} has no profile {profile!r}, only {', '.join(self.profiles)}")
+        settings = self.profiles[profile](needs, dt)
+        if iterations is None:
+            return settings
+        asked = Setting("iterations", iterations, "asked for by --iterations")
+        if not any(setting.name == "iterations" for setting in settings):
+            raise EngineError(f"iterations: {self.name}/{profile} does not stop at an iteration count")
+        return [asked if setting.name == "iterations" else setting for setting in settings]

@@ -1,0 +1,88 @@
+"""The one lift: planar scenes in 3-D engines, and back.
+
+    planar  (x, y, theta)   ->   spatial (x, 0, z = y), turned by theta about -Y
+
+        y |  / theta             z |  / theta
+          | /                      | /        Y points into the page: a turn from x to z
+          +------ x                +------ x  is a right-handed turn about -Y.
+
+Inertia is stated, not derived from the 3-D shape: a disc becomes a sphere that keeps the disc's own moment.
+What leaves the plane afterwards is measured (`Trajectory.out_of_plane`), never ignored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adapters.engine import Array, Contacts
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Shape, Sphere
+
+
+def lift(scene: Scene) -> Scene:
+    """Spatial counterpart of a planar scene."""
+    return replace(
+        scene,
+        dimension=3,
+        bodies=tuple(_lift_body(body) for body in scene.bodies),
+        gravity=_lift_vector(scene.gravity),
+    )
+
+
+def _lift_vector(v: tuple[float, ...]) -> tuple[float, float, float]:
+    return (v[0], 0.0, v[1])
+
+
+def _lift_shape(shape: Shape) -> Shape:
+    if isinstance(shape, Disc):
+        return Sphere(shape.radius)
+    if isinstance(shape, Box):
+        hx, hy = shape.half_extents
+        return Box((hx, max(hx, hy), hy))  # as deep as it is wide or tall, so that it cannot fall sideways
+    assert isinstance(shape, HalfSpace)
+    return HalfSpace(_lift_vector(shape.normal), shape.offset)
+
+
+def _lift_body(body: Body) -> Body:
+    x, y, theta = body.pose
+    vx, vy, omega = body.twist
+    moment = body.inertia if isinstance(body.inertia, float | int) else body.inertia[0]
+    half = 0.5 * theta
+    return replace(
+        body,
+        shape=_lift_shape(body.shape),
+        # Only the moment about Y acts in the plane; the other two are set equal, so that a body that
+        # leaves the plane by round-off meets no gyroscopic coupling.
+        inertia=(moment, moment, moment),
+        pose=(x, 0.0, y, float(np.cos(half)), 0.0, float(-np.sin(half)), 0.0),
+        twist=(vx, 0.0, vy, 0.0, -omega, 0.0),
+        force=_lift_vector(body.force),
+        torque=(0.0, -body.torque[0], 0.0),
+    )
+
+
+def lower_pose(pose: Array) -> tuple[Array, float]:
+    """Planar poses (n, 3) of spatial ones (n, 7), and how far they left the plane [m, rad]."""
+    w, qx, qy, qz = pose[:, 3:].T
+    theta = -2.0 * np.arctan2(qy, w)
+    theta = np.arctan2(np.sin(theta), np.cos(theta))
+    outside = max(float(np.abs(pose[:, 1]).max()), 2.0 * float(np.hypot(qx, qz).max()))
+    return np.column_stack([pose[:, 0], pose[:, 2], theta]), outside
+
+
+def lower_twist(twist: Array) -> tuple[Array, float]:
+    """Planar twists (n, 3) of spatial ones (n, 6), and the largest component out of the plane [m/s, rad/s]."""
+    outside = float(np.abs(twist[:, [1, 3, 5]]).max())
+    return np.column_stack([twist[:, 0], twist[:, 2], -twist[:, 4]]), outside
+
+
+def lower_contacts(contacts: Contacts) -> Contacts:
+    """Contacts with their y components dropped."""
+    keep = [0, 2]
+    return replace(
+        contacts,
+        point=contacts.point[:, keep],
+        normal=contacts.normal[:, keep],
+        impulse=contacts.impulse[:, keep],
+    )

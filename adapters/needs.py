@@ -1,0 +1,100 @@
+"""What a scene needs from a solver; derived from the scene, never stored.
+
+Profiles choose an engine's settings from these facts alone. They see neither the scene's name nor its truth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from adapters.scene import Box, HalfSpace, Scene
+
+Regime = Literal["free", "impact", "rest"]
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Facts that a profile may use.
+
+    Parameters
+    ----------
+    dimension
+        2 or 3, of the scene as posed (before any lift).
+    rotation
+        True if anything can turn a body: a box, friction, spin or torque.
+    friction
+        Largest friction coefficient of a pair that can meet.
+    restitution
+        Largest restitution of a pair that can meet.
+    regime
+        ``impact``: a pair that can meet has e > 0, or nothing but motion brings bodies together;
+        ``rest``: gravity or a force acts and no e > 0; ``free``: no pair can meet.
+    slide
+        Friction acts and a body starts with tangential motion or spin, or load acts along a fixed face.
+    smallest_size
+        Smallest full extent of a free body [m].
+    top_speed
+        Largest initial speed plus what gravity can add over the duration [m/s].
+    mass_ratio
+        Largest over smallest mass of the free bodies.
+    gravity
+        Magnitude [m/s^2].
+    """
+
+    dimension: int
+    rotation: bool
+    friction: float
+    restitution: float
+    regime: Regime
+    slide: bool
+    smallest_size: float
+    top_speed: float
+    mass_ratio: float
+    gravity: float
+
+
+def needs(scene: Scene) -> Needs:
+    """Derive what ``scene`` needs."""
+    d = scene.dimension
+    free = [body for body in scene.bodies if body.motion == "free"]
+    materials = [material for _, _, material in scene.contact_pairs()]
+    friction = max((m.friction for m in materials), default=0.0)
+    restitution = max((m.restitution for m in materials), default=0.0)
+    gravity = math.hypot(*scene.gravity)
+    loaded = gravity > 0.0 or any(any(body.force) for body in free)
+    spin = any(any(body.twist[d:]) or any(body.torque) for body in scene.bodies)
+    masses = [body.mass for body in free] or [1.0]
+    return Needs(
+        dimension=d,
+        rotation=friction > 0.0 or spin or any(isinstance(body.shape, Box) for body in free),
+        friction=friction,
+        restitution=restitution,
+        regime=_regime(bool(materials), restitution, loaded),
+        slide=friction > 0.0 and (spin or _tangential(scene)),
+        smallest_size=min((body.shape.smallest_size for body in free), default=1.0),
+        top_speed=max((math.hypot(*body.twist[:d]) for body in scene.bodies), default=0.0)
+        + gravity * scene.duration,
+        mass_ratio=max(masses) / min(masses),
+        gravity=gravity,
+    )
+
+
+def _regime(can_meet: bool, restitution: float, loaded: bool) -> Regime:
+    if not can_meet:
+        return "free"
+    return "rest" if loaded and restitution == 0.0 else "impact"
+
+
+def _tangential(scene: Scene) -> bool:
+    """True if a body moves along, or load acts along, the face of a half-space (1e-12: round-off)."""
+    d = scene.dimension
+    for face in (body.shape for body in scene.bodies if isinstance(body.shape, HalfSpace)):
+        vectors = [scene.gravity] + [b.twist[:d] for b in scene.bodies] + [b.force for b in scene.bodies]
+        for vector in vectors:
+            normal = sum(v * n for v, n in zip(vector, face.normal, strict=True))
+            along = math.sqrt(max(0.0, sum(v * v for v in vector) - normal * normal))
+            if along > 1e-12 * max(1.0, math.hypot(*vector)):
+                return True
+    return False

@@ -1,0 +1,74 @@
+"""Finds engines by entry points and loads them late; a broken one costs its own rows only."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+
+from adapters.engine import Engine, EngineError
+
+GROUP = "contact_crosscheck.engines"
+#: Order in which our own engines are shown; others follow by name.
+SHOWN_FIRST = ("reference", "chipmunk", "bullet", "mujoco")
+
+
+@dataclass(frozen=True)
+class Found:
+    """An engine that was looked for: loaded, or the reason why not."""
+
+    name: str
+    engine: Engine | None
+    version: str
+    reason: str = ""
+
+
+def _entries() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def names() -> list[str]:
+    """Names of all registered engines, ours first."""
+    registered = _entries()
+    ours = [name for name in SHOWN_FIRST if name in registered]
+    return ours + sorted(set(registered) - set(ours))
+
+
+@lru_cache(maxsize=None)
+def find(name: str) -> Found:
+    """Load the engine called ``name``; never raises for an engine that is missing or broken.
+
+    Raises
+    ------
+    EngineError
+        If no such engine is registered ("did you mean").
+    """
+    registered = _entries()
+    if name not in registered:
+        close = difflib.get_close_matches(name, registered, n=1)
+        hint = f", did you mean {close[0]!r}?" if close else f"; known: {', '.join(names())}"
+        raise EngineError(f"engine: there is no engine called {name!r}{hint}")
+    engine: Engine | None = None
+    try:
+        engine = registered[name].load()()
+        return Found(name, engine, engine.version())
+    except ImportError as error:
+        package = engine.facts.package if engine else name
+        return Found(name, None, "", f"{error}; pip install 'contact-crosscheck[{name}]' ({package})")
+    except Exception as error:  # a third-party plugin may raise anything; only its rows may suffer
+        return Found(name, None, "", f"{type(error).__name__}: {error}".splitlines()[0])
+
+
+def load(name: str) -> Engine:
+    """Return the engine called ``name``.
+
+    Raises
+    ------
+    EngineError
+        If it is unknown, not installed or broken.
+    """
+    found = find(name)
+    if found.engine is None:
+        raise EngineError(f"engine: {name} is not installed: {found.reason}")
+    return found.engine

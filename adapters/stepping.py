@@ -1,0 +1,159 @@
+"""The only loop that steps an engine.
+
+    build -> sample -> [ advance(stride) -> sample -> finite? ] ... -> readback -> close
+
+Every engine is driven, sampled and stopped by these lines, so that a difference between two trajectories is a
+difference between two engines.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Contacts, Engine, EngineError, Simulation
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.scene import Scene
+from adapters.trajectory import ContactRecord, Sampling, Trajectory
+
+#: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
+#: still be a wrong answer worth measuring; a thousand times is none.
+EXPLOSION_FACTOR = 1e3
+
+
+class _Planar:
+    """Reads a lifted simulation as a planar one and remembers the largest departure from the plane."""
+
+    def __init__(self, inner: Simulation) -> None:
+        self.inner = inner
+        self.outside = 0.0
+
+    def pose(self) -> np.ndarray:
+        pose, outside = lower_pose(self.inner.pose())
+        self.outside = max(self.outside, outside)
+        return pose
+
+    def twist(self) -> np.ndarray:
+        twist, outside = lower_twist(self.inner.twist())
+        self.outside = max(self.outside, outside)
+        return twist
+
+    def contacts(self) -> Contacts:
+        return lower_contacts(self.inner.contacts())
+
+
+def posed_for(engine: Engine, scene: Scene) -> Scene:
+    """Return the scene as ``engine`` gets it: itself, or lifted.
+
+    Raises
+    ------
+    EngineError
+        If the engine has no dimension for it (a spatial scene on a planar engine).
+    """
+    if scene.dimension in engine.facts.dimensions:
+        return scene
+    if scene.dimension == 2 and 3 in engine.facts.dimensions:
+        return lift(scene)
+    raise EngineError(f"dimension: {engine.name} is planar and cannot run a spatial scene")
+
+
+def step_count(duration: float, dt: float) -> int:
+    """Whole steps that cover ``duration``; 1e-9 forgives the rounding of duration / dt."""
+    return max(1, math.ceil(duration / dt - 1e-9))
+
+
+def run(
+    engine: Engine, scene: Scene, dt: float, settings: Mapping[str, Any], sampling: Sampling | None = None
+) -> Trajectory:
+    """Run ``scene`` on ``engine`` and record it.
+
+    Parameters
+    ----------
+    dt
+        Step [s], > 0.
+    settings
+        Setting values by name, as `Engine.settings` gives them.
+    sampling
+        Defaults to every step and no contacts.
+
+    Raises
+    ------
+    EngineError
+        If the engine refuses the scene, or for a step that is not positive and finite.
+    """
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+    sampling = sampling or Sampling()
+    posed = posed_for(engine, scene)
+    started = time.perf_counter()
+    simulation = engine.build(posed, dt, settings)
+    try:
+        return _record(simulation, scene, posed.dimension != scene.dimension, dt, sampling, started)
+    finally:
+        simulation.close()
+
+
+def _record(
+    simulation: Simulation, scene: Scene, lifted: bool, dt: float, sampling: Sampling, started: float
+) -> Trajectory:
+    view = _Planar(simulation) if lifted else simulation
+    limit = EXPLOSION_FACTOR * _fastest(scene)
+    poses, twists, steps_at = [view.pose()], [view.twist()], [0]
+    collected: list[tuple[int, Contacts]] = []
+    finish, reason, done, steps = "completed", "", 0, step_count(scene.duration, dt)
+    while done < steps:
+        advance = min(sampling.stride, steps - done)
+        simulation.advance(advance)
+        done += advance
+        poses.append(view.pose())
+        twists.append(view.twist())
+        steps_at.append(done)
+        if sampling.contacts_from is not None and done * dt > sampling.contacts_from - 0.5 * dt:
+            collected.append((len(poses) - 1, view.contacts()))
+        reason = _divergence(poses[-1], twists[-1], scene.dimension, limit)
+        if reason:
+            finish, reason = "diverged", f"{reason} at t = {done * dt:.6g} s"
+            break
+    return Trajectory(
+        t=np.array(steps_at) * dt,
+        pose=np.array(poses),
+        twist=np.array(twists),
+        contacts=_join(collected, scene.dimension) if sampling.contacts_from is not None else None,
+        dt=dt,
+        finish="diverged" if finish == "diverged" else "completed",
+        reason=reason,
+        initial_change=tuple(simulation.initial_change),
+        readback=simulation.readback(),
+        certificate=simulation.certificate(),
+        out_of_plane=view.outside if isinstance(view, _Planar) else 0.0,
+        wall_time=time.perf_counter() - started,
+    )
+
+
+def _fastest(scene: Scene) -> float:
+    """Largest speed the scene can explain [m/s]: initial motion plus gravity and forces over its duration."""
+    d = scene.dimension
+    free = [body for body in scene.bodies if body.motion == "free"]
+    initial = max((math.hypot(*body.twist[:d]) for body in scene.bodies), default=0.0)
+    pull = max((math.hypot(*body.force) / body.mass for body in free), default=0.0)
+    return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
+
+
+def _divergence(pose: np.ndarray, twist: np.ndarray, dimension: int, limit: float) -> str:
+    if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
+        return "the state is not finite"
+    fastest = float(np.abs(twist[:, :dimension]).max())
+    return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it" if fastest > limit else ""
+
+
+def _join(collected: list[tuple[int, Contacts]], dimension: int) -> ContactRecord:
+    offset = np.cumsum([0] + [len(contacts.a) for _, contacts in collected])
+    empty = Contacts.from_rows([], dimension)
+    parts = [empty] + [contacts for _, contacts in collected]
+    fields = ("a", "b", "point", "normal", "impulse", "gap")
+    rows = Contacts(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields))
+    return ContactRecord(np.array([index for index, _ in collected], np.int64), offset.astype(np.int64), rows)
