@@ -1,0 +1,146 @@
+"""Metrics: pure functions of a trajectory, the same for every engine."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.trajectory import Trajectory
+from validation.canonical import Measured
+from validation.geometry import rotation, separation
+
+UNAVAILABLE = "the engine does not report contact impulses"
+
+
+def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None, str]:
+    """Impulse on body b (the higher index) from body a over all recorded contacts, (d,) [N s]."""
+    if trajectory.contacts is None:
+        return None, "contacts were not recorded"
+    total = trajectory.contacts.impulse_between(a, b).sum(axis=0)
+    return (None, UNAVAILABLE) if np.isnan(total).any() else (total, "")
+
+
+def apexes(t: Array, height: Array, velocity: Array) -> tuple[Array, Array]:
+    """Times and heights of the tops of all arcs.
+
+    An arc ends where the velocity turns from upwards to not upwards; its top is that of the parabola through the
+    highest sample and its neighbours (exact for constant gravity, whatever the phase of the samples).
+    """
+    turns = np.flatnonzero((velocity[:-1] > 0.0) & (velocity[1:] <= 0.0))
+    times, tops = [], []
+    for turn in turns:
+        window = slice(max(1, turn - 1), min(len(height) - 1, turn + 3))
+        if window.stop <= window.start:
+            continue
+        k = window.start + int(np.argmax(height[window]))
+        before, here, after = height[k - 1 : k + 2]
+        curvature = before - 2.0 * here + after
+        shift = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
+        shift = float(np.clip(shift, -1.0, 1.0))
+        times.append(t[k] + shift * (t[k] - t[k - 1]))
+        tops.append(here - 0.25 * (before - after) * shift)
+    return np.array(times), np.array(tops)
+
+
+def interval_ratio(times: Array) -> Measured:
+    """Second interval between apexes over the first (apexes 1, 2, 3)."""
+    if len(times) < 3:
+        return 0.0, f"there are only {len(times)} apexes, three are needed"
+    return float((times[2] - times[1]) / (times[1] - times[0])), ""
+
+
+def last_motion(t: Array, speed: Array, threshold: float) -> Measured:
+    """Time after which the speed stays at or below ``threshold`` to the end [s]; the end if it never does."""
+    moving = np.flatnonzero(np.abs(speed) > threshold)
+    if len(moving) == 0:
+        return 0.0, ""
+    if moving[-1] == len(t) - 1:
+        return float(t[-1]), "still moving at the end of the run"
+    return float(t[moving[-1] + 1]), ""
+
+
+def mean_rate(t: Array, value: Array) -> Measured:
+    """Mean rate of change of ``value`` over the second half of the run."""
+    middle = len(t) // 2
+    return float((value[-1] - value[middle]) / (t[-1] - t[middle])), ""
+
+
+def _reach(shape: object) -> float:
+    """Distance of a shape's outermost point from its centre [m]: turns spin into a speed."""
+    if isinstance(shape, Disc | Sphere):
+        return shape.radius
+    return float(np.linalg.norm(shape.half_extents)) if isinstance(shape, Box) else 0.0
+
+
+def free_bodies(scene: Scene) -> list[int]:
+    """Indices of the bodies that the engine moves."""
+    return [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
+
+
+def body_speeds(scene: Scene, trajectory: Trajectory) -> Array:
+    """Upper bound of the speed of any point of each free body, |v| + |omega| R, (s, bodies) [m/s]."""
+    d = scene.dimension
+    free = free_bodies(scene)
+    linear = np.linalg.norm(trajectory.twist[:, free, :d], axis=2)
+    angular = np.linalg.norm(trajectory.twist[:, free, d:], axis=2)
+    return linear + angular * np.array([_reach(scene.bodies[i].shape) for i in free])
+
+
+def kinetic_energy(scene: Scene, trajectory: Trajectory) -> Array:
+    """Total kinetic energy with the inertia of the scene, (s,) [J]."""
+    d = scene.dimension
+    total = np.zeros(len(trajectory.t))
+    for i in free_bodies(scene):
+        body, twist = scene.bodies[i], trajectory.twist[:, i]
+        total += 0.5 * body.mass * (twist[:, :d] ** 2).sum(axis=1)
+        if d == 2:
+            assert isinstance(body.inertia, float | int)
+            total += 0.5 * body.inertia * twist[:, 2] ** 2
+        else:
+            spin = np.einsum("sij,si->sj", rotation(trajectory.pose[:, i]), twist[:, 3:])
+            total += 0.5 * (spin**2 @ np.array(body.inertia))
+    return total
+
+
+def lateral_drift(trajectory: Trajectory) -> float:
+    """Largest horizontal displacement of any body between start and end [m]."""
+    d = trajectory.dimension
+    moved = trajectory.pose[-1, :, : d - 1] - trajectory.pose[0, :, : d - 1]
+    return float(np.linalg.norm(moved, axis=1).max())
+
+
+def deepest_overlap(scene: Scene, trajectory: Trajectory) -> float:
+    """Deepest overlap of neighbouring bodies at any sample, >= 0 [m]."""
+    worst = 0.0
+    for i in range(len(scene.bodies) - 1):
+        a, b = scene.bodies[i].shape, scene.bodies[i + 1].shape
+        gap = separation(a, trajectory.pose[:, i], b, trajectory.pose[:, i + 1])
+        worst = max(worst, -float(gap.min()))
+    return worst
+
+
+def interface_load(
+    trajectory: Trajectory, a: int, b: int, weight_impulse: float, window: float
+) -> tuple[Measured, float | None]:
+    """Mean and standard deviation over the last ``window`` seconds of the vertical impulse a -> b per step.
+
+    Both are relative to ``weight_impulse`` [N s], the weight above times dt.
+    """
+    contacts = trajectory.contacts
+    if contacts is None:
+        return (None, "contacts were not recorded"), None
+    late = trajectory.t[contacts.step] > trajectory.t[-1] - window
+    vertical = contacts.impulse_between(a, b)[late, -1] / weight_impulse
+    if len(vertical) == 0 or np.isnan(vertical).any():
+        return (None, UNAVAILABLE), None
+    return (float(vertical.mean()), ""), float(vertical.std())
+
+
+def separations(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
+    """Separation of every pair that can meet, by body indices; each (s,) [m]."""
+    return {
+        (i, j): separation(scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j])
+        for i, j, _ in scene.contact_pairs()
+        if not (isinstance(scene.bodies[i].shape, HalfSpace) and isinstance(scene.bodies[j].shape, HalfSpace))
+    }

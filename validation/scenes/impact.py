@@ -1,0 +1,110 @@
+"""A ball hits an immovable floor in free space: the bare impact law.
+
+          o   m = 0.5 kg, r = 0.5 m
+          |  v                          v+ = -e v-
+          v                             J  = m (1 + e) v
+    ==============  floor               (no gravity: nothing else acts)
+
+Gravity is left out because it would add g dt to what is sampled: rebound ratios belong in free space. Friction
+cannot act on a central hit and is 0, so that no solver needs rotation or friction rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Sampling, Trajectory
+from validation import metrics
+from validation.canonical import CanonicalScene, Measured, Parameter, Track
+from validation.scenes.parts import ball, floor, upward
+
+#: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
+AFTERMATH = 0.45
+
+
+def make(dimension: int, params: Mapping[str, float]) -> Scene:
+    """Build the scene: the ball reaches the floor after ``delay`` seconds."""
+    radius, v = params["radius"], params["v"]
+    centre = radius + v * params["delay"]
+    return Scene(
+        "impact",
+        1,
+        dimension,
+        (floor(dimension), ball("ball", dimension, params["mass"], radius, centre, -v)),
+        (Pair(restitution=params["e"], friction=params["mu"]),),
+        upward(dimension, 0.0),
+        params["delay"] + AFTERMATH,
+        params,
+    )
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Newton's law of restitution against a partner of infinite mass."""
+    e, v, mass = scene.params["e"], scene.params["v"], scene.params["mass"]
+    return {
+        "rebound_ratio": e,
+        "rebound_speed": e * v,
+        "velocity_change": (1.0 + e) * v,
+        "impulse": mass * (1.0 + e) * v,
+        "momentum_defect": 0.0,
+    }
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Velocity at the end, impulses summed over the whole contact."""
+    up = scene.dimension - 1
+    mass, v = scene.params["mass"], scene.params["v"]
+    v_end = float(trajectory.twist[-1, 1, up])
+    change = v_end + v
+    impulse = metrics.total_impulse(trajectory, 0, 1)
+    along: Measured = (None, impulse[1]) if impulse[0] is None else (float(impulse[0][up]), "")
+    defect: Measured = (None, along[1]) if along[0] is None else (abs(mass * change - along[0]) / (mass * v), "")
+    return {
+        "rebound_ratio": (v_end / v, ""),
+        "rebound_speed": (v_end, ""),
+        "velocity_change": (change, ""),
+        "impulse": along,
+        "momentum_defect": defect,
+    }
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step, with contacts from the start: the impulse is summed over the contact."""
+    return Sampling(1, 0.0)
+
+
+def track(scene: Scene) -> Track:
+    """Straight in, straight out."""
+    p = scene.params
+
+    def position(t: float) -> tuple[float, ...]:
+        since = t - p["delay"]
+        return upward(scene.dimension, p["radius"] - p["v"] * since * (1.0 if since < 0.0 else -p["e"]))
+
+    return Track("ball", position)
+
+
+IMPACT = CanonicalScene(
+    "impact",
+    1,
+    "Ball against an immovable floor, no gravity",
+    __doc__ or "",
+    "v+ = -e v-,  J = m (1 + e) v",
+    (2, 3),
+    (
+        Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
+        Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
+        # 12.6 steps of 1/240 s: the contact falls inside a step, not on its edge, where engines may differ by
+        # whether a touching contact counts.
+        Parameter("delay", 0.0525, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
+        Parameter("mass", 0.5, "kg", "of the ball (worked example)", 0.0, 1e6, positive=True),
+        Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
+    ),
+    make,
+    exact,
+    measure,
+    sampling,
+    track,
+)

@@ -1,0 +1,43 @@
+"""Bodies and directions that the canonical scenes share, in two and three dimensions."""
+
+from __future__ import annotations
+
+from adapters.scene import Body, Box, Disc, HalfSpace, Sphere
+
+
+def upward(dimension: int, length: float) -> tuple[float, ...]:
+    """Vector of ``length`` along the vertical."""
+    return (0.0,) * (dimension - 1) + (length,)
+
+
+def floor(dimension: int) -> Body:
+    """Immovable half-space below height 0."""
+    return Body("floor", HalfSpace(upward(dimension, 1.0), 0.0), motion="fixed")
+
+
+def pose_at(dimension: int, position: tuple[float, ...]) -> tuple[float, ...]:
+    """Pose at ``position``, not turned."""
+    return (*position, 0.0) if dimension == 2 else (*position, 1.0, 0.0, 0.0, 0.0)
+
+
+def ball(name: str, dimension: int, mass: float, radius: float, height: float, speed: float = 0.0) -> Body:
+    """Disc (I = m r^2/2) or solid sphere (I = 2 m r^2/5), centre at ``height``, moving up with ``speed``."""
+    spin = (0.0,) if dimension == 2 else (0.0, 0.0, 0.0)
+    inertia: float | tuple[float, float, float]
+    inertia = 0.5 * mass * radius**2 if dimension == 2 else (0.4 * mass * radius**2,) * 3
+    return Body(
+        name,
+        Disc(radius) if dimension == 2 else Sphere(radius),
+        mass,
+        inertia,
+        pose_at(dimension, upward(dimension, height)),
+        (*upward(dimension, speed), *spin),
+    )
+
+
+def cube(name: str, dimension: int, mass: float, side: float, height: float) -> Body:
+    """Square or cube, centre at ``height``, at rest; I = m s^2/6 about every principal axis."""
+    moment = mass * side**2 / 6.0
+    inertia: float | tuple[float, float, float] = moment if dimension == 2 else (moment,) * 3
+    shape = Box((0.5 * side,) * dimension)
+    return Body(name, shape, mass, inertia, pose_at(dimension, upward(dimension, height)))
