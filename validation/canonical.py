@@ -57,10 +57,24 @@ class Parameter:
         if not math.isfinite(value):
             raise SceneError(f"{label}: {value!r} is not a finite number")
         if value < self.low or value > self.high or (self.positive and value == self.low):
-            raise SceneError(f"{label}: {value:g} must lie in {'(' if self.positive else '['}{self.low:g}, {self.high:g}]")
+            raise SceneError(
+                f"{label}: {value:g} must lie in {'(' if self.positive else '['}{self.low:g}, {self.high:g}]"
+            )
         if self.integer and value != int(value):
             raise SceneError(f"{label}: {value:g} must be a whole number")
         return float(value)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One judged number: PASS if |value - truth| <= bound."""
+
+    metric: str
+    unit: str
+    truth: float
+    bound: float
+    because: str
+    source: str
 
 
 #: A measured value, or None and why there is none.
@@ -101,6 +115,8 @@ class CanonicalScene:
         What has to be recorded.
     track
         Exact motion for the replay's ghost, or None.
+    rule
+        The stated tolerances, from `validation.tolerances`.
     """
 
     name: str
@@ -115,6 +131,11 @@ class CanonicalScene:
     measure: Callable[[Scene, Trajectory], dict[str, Measured]]
     sampling: Callable[[Scene], Sampling]
     track: Callable[[Scene], Track | None]
+    rule: Callable[[Scene, float, dict[str, float]], list[Check]]
+
+    def checks(self, scene: Scene, dt: float) -> list[Check]:
+        """State all checks of ``scene`` at step ``dt`` [s]: truth, bound and reason."""
+        return self.rule(scene, dt, self.exact(scene))
 
     def complete(self, params: Mapping[str, float]) -> dict[str, float]:
         """All parameters with their values, defaults filled in.

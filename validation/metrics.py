@@ -140,7 +140,9 @@ def interface_load(
 def separations(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
     """Separation of every pair that can meet, by body indices; each (s,) [m]."""
     return {
-        (i, j): separation(scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j])
+        (i, j): separation(
+            scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j]
+        )
         for i, j, _ in scene.contact_pairs()
         if not (isinstance(scene.bodies[i].shape, HalfSpace) and isinstance(scene.bodies[j].shape, HalfSpace))
     }

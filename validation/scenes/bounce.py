@@ -17,15 +17,12 @@ from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
-from validation import metrics
+from validation import metrics, tolerances
 from validation.canonical import GRAVITY, CanonicalScene, Measured, Parameter, Track
 from validation.scenes.parts import ball, floor, upward
+from validation.tolerances import APEXES
 
 RADIUS = 0.5
-#: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
-APEXES = 5
-#: An arc counts if its launch speed is above this many g dt: shorter ones are a handful of samples.
-RESOLVED = 20.0
 
 
 def rest_time(e: float, height: float, g: float = GRAVITY) -> float:
@@ -117,7 +114,15 @@ BOUNCE = CanonicalScene(
     (2, 3),
     (
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
-        Parameter("height", 1.0, "m", "clearance at release; sets the phase of every impact", 0.0, 1e4, positive=True),
+        Parameter(
+            "height",
+            1.0,
+            "m",
+            "clearance at release; sets the phase of every impact",
+            0.0,
+            1e4,
+            positive=True,
+        ),
         Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
         Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
         Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
@@ -127,4 +132,5 @@ BOUNCE = CanonicalScene(
     measure,
     sampling,
     track,
+    tolerances.bounce_checks,
 )

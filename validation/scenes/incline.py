@@ -15,7 +15,7 @@ from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
-from validation import metrics
+from validation import metrics, tolerances
 from validation.canonical import GRAVITY, CanonicalScene, Measured, Parameter, Track
 from validation.scenes.parts import cube, floor
 
@@ -90,4 +90,5 @@ INCLINE = CanonicalScene(
     measure,
     sampling,
     track,
+    tolerances.incline_checks,
 )

@@ -1,0 +1,228 @@
+"""Slots, cells and observations: what was asked, what ran, what came out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from enum import Enum
+from fractions import Fraction
+from typing import Any
+
+from adapters.needs import needs
+from adapters.registry import find
+from adapters.scene import Scene, SceneError
+from validation.canonical import CanonicalScene, Measured
+from validation.identity import adapter_hash
+from validation.posed import resolve
+
+
+class Outcome(Enum):
+    """What became of a cell."""
+
+    OK = "ok"
+    UNSUPPORTED = "unsupported"
+    NOT_INSTALLED = "not_installed"
+    INVALID = "invalid"
+    DIVERGED = "diverged"
+    CRASHED = "crashed"
+    TIMED_OUT = "timed_out"
+
+
+def format_dt(dt: float) -> str:
+    """``1/240`` where the step is one over a whole number, else the shortest decimal."""
+    per_second = 1.0 / dt
+    return f"1/{round(per_second)}" if 1.0 / round(per_second) == dt else repr(dt)
+
+
+def parse_dt(text: str) -> float:
+    """Read a step [s] written as a decimal or a fraction.
+
+    Raises
+    ------
+    SceneError
+        If it is not a positive, finite number.
+    """
+    try:
+        # Divided in floating point: 1/240 must be the double that 1 / 240 gives, not a rounded decimal.
+        numerator, _, denominator = text.partition("/")
+        dt = float(numerator) / float(denominator) if denominator else float(Fraction(text))
+    except (ValueError, ZeroDivisionError):
+        raise SceneError(f"dt: {text!r} is not a number of seconds such as 1/240 or 0.004") from None
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise SceneError(f"dt: {text} must be a positive, finite number of seconds")
+    return dt
+
+
+@dataclass(frozen=True)
+class Slot:
+    """What was asked; comparisons, findings and dashboards join on it.
+
+    Parameters
+    ----------
+    scene
+        Name in the catalogue, or path of a scene file.
+    params
+        Only what differs from the defaults, sorted by name.
+    iterations
+        None: the profile's own count.
+    ulp
+        Units in the last place by which the start height is moved (measures the noise floor).
+    """
+
+    scene: str
+    params: tuple[tuple[str, float], ...]
+    dimension: int
+    engine: str
+    profile: str
+    dt: float
+    iterations: int | None = None
+    ulp: int = 0
+
+    def key(self) -> str:
+        """Sixteen hex digits that identify the slot."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+
+    def params_text(self) -> str:
+        """``e=0.8 height=1.03``."""
+        return " ".join(f"{name}={value:.12g}" for name, value in self.params)
+
+    def with_params(self, params: Mapping[str, float]) -> Slot:
+        """Return the same slot with other parameters."""
+        return replace(self, params=tuple(sorted(params.items())))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data that `slot_from_dict` reads back."""
+        return {**asdict(self), "params": dict(self.params)}
+
+
+def slot_from_dict(data: Mapping[str, Any]) -> Slot:
+    """Inverse of `Slot.as_dict`.
+
+    Raises
+    ------
+    SceneError
+        Naming a missing, unknown or malformed field.
+    """
+    fields = set(Slot.__dataclass_fields__)
+    for name in data:
+        if name not in fields:
+            raise SceneError(f"slot.{name}: unknown field; a slot has {', '.join(sorted(fields))}")
+    for name in ("scene", "engine", "profile", "dt"):
+        if name not in data:
+            raise SceneError(f"slot.{name}: is missing")
+    dt = parse_dt(str(data["dt"]))
+    iterations = data.get("iterations")
+    if iterations is not None and (not isinstance(iterations, int) or iterations < 1):
+        raise SceneError(f"slot.iterations: {iterations!r} must be a whole number of at least 1")
+    try:
+        params = tuple(sorted((str(k), float(v)) for k, v in dict(data.get("params", {})).items()))
+    except (TypeError, ValueError):
+        raise SceneError(f"slot.params: {data.get('params')!r} is not a table of numbers") from None
+    dimension, ulp = int(data.get("dimension", 2)), int(data.get("ulp", 0))
+    return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What ran: a slot and the identity of everything that decides its answer."""
+
+    slot: Slot
+    scene_hash: str
+    engine_version: str
+    adapter_hash: str
+    settings_hash: str
+    python: str
+
+    def key(self) -> str:
+        """Sixteen hex digits that identify the cell."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What came out of a cell. Measurements only: verdicts are derived from it, never stored."""
+
+    slot: Slot
+    cell: str
+    scene_version: int
+    engine_version: str
+    outcome: Outcome
+    reason: str = ""
+    metrics: Mapping[str, Measured] = field(default_factory=dict)
+    state_hash: str = ""
+    steps: int = 0
+    wall_time_s: float = 0.0
+    settings: tuple[Mapping[str, Any], ...] = ()
+    receipts: tuple[Mapping[str, Any], ...] = ()
+    readback: Mapping[str, Any] = field(default_factory=dict)
+    certificate: Mapping[str, Any] = field(default_factory=dict)
+    initial_change: tuple[str, ...] = ()
+    out_of_plane: float = 0.0
+    log: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready) that `observation_from_dict` reads back."""
+        data = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        data |= {"slot": self.slot.as_dict(), "outcome": self.outcome.value}
+        data["metrics"] = {name: list(measured) for name, measured in self.metrics.items()}
+        return data
+
+
+def observation_from_dict(data: Mapping[str, Any]) -> Observation:
+    """Inverse of `Observation.as_dict`."""
+    values = dict(data)
+    values |= {"slot": slot_from_dict(data["slot"]), "outcome": Outcome(data["outcome"])}
+    values["metrics"] = {name: (value, reason) for name, (value, reason) in data["metrics"].items()}
+    for name in ("settings", "receipts", "initial_change"):
+        values[name] = tuple(data[name])
+    return Observation(**values)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A slot made concrete: its scene and the cell it will be."""
+
+    canonical: CanonicalScene
+    scene: Scene
+    cell: Cell
+
+
+def prepare(slot: Slot) -> Prepared:
+    """Make the slot's scene and the identity of its cell, without loading the engine's own library.
+
+    Raises
+    ------
+    SceneError, EngineError
+        For bad parameters, an unknown scene, engine or profile.
+    """
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    if slot.ulp:
+        scene = _nudged(scene, slot.ulp)
+    found = find(slot.engine)
+    settings: list[Any] = []
+    if found.engine is not None:
+        settings = found.engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
+    text = json.dumps([(s.name, s.value) for s in settings], sort_keys=True, default=str)
+    settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
+    version = ".".join(platform.python_version_tuple()[:2])
+    cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)
+    return Prepared(canonical, scene, cell)
+
+
+def _nudged(scene: Scene, ulp: int) -> Scene:
+    """Move every free body up by ``ulp`` units in the last place of its height."""
+    up = scene.dimension - 1
+
+    def nudge(pose: tuple[float, ...]) -> tuple[float, ...]:
+        height = pose[up]
+        for _ in range(abs(ulp)):
+            height = math.nextafter(height, math.copysign(math.inf, ulp))
+        return (*pose[:up], height, *pose[up + 1 :])
+
+    bodies = tuple(replace(b, pose=nudge(b.pose)) if b.motion == "free" else b for b in scene.bodies)
+    return replace(scene, bodies=bodies)

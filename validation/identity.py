@@ -1,0 +1,93 @@
+"""What code and what machine an answer came from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import subprocess
+from functools import cache
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import reference_solver
+
+import adapters
+import validation
+from adapters.registry import GROUP
+
+
+def _hash_files(paths: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in sorted(paths):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sources(package: Any) -> list[Path]:
+    return list(Path(package.__file__).parent.rglob("*.py"))
+
+
+@cache
+def adapter_hash(engine: str) -> str:
+    """Hash of everything of ours between a scene and this engine's trajectory.
+
+    The shared vocabulary and step loop, the engine's own adapter file, and for the reference engine its solver.
+    """
+    entry = {e.name: e for e in entry_points(group=GROUP)}[engine]
+    spec = find_spec(entry.module)
+    own = [Path(spec.origin)] if spec and spec.origin else []
+    engines = {e.module.rsplit(".", 1)[-1] + ".py" for e in entry_points(group=GROUP)}
+    shared = [p for p in _sources(adapters) if p.name not in engines]
+    solver = _sources(reference_solver) if entry.module == "adapters.reference" else []
+    return _hash_files([*shared, *own, *solver])
+
+
+@cache
+def code_hash() -> str:
+    """Hash of all our code that decides stored measurements (not of what judges or shows them)."""
+    return _hash_files([*_sources(adapters), *_sources(reference_solver), *_sources(validation)])
+
+
+def commit() -> str:
+    """Commit of the checkout, with ``+`` if it has uncommitted changes; empty outside a checkout."""
+    root = Path(validation.__file__).parent.parent
+    try:
+        head = subprocess.run(
+            ["git", "-C", str(root), "rev-parse", "--short=12", "HEAD"],
+            capture_output=True,
+            text=True,
+            timeout=10,
+        )
+        if head.returncode:
+            return ""
+        status = subprocess.run(
+            ["git", "-C", str(root), "status", "--porcelain"], capture_output=True, text=True, timeout=10
+        )
+        return head.stdout.strip() + ("+" if status.stdout.strip() else "")
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+
+
+def machine() -> dict[str, Any]:
+    """CPU, cores, memory, system and Python: what a time means, and what may move a last bit."""
+    return {
+        "cpu": _cpu_name(),
+        "cores": os.cpu_count() or 0,
+        "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
+        "system": f"{platform.system()} {platform.release()}",
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+    }
+
+
+def _cpu_name() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

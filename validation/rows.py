@@ -1,0 +1,177 @@
+"""Rows: every engine x profile x scene x check, judged. What people see is made from these and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from adapters.scene import Scene
+from validation.canonical import Check
+from validation.cells import Observation, Outcome, Slot
+from validation.deviations import covering
+from validation.findings import listed, row_key
+from validation.posed import resolve
+from validation.studies import STUDIES, StudyResult
+from validation.verdicts import Physics, Standing, Verdict, judge, predicted
+
+#: Standings and outcomes that make the command exit 1.
+ALARMING_STANDINGS = ("new", "drifted")
+ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One judged check of one cell (or of one study); JSON-ready. Field names are the public ones."""
+
+    run: str
+    engine: str
+    engine_version: str
+    profile: str
+    scene: str
+    dimension: int
+    params: dict[str, float]
+    dt: float
+    iterations: int | None
+    check: str
+    metric: str
+    unit: str
+    value: float | None
+    truth: float | None
+    error: float | None
+    tolerance: float | None
+    because: str
+    outcome: str
+    physics: str | None
+    standing: str | None
+    reason: str
+    state_hash: str
+    steps: int
+    wall_time_s: float
+    source: str = ""
+    log: str = ""
+    initial_change: list[str] = field(default_factory=list)
+    slot: dict[str, Any] = field(default_factory=dict)
+    cells: list[str] = field(default_factory=list)
+
+    @property
+    def alarming(self) -> bool:
+        """Whether this row makes the command fail."""
+        return self.standing in ALARMING_STANDINGS or self.outcome in ALARMING_OUTCOMES
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def rows_of(run: str, observations: Iterable[Observation]) -> list[Row]:
+    """Judge all checks of all observations, and the studies that they feed."""
+    observations = list(observations)
+    rows = [row for observation in observations for row in _cell_rows(run, observation)]
+    return rows + [_study_row(run, result) for study in STUDIES for result in study.results(observations)]
+
+
+def _cell_rows(run: str, observation: Observation) -> list[Row]:
+    canonical = resolve(observation.slot.scene)
+    scene = canonical.scene(observation.slot.dimension, dict(observation.slot.params))
+    checks = canonical.checks(scene, observation.slot.dt)
+    return [_row(run, observation, scene, check) for check in checks]
+
+
+def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
+    slot = observation.slot
+    value, why = observation.metrics.get(check.metric, (None, ""))
+    if observation.outcome in (Outcome.OK, Outcome.INVALID):
+        laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
+        known = listed(slot.engine)
+        finding = (known or {}).get(row_key(slot, check.metric))
+        verdict = judge(value, check, predicted(laws, scene, slot), finding, known is not None)
+        if observation.outcome is Outcome.INVALID:
+            verdict = Verdict(None, None, observation.reason)
+    else:
+        verdict = _verdict_of_outcome(observation, check)
+    reason = "; ".join(text for text in (why, verdict.reason) if text)
+    return _assemble(run, observation, slot, dict(scene.params), check, value, verdict, reason)
+
+
+def _verdict_of_outcome(observation: Observation, check: Check) -> Verdict:
+    """Diverged is a FAIL; unsupported must be on the list; the rest has no physics."""
+    slot = observation.slot
+    known = listed(slot.engine)
+    finding = (known or {}).get(row_key(slot, check.metric))
+    if observation.outcome is Outcome.DIVERGED:
+        standing = Standing.KNOWN if finding else (Standing.NEW if known is not None else None)
+        reason = f"{observation.reason}; {finding.reason.text}" if finding else observation.reason
+        return Verdict(Physics.FAIL, standing, reason)
+    if observation.outcome is Outcome.UNSUPPORTED and known is not None:
+        listed_so = (known or {}).get(row_key(slot, "*"))
+        standing = Standing.KNOWN if listed_so or finding else Standing.NEW
+        return Verdict(None, standing, observation.reason)
+    return Verdict(None, None, observation.reason)
+
+
+def _assemble(
+    run: str,
+    observation: Observation,
+    slot: Slot,
+    params: dict[str, float],
+    check: Check,
+    value: float | None,
+    verdict: Verdict,
+    reason: str,
+) -> Row:
+    return Row(
+        run=run,
+        engine=slot.engine,
+        engine_version=observation.engine_version,
+        profile=slot.profile,
+        scene=slot.scene,
+        dimension=slot.dimension,
+        params=params,
+        dt=slot.dt,
+        iterations=slot.iterations,
+        check=f"{slot.scene}/{check.metric}",
+        metric=check.metric,
+        unit=check.unit,
+        value=value,
+        truth=check.truth,
+        error=None if value is None else value - check.truth,
+        tolerance=check.bound,
+        because=check.because,
+        outcome=observation.outcome.value,
+        physics=verdict.physics.value if verdict.physics else None,
+        standing=verdict.standing.value if verdict.standing else None,
+        reason=reason,
+        state_hash=observation.state_hash,
+        steps=observation.steps,
+        wall_time_s=observation.wall_time_s,
+        source=check.source,
+        log=observation.log,
+        initial_change=list(observation.initial_change),
+        slot=slot.as_dict(),
+        cells=[observation.cell],
+    )
+
+
+def _study_row(run: str, result: StudyResult) -> Row:
+    """Judge a study like an observation; its row lists its cells."""
+    slot, check = result.slot, result.check
+    known = listed(slot.engine)
+    finding = (known or {}).get(row_key(slot, check.metric))
+    verdict = judge(result.value, check, (), finding, known is not None)
+    reason = "; ".join(text for text in (result.reason, verdict.reason) if text)
+    row = _assemble(run, result.observation, slot, {}, check, result.value, verdict, reason)
+    return Row(
+        **{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0}
+    )
+
+
+def frame(rows: Sequence[Row]) -> pd.DataFrame:
+    """Rows as a DataFrame, one column per field, parameters as ``param.<name>`` columns as well."""
+    plain = [row.as_dict() for row in rows]
+    table = pd.DataFrame(plain, columns=list(Row.__dataclass_fields__))
+    params = pd.json_normalize([row["params"] for row in plain]).add_prefix("param.")
+    params.index = table.index
+    return pd.concat([table, params], axis=1)
