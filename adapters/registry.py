@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from adapters.engine import Engine, EngineError
@@ -35,7 +35,7 @@ def names() -> list[str]:
     return ours + sorted(set(registered) - set(ours))
 
 
-@lru_cache(maxsize=None)
+@cache
 def find(name: str) -> Found:
     """Load the engine called ``name``; never raises for an engine that is missing or broken.
 

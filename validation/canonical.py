@@ -67,12 +67,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Check:
-    """One judged number: PASS if |value - truth| <= bound."""
+    """One judged number: PASS if |value - truth| <= bound; shown but not judged if there is no truth."""
 
     metric: str
     unit: str
-    truth: float
-    bound: float
+    truth: float | None
+    bound: float | None
     because: str
     source: str
 

@@ -30,10 +30,10 @@ def apexes(t: Array, height: Array, velocity: Array) -> tuple[Array, Array]:
     turns = np.flatnonzero((velocity[:-1] > 0.0) & (velocity[1:] <= 0.0))
     times, tops = [], []
     for turn in turns:
-        window = slice(max(1, turn - 1), min(len(height) - 1, turn + 3))
-        if window.stop <= window.start:
+        first, last = max(1, int(turn) - 1), min(len(height) - 1, int(turn) + 3)
+        if last <= first:
             continue
-        k = window.start + int(np.argmax(height[window]))
+        k = first + int(np.argmax(height[first:last]))
         before, here, after = height[k - 1 : k + 2]
         curvature = before - 2.0 * here + after
         shift = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
@@ -140,9 +140,7 @@ def interface_load(
 def separations(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
     """Separation of every pair that can meet, by body indices; each (s,) [m]."""
     return {
-        (i, j): separation(
-            scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j]
-        )
+        (i, j): separation(scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j])
         for i, j, _ in scene.contact_pairs()
         if not (isinstance(scene.bodies[i].shape, HalfSpace) and isinstance(scene.bodies[j].shape, HalfSpace))
     }

@@ -137,7 +137,7 @@ def _assemble(
         unit=check.unit,
         value=value,
         truth=check.truth,
-        error=None if value is None else value - check.truth,
+        error=None if value is None or check.truth is None else value - check.truth,
         tolerance=check.bound,
         because=check.because,
         outcome=observation.outcome.value,
@@ -163,9 +163,7 @@ def _study_row(run: str, result: StudyResult) -> Row:
     verdict = judge(result.value, check, (), finding, known is not None)
     reason = "; ".join(text for text in (result.reason, verdict.reason) if text)
     row = _assemble(run, result.observation, slot, {}, check, result.value, verdict, reason)
-    return Row(
-        **{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0}
-    )
+    return Row(**{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0})
 
 
 def frame(rows: Sequence[Row]) -> pd.DataFrame:

@@ -142,17 +142,13 @@ class Store:
         StoreError
             If there is none of that name.
         """
-        where, args = (
-            ("id = ?", (run_id,)) if run_id != "latest" else ("1 ORDER BY date DESC, id DESC LIMIT 1", ())
-        )
+        where, args = ("id = ?", (run_id,)) if run_id != "latest" else ("1 ORDER BY date DESC, id DESC LIMIT 1", ())
         columns = "id, date, commit_hash, machine, title, plan, finished"
         row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
         if row is None:
             known = ", ".join(r[0] for r in self._db.execute("SELECT id FROM runs")) or "none"
             raise StoreError(f"run: there is no run {run_id!r} in {self.path}; it has {known}")
-        return Run(
-            row[0], row[1], row[2], json.loads(row[3]), row[4], tuple(json.loads(row[5])), bool(row[6])
-        )
+        return Run(row[0], row[1], row[2], json.loads(row[3]), row[4], tuple(json.loads(row[5])), bool(row[6]))
 
     def observations(self, run: Run) -> list[Observation]:
         """Observations of a run, in the order of its plan."""

@@ -78,9 +78,7 @@ def _threshold(observations: Sequence[Observation]) -> tuple[float | None, str, 
     if not below or not above:
         return None
     sliding = [ratio for ratio, slides in ratios if slides]
-    low = max(
-        (ratio for ratio, slides in ratios if not slides and ratio < min(sliding, default=2e9)), default=None
-    )
+    low = max((ratio for ratio, slides in ratios if not slides and ratio < min(sliding, default=2e9)), default=None)
     bound = 0.5 * (min(above) - max(below))
     because = f"half the distance between the ratios tried next to 1, {max(below):g} and {min(above):g}"
     check = Check("threshold", "1", 1.0, bound, because, "Coulomb's law: sticks iff tan(theta) <= mu")

@@ -38,9 +38,7 @@ def impact_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Chec
         "velocity_change": ("m/s", v),
         "impulse": ("N s", mass * v),
     }
-    checks = [
-        Check(m, unit, truth[m], ROUND_OFF * scale, because, source) for m, (unit, scale) in units.items()
-    ]
+    checks = [Check(m, unit, truth[m], ROUND_OFF * scale, because, source) for m, (unit, scale) in units.items()]
     momentum = "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law"
     return [*checks, Check("momentum_defect", "1", 0.0, ROUND_OFF, momentum, "conservation of momentum")]
 
@@ -55,9 +53,7 @@ def bounce_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Chec
     per_bounce = 1.0 - e * e + 0.5 * e * (1.0 + e)
     speed, bound = math.sqrt(2.0 * g * height), 0.0
     checks, velocity_error = [], []
-    because = (
-        "impact located within a step: per bounce (1 - e^2 + e (1+e)/2) v dt, shrinking by e^2; + g dt^2/8"
-    )
+    because = "impact located within a step: per bounce (1 - e^2 + e (1+e)/2) v dt, shrinking by e^2; + g dt^2/8"
     for n in range(1, APEXES + 1):
         bound = e * e * bound + per_bounce * speed * dt
         speed *= e
@@ -66,16 +62,12 @@ def bounce_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Chec
         apex = bound + g * dt * dt / 8.0
         velocity_error.append(apex * g / speed)
         name = f"apex[{n}]"
-        checks.append(
-            Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt")
-        )
+        checks.append(Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt"))
     growth = per_bounce * math.sqrt(2.0 * g * height) * dt / height if e == 1.0 else 0.0
     grows = "an apex may exceed the last one by no more than the sampling of an apex, g dt^2/8"
     if e == 1.0:
         grows = "e = 1: an apex may exceed the last one by the impact's location within a step, v dt"
-    checks.append(
-        Check("apex_growth", "1", 0.0, growth + g * dt * dt / 8.0 / height, grows, "conservation of energy")
-    )
+    checks.append(Check("apex_growth", "1", 0.0, growth + g * dt * dt / 8.0 / height, grows, "conservation of energy"))
     if len(velocity_error) >= 3:
         checks.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
     if "rest_time" in truth:
@@ -96,9 +88,7 @@ def _interval_check(e: float, height: float, g: float, dt: float, error: list[fl
 def _rest_check(e: float, height: float, g: float, dt: float, truth: float) -> Check:
     """Allowance for the rest time: location of every bounce, unresolved tail, scatter of phases."""
     speed = math.sqrt(2.0 * g * height)
-    bounces = (
-        math.log(speed / (2.0 * g * dt)) / math.log(1.0 / e) if e > 0.0 and speed > 2.0 * g * dt else 1.0
-    )
+    bounces = math.log(speed / (2.0 * g * dt)) / math.log(1.0 / e) if e > 0.0 and speed > 2.0 * g * dt else 1.0
     tail = 4.0 / (1.0 - e)
     # One bounce found late by a uniform phase changes its speed by (1 - e^2)/e g dt u, u uniform (sd 0.289), and
     # all later times by 2/(1 - e) of that over g; phases are independent, four standard deviations.
@@ -119,27 +109,19 @@ def stack_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check
     load = 2.0 * 0.01 * dt / WINDOW
     moved = "n bodies may each move by what one step of free fall adds, n g dt^2"
     energy = "n bodies below the speed that counts as motion, v1/100 = g dt/100"
-    settles = (
-        "moving at v1/100 for longer would use up the allowed n g dt^2; and the last second must be at rest"
-    )
-    carried = (
-        "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted"
-    )
+    settles = "moving at v1/100 for longer would use up the allowed n g dt^2; and the last second must be at rest"
+    carried = "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted"
     scatter = "a body slower than v1/100 changes its momentum by at most 2 m v1/100 a step"
     source = "static equilibrium"
     checks = [
         Check("settle_time", "s", truth["settle_time"], settle, settles, source),
         Check("drift", "m", truth["drift"], n * x1, moved, source),
         Check("penetration", "m", truth["penetration"], n * x1, moved, source),
-        Check(
-            "kinetic_energy", "J", truth["kinetic_energy"], n * 0.5 * mass * (0.01 * v1) ** 2, energy, source
-        ),
+        Check("kinetic_energy", "J", truth["kinetic_energy"], n * 0.5 * mass * (0.01 * v1) ** 2, energy, source),
         Check("impulse_scatter", "1", truth["impulse_scatter"], 0.02, scatter, source),
     ]
     names = [name for name in truth if name.startswith("interface_impulse")]
-    return checks + [
-        Check(name, "1", truth[name], load, carried, "weight above the interface") for name in names
-    ]
+    return checks + [Check(name, "1", truth[name], load, carried, "weight above the interface") for name in names]
 
 
 def incline_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:

@@ -47,8 +47,8 @@ class Verdict:
 
 
 def judge_physics(value: float | None, check: Check) -> Physics | None:
-    """PASS if |value - truth| <= bound; None where nothing was measured."""
-    if value is None:
+    """PASS if |value - truth| <= bound; None where nothing was measured or there is no truth."""
+    if value is None or check.truth is None or check.bound is None:
         return None
     error = abs(value - check.truth)
     return Physics.PASS if math.isfinite(error) and error <= check.bound else Physics.FAIL
@@ -56,6 +56,8 @@ def judge_physics(value: float | None, check: Check) -> Physics | None:
 
 def is_marginal(value: float, check: Check) -> bool:
     """Within a factor of two of the tolerance, on either side."""
+    if check.truth is None or check.bound is None:
+        return False
     return 0.5 * check.bound <= abs(value - check.truth) <= 2.0 * check.bound
 
 
@@ -95,9 +97,7 @@ def judge(
     predictions = list(predictions)
     for law, centre, band in predictions:
         if abs(value - centre) <= band:
-            return Verdict(
-                physics, Standing.EXPLAINED, f"{law.because} (predicted {centre:.6g} +- {band:.1g})"
-            )
+            return Verdict(physics, Standing.EXPLAINED, f"{law.because} (predicted {centre:.6g} +- {band:.1g})")
     if finding is not None:
         return Verdict(physics, Standing.KNOWN, finding.reason.text)
     if predictions:

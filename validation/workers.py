@@ -126,9 +126,7 @@ def _cause(code: int | None) -> str:
 def _lost(slot: Slot, outcome: Outcome, reason: str, log: Path) -> Observation:
     prepared = prepare(slot)
     cell = prepared.cell
-    return Observation(
-        slot, cell.key(), prepared.scene.version, cell.engine_version, outcome, reason, log=_tail(log)
-    )
+    return Observation(slot, cell.key(), prepared.scene.version, cell.engine_version, outcome, reason, log=_tail(log))
 
 
 def _tail(log: Path) -> str:

@@ -6,7 +6,7 @@ This package and `validation.findings` are the only places in `validation` where
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache, lru_cache
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 

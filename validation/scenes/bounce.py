@@ -1,9 +1,9 @@
-"""A ball is dropped and bounces until it rests.
+r"""A ball is dropped and bounces until it rests.
 
       o  h0          h_n = e^(2n) h0
       |      o  h1   interval between apexes shrinks by e
-      |     / \\  o  h2
-      v    /   \\/ \\/\\       at rest after sqrt(2 h0/g) (1 + e)/(1 - e)
+      |     / \  o  h2
+      v    /   \/ \/\       at rest after sqrt(2 h0/g) (1 + e)/(1 - e)
     =====================
 
 A central fall: friction cannot act and is 0. The height is the clearance below the ball, so the truth does not

@@ -59,9 +59,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     change = v_end + v
     impulse = metrics.total_impulse(trajectory, 0, 1)
     along: Measured = (None, impulse[1]) if impulse[0] is None else (float(impulse[0][up]), "")
-    defect: Measured = (
-        (None, along[1]) if along[0] is None else (abs(mass * change - along[0]) / (mass * v), "")
-    )
+    defect: Measured = (None, along[1]) if along[0] is None else (abs(mass * change - along[0]) / (mass * v), "")
     return {
         "rebound_ratio": (v_end / v, ""),
         "rebound_speed": (v_end, ""),
@@ -96,14 +94,10 @@ IMPACT = CanonicalScene(
     (2, 3),
     (
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
-        Parameter(
-            "v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True
-        ),
+        Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
         # 12.6 steps of 1/240 s: the contact falls inside a step, not on its edge, where engines may differ by
         # whether a touching contact counts.
-        Parameter(
-            "delay", 0.0525, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True
-        ),
+        Parameter("delay", 0.0525, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
         Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
         Parameter("mass", 0.5, "kg", "of the ball (worked example)", 0.0, 1e6, positive=True),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),

@@ -1,0 +1,32 @@
+# One command each, with its own set-up: `make run` runs the quick suite, `make test` runs the tests.
+# PyBullet has no wheel beyond CPython 3.11, so a python3.11 that really runs is preferred.
+PYTHON ?= $(shell for p in python3.11 python3; do $$p -c '' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+OUT ?= crosscheck-out
+
+.PHONY: run test lint setup clean
+
+setup: $(STAMP)
+
+# An editable install goes stale when entry points or pins change, so both files re-install.
+$(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "no working python3.11 or python3 on PATH"; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" -c constraints.txt
+	@touch $@
+
+run: $(STAMP)
+	$(BIN)/crosscheck run --quick --out $(OUT)
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -n auto
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,126 @@
+"""Results as files: JSON, JSON Lines, CSV, Markdown, JUnit XML, and as a DataFrame."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pandas as pd
+
+from reports.findings import finding_line, grouped
+from reports.matrix import legend, matrix_of, versions_of
+from reports.wording import LABELS, mark_of
+from validation.rows import Row, frame, rows_of
+from validation.store import Store
+
+Plain = Mapping[str, Any]
+
+
+def load(folder: str | Path = "crosscheck-out", run: str = "latest") -> pd.DataFrame:
+    """Rows of a run as a DataFrame, judged with today's checks, laws and findings.
+
+    Raises
+    ------
+    StoreError
+        If the folder has no results or no such run.
+    """
+    return frame(load_rows(folder, run))
+
+
+def load_rows(folder: str | Path = "crosscheck-out", run: str = "latest") -> list[Row]:
+    """Rows of a run; see `load`."""
+    store = Store(Path(folder), create=False)
+    try:
+        chosen = store.run(run)
+        return rows_of(chosen.id, store.observations(chosen))
+    finally:
+        store.close()
+
+
+def as_json(rows: Sequence[Plain]) -> str:
+    """One JSON array."""
+    return json.dumps(list(rows), allow_nan=False, indent=1)
+
+
+def as_jsonl(rows: Sequence[Plain]) -> str:
+    """One JSON object per line."""
+    return "".join(json.dumps(row, allow_nan=False) + "\n" for row in rows)
+
+
+def as_csv(rows: Sequence[Plain]) -> str:
+    """Flat table: parameters as ``e=0.8 height=1``, lists joined by ``;``."""
+    stream = StringIO()
+    names = [name for name in Row.__dataclass_fields__ if name not in ("slot", "log")]
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow([_flat(row[name]) for name in names])
+    return stream.getvalue()
+
+
+def _flat(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return " ".join(f"{k}={v:.12g}" for k, v in value.items())
+    if isinstance(value, list):
+        return ";".join(str(item) for item in value)
+    return repr(value) if isinstance(value, float) else value
+
+
+def as_markdown(rows: Sequence[Plain]) -> str:
+    """Verdict matrix and findings that need attention, fit for a step summary."""
+    matrix, versions = matrix_of(rows), versions_of(rows)
+    heads = [f"{engine}/{profile}<br>{versions.get(engine, '')}" for engine, profile in matrix.columns]
+    out = ["| scene | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
+    for line in matrix.lines:
+        fields = [matrix.fields.get((line, column)) for column in matrix.columns]
+        out.append(f"| {line[0]} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
+    out += ["", legend().replace("|", "\\|"), ""]
+    for mark, group in grouped(rows):
+        out.append(f"**{LABELS[mark]}**: {len(group)} rows")
+        if mark in ("crashed", "timed_out", "invalid", "new", "drifted"):
+            out += [f"* {finding_line(row)}" for row in group]
+    return "\n".join(out) + "\n"
+
+
+def as_junit(rows: Sequence[Plain]) -> str:
+    """JUnit XML: a suite per engine and profile; only what makes the command fail is a failure."""
+    root = ElementTree.Element("testsuites", name="contact-crosscheck")
+    suites: dict[str, ElementTree.Element] = {}
+    for row in rows:
+        name = f"{row['engine']}/{row['profile']}"
+        suite = suites.setdefault(name, ElementTree.SubElement(root, "testsuite", name=name))
+        params = _flat(row["slot"]["params"])
+        case = ElementTree.SubElement(
+            suite,
+            "testcase",
+            classname=f"{name}.{row['scene']}{row['dimension']}d",
+            name=f"{row['metric']} {params} dt={row['dt']:.6g} it={row['iterations'] or 'own'}",
+        )
+        mark = mark_of(row)
+        if mark in ("crashed", "timed_out"):
+            ElementTree.SubElement(case, "error", message=finding_line(row)).text = row["log"]
+        elif mark in ("invalid", "new", "drifted"):
+            ElementTree.SubElement(case, "failure", message=finding_line(row))
+        elif mark in ("unsupported", "not_installed", "none"):
+            ElementTree.SubElement(case, "skipped", message=row["reason"])
+        elif mark != "pass":
+            ElementTree.SubElement(case, "system-out").text = finding_line(row)
+    for suite in suites.values():
+        suite.set("tests", str(len(suite)))
+        for attribute, tag in (("errors", "error"), ("failures", "failure"), ("skipped", "skipped")):
+            suite.set(attribute, str(len(suite.findall(f"testcase/{tag}"))))
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def write_all(folder: Path, rows: Sequence[Plain]) -> dict[str, Path]:
+    """Write rows.jsonl, rows.csv and summary.md into ``folder``."""
+    texts = {"rows.jsonl": as_jsonl(rows), "rows.csv": as_csv(rows), "summary.md": as_markdown(rows)}
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return {name: folder / name for name in texts}

@@ -1,0 +1,148 @@
+"""What there is: ``list``, ``describe`` and ``doctor``, as data; the command prints it as text or JSON."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from adapters import registry
+from adapters.needs import needs
+from adapters.scene import SceneError
+from validation.identity import commit, machine
+from validation.plan import QUICK_DT, variations
+from validation.posed import resolve
+from validation.scenes import CATALOGUE
+
+
+def scenes() -> list[dict[str, Any]]:
+    """Scenes of the catalogue."""
+    return [
+        {"name": s.name, "version": s.version, "title": s.title, "dimensions": list(s.dimensions), "law": s.law}
+        for s in CATALOGUE.values()
+    ]
+
+
+def engines() -> list[dict[str, Any]]:
+    """All registered engines, installed or not."""
+    out: list[dict[str, Any]] = []
+    for name in registry.names():
+        found = registry.find(name)
+        profiles = list(found.engine.profiles) if found.engine else []
+        status = "installed" if found.engine else "not installed"
+        out.append(
+            {"name": name, "version": found.version, "status": status, "profiles": profiles, "reason": found.reason}
+        )
+    return out
+
+
+def checks() -> list[dict[str, Any]]:
+    """Every check at the defaults of its scene and dt 1/240."""
+    out: list[dict[str, Any]] = []
+    for canonical in CATALOGUE.values():
+        seen: dict[str, dict[str, Any]] = {}
+        for variation in variations(canonical.name, "quick"):
+            scene = canonical.scene(canonical.dimensions[0], variation.params)
+            for check in canonical.checks(scene, QUICK_DT):
+                name = f"{canonical.name}/{check.metric.partition('[')[0]}"
+                seen.setdefault(name, {"name": name, **asdict(check)})
+        out += seen.values()
+    return out
+
+
+def describe(name: str) -> dict[str, Any]:
+    """Everything about one scene or engine.
+
+    Raises
+    ------
+    SceneError
+        If nothing is called that.
+    """
+    if name in registry.names():
+        return _describe_engine(name)
+    try:
+        return _describe_scene(name)
+    except SceneError:
+        known = [*CATALOGUE, *registry.names()]
+        raise SceneError(f"name: nothing is called {name!r}; known: {', '.join(known)}") from None
+
+
+def _describe_scene(name: str) -> dict[str, Any]:
+    canonical = resolve(name)
+    scene = canonical.scene(canonical.dimensions[0])
+    return {
+        "kind": "scene",
+        "name": canonical.name,
+        "version": canonical.version,
+        "title": canonical.title,
+        "figure": canonical.figure,
+        "law": canonical.law,
+        "dimensions": list(canonical.dimensions),
+        "parameters": [asdict(parameter) for parameter in canonical.parameters],
+        "needs": asdict(needs(scene)),
+        "checks_at_defaults": [asdict(check) for check in canonical.checks(scene, QUICK_DT)],
+    }
+
+
+def _describe_engine(name: str) -> dict[str, Any]:
+    found = registry.find(name)
+    out: dict[str, Any] = {"kind": "engine", "name": name, "version": found.version}
+    if found.engine is None:
+        return {**out, "status": "not installed", "reason": found.reason}
+    facts = found.engine.facts
+    profiles: dict[str, Any] = {}
+    for profile in found.engine.profiles:
+        per_scene = {}
+        for canonical in CATALOGUE.values():
+            wanted = needs(canonical.scene(canonical.dimensions[-1]))
+            per_scene[canonical.name] = [asdict(s) for s in found.engine.settings(profile, wanted, QUICK_DT)]
+        profiles[profile] = per_scene
+    return {
+        **out,
+        "status": "installed",
+        "title": facts.title,
+        "package": facts.package,
+        "dimensions": sorted(facts.dimensions),
+        "scheme": asdict(facts.scheme),
+        "customary_dt": facts.customary_dt,
+        "quirks": [asdict(quirk) for quirk in facts.quirks],
+        "known_bad_versions": dict(facts.known_bad_versions),
+        "profiles": profiles,
+    }
+
+
+def doctor() -> dict[str, Any]:
+    """Health of the installation: engines, versions, caches, and whether our packages are really ours."""
+    packages, problems = {}, []
+    home = Path(__file__).resolve().parent.parent
+    for name in ("reference_solver", "adapters", "validation", "reports"):
+        path = Path(importlib.import_module(name).__file__ or "").resolve()
+        packages[name] = str(path.parent)
+        if path.parent.parent != home:
+            problems.append(f"the package {name!r} on this path is not ours: {path.parent}")
+    found = engines()
+    for engine in found:
+        if engine["reason"]:
+            problems.append(f"{engine['name']}: {engine['reason']}")
+        loaded = registry.find(engine["name"]).engine
+        bad = loaded.facts.known_bad_versions.get(engine["version"]) if loaded else None
+        if bad:
+            problems.append(f"{engine['name']} {engine['version']} is known to be bad: {bad}")
+    from reference_solver.compilation import cache_folder
+
+    folder = cache_folder()
+    return {
+        "machine": machine(),
+        "commit": commit(),
+        "executable": sys.executable,
+        "packages": packages,
+        "engines": found,
+        "kernel_cache": {
+            "folder": str(folder) if folder else None,
+            "compiled": os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"),
+        },
+        "problems": problems,
+    }

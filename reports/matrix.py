@@ -1,0 +1,93 @@
+"""The verdict matrix: scenes x engines x profiles, one mark and a count per field."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from reports.wording import LABELS, MARKS, mark_of
+
+#: Colours support the words, they never replace them.
+STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
+ALARM = "bold white on red"
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of the matrix: the marks of its rows."""
+
+    marks: Counter[str]
+
+    @property
+    def mark(self) -> str:
+        """The most serious mark, see `reports.wording.MARKS`."""
+        return next((mark for mark in MARKS if self.marks[mark]), next(iter(self.marks), "none"))
+
+    @property
+    def text(self) -> str:
+        """``pass 24`` or ``FAIL known 3/24`` (rows with that mark or a worse one, of the judged)."""
+        judged = sum(n for mark, n in self.marks.items() if mark not in ("unsupported", "none"))
+        if self.mark not in MARKS:
+            return LABELS[self.mark]
+        if self.mark == "pass":
+            return f"pass {self.marks['pass']}"
+        return f"{LABELS[self.mark]} {judged - self.marks['pass']}/{judged}"
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Fields by (scene, dimension) and (engine, profile), both in the order of the rows."""
+
+    lines: tuple[tuple[str, int], ...]
+    columns: tuple[tuple[str, str], ...]
+    fields: Mapping[tuple[tuple[str, int], tuple[str, str]], Field]
+
+
+def matrix_of(rows: Iterable[Mapping[str, Any]]) -> Matrix:
+    """Count marks per field."""
+    marks: dict[Any, Counter[str]] = defaultdict(Counter)
+    lines: dict[tuple[str, int], None] = {}
+    columns: dict[tuple[str, str], None] = {}
+    for row in rows:
+        line, column = (row["scene"], row["dimension"]), (row["engine"], row["profile"])
+        lines[line] = columns[column] = None
+        marks[line, column][mark_of(row)] += 1
+    fields = {key: Field(counter) for key, counter in marks.items()}
+    return Matrix(tuple(lines), tuple(columns), fields)
+
+
+def table_of(matrix: Matrix, versions: Mapping[str, str]) -> Table:
+    """Terminal table of a matrix; engines are columns, grouped by name."""
+    table = Table(title="Verdicts: worst mark, rows that do not pass / rows judged", title_justify="left")
+    table.add_column("scene")
+    for engine, profile in matrix.columns:
+        table.add_column(f"{engine}\n{profile}\n{versions.get(engine, '')}", justify="left")
+    for line in matrix.lines:
+        cells = [_styled(matrix.fields.get((line, column))) for column in matrix.columns]
+        table.add_row(f"{line[0]} {line[1]}-D", *cells)
+    return table
+
+
+def _styled(field: Field | None) -> Text:
+    if field is None:
+        return Text("")
+    alarming = field.mark in ("crashed", "timed_out", "invalid", "new", "drifted")
+    return Text(field.text, style=ALARM if alarming else STYLES.get(field.mark, ""))
+
+
+def legend() -> str:
+    """What the marks mean, in one line each."""
+    return (
+        "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
+        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | -: cannot be asked of this engine"
+    )
+
+
+def versions_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Engine -> version that ran."""
+    return {row["engine"]: row["engine_version"] for row in rows if row["engine_version"]}

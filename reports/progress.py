@@ -1,0 +1,54 @@
+"""Runs a plan with a progress line on stderr; what finished is kept, the same command resumes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from validation.cells import Slot
+from validation.store import Run, Store
+from validation.workers import TIMEOUT, run_cells
+
+
+def run_plan(
+    store: Store,
+    title: str,
+    slots: Sequence[Slot],
+    console: Console,
+    jobs: int = 0,
+    timeout: float = TIMEOUT,
+    keep: Path | None = None,
+    fresh: bool = False,
+) -> Run:
+    """Run what the store does not have yet of this plan; the observations are in the store afterwards."""
+    run, done = store.start(title, slots, fresh)
+    todo = [slot for slot in slots if slot.key() not in done]
+    if done:
+        console.print(f"resuming run {run.id}: {len(done)} of {len(slots)} cells are done")
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    jobs = jobs or min(len(todo) or 1, os.cpu_count() or 1)
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
+        try:
+            path = (lambda slot: keep / f"{slot.key()}.npz") if keep else (lambda slot: None)
+            for observation in run_cells(todo, jobs, timeout, keep=path):
+                store.add(run, observation)
+                progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
+        except KeyboardInterrupt:
+            console.print("interrupted: what finished is kept, the same command resumes")
+            raise
+    store.finish(run)
+    return run

@@ -1,0 +1,73 @@
+"""Words and numbers as they are shown everywhere: marks, digits, the command that reproduces a row."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from validation.cells import format_dt, parse_dt
+from validation.posed import resolve
+
+#: Order in which a group of rows is summed up: the first that occurs is its mark.
+MARKS = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
+LABELS = {
+    "crashed": "CRASHED",
+    "timed_out": "TIMED OUT",
+    "invalid": "INVALID",
+    "diverged": "DIVERGED",
+    "new": "FAIL new",
+    "drifted": "drifted",
+    "fail": "FAIL",
+    "known": "FAIL known",
+    "explained": "FAIL expl.",
+    "pass": "pass",
+    "unsupported": "-",
+    "not_installed": "NOT INSTALLED",
+    "none": "no value",
+}
+
+
+def mark_of(row: Mapping[str, Any]) -> str:
+    """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
+    if row["outcome"] in ("crashed", "timed_out", "invalid", "not_installed"):
+        return str(row["outcome"])
+    if row["outcome"] == "unsupported":
+        return "new" if row["standing"] == "new" else "unsupported"
+    if row["standing"] == "drifted":
+        return "drifted"
+    if row["physics"] == "pass":
+        return "pass"
+    if row["physics"] == "fail":
+        return str(row["standing"] or "fail")
+    return "none"
+
+
+def reproduce(slot: Mapping[str, Any]) -> str:
+    """Command that runs exactly this slot."""
+    words = ["crosscheck", "run", slot["scene"]]
+    first = resolve(slot["scene"]).parameters[:1]
+    # Naming any parameter asks for one cell instead of the suite's variations, so one is always named.
+    for name, value in (slot["params"] or {p.name: p.default for p in first}).items():
+        words += ["--param", f"{name}={value:.17g}" if float(f"{value:.12g}") != value else f"{name}={value:.12g}"]
+    words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], "--profile", slot["profile"]]
+    words += ["--dt", format_dt(parse_dt(str(slot["dt"])))]
+    if slot["iterations"] is not None:
+        words += ["--iterations", str(slot["iterations"])]
+    return shlex.join(words)
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Sensible digits: plain between 1e-3 and 1e5, else with an exponent."""
+    if value is None:
+        return "-"
+    if value == 0.0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(1, digits - 2)}e}".replace("e-0", "e-").replace("e+0", "e+")
+
+
+def params_text(params: Mapping[str, float]) -> str:
+    """``e=0.8 height=1.03``."""
+    return " ".join(f"{name}={value:g}" for name, value in params.items())

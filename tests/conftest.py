@@ -1,0 +1,71 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+
+import pytest
+
+from adapters import registry
+
+EVIL = '''
+"""An engine that misbehaves in a different way in each profile."""
+import os, time
+from adapters.engine import Engine, EngineFacts, Scheme, Setting
+
+
+class EvilEngine(Engine):
+    facts = EngineFacts("evil", "Evil", "evil", frozenset({2, 3}), Scheme("none", 1), 1 / 240)
+    profiles = {
+        name: (lambda needs, dt, name=name: [Setting("deed", name, "to test isolation")])
+        for name in ("abort", "segfault", "exit", "hang", "leak", "raise", "refuse")
+    }
+
+    def version(self):
+        return "6.6.6"
+
+    def refuses(self, scene, profile):
+        return "it does not want to" if profile == "refuse" else None
+
+    def declares(self, profile, needs, dt):
+        return {}
+
+    def build(self, scene, dt, settings):
+        deed = settings["deed"]
+        print("about to", deed, flush=True)
+        if deed == "abort":
+            os.abort()
+        if deed == "segfault":
+            import ctypes
+            ctypes.string_at(0)
+        if deed == "exit":
+            os._exit(7)
+        if deed == "hang":
+            time.sleep(3600)
+        if deed == "leak":
+            hoard = []
+            while True:
+                hoard.append(bytearray(2**28))
+        raise RuntimeError("building failed\\nsecond line")
+'''
+BROKEN = "raise RuntimeError('this plugin is broken')\n"
+
+
+@pytest.fixture
+def plugins(tmp_path_factory, monkeypatch):
+    """Install two third-party engines for this test and its worker processes: `evil` and `broken`."""
+    folder = tmp_path_factory.mktemp("plugins")
+    (folder / "evil_engine.py").write_text(textwrap.dedent(EVIL))
+    (folder / "broken_engine.py").write_text(BROKEN)
+    info = folder / "evil-6.6.6.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: evil\nVersion: 6.6.6\n")
+    entries = "evil = evil_engine:EvilEngine\nbroken = broken_engine:Nothing\n"
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{entries}")
+    monkeypatch.syspath_prepend(str(folder))
+    registry.find.cache_clear()
+    yield folder
+    registry.find.cache_clear()
+    for name in ("evil_engine", "broken_engine"):
+        sys.modules.pop(name, None)

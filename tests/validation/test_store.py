@@ -1,0 +1,58 @@
+"""The store keeps every finished cell at once, resumes an unfinished plan, and never drops a second run."""
+
+import pytest
+
+from validation.cells import Observation, Outcome, Slot
+from validation.store import Store, StoreError
+
+SLOTS = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", 1 / 240) for v in (1.0, 2.0, 3.0)]
+
+
+def observed(slot, value=0.8):
+    return Observation(slot, "cell", 1, "7.3.1", Outcome.OK, metrics={"rebound_ratio": (value, "")}, state_hash="ab")
+
+
+def test_what_was_added_comes_back_equal_and_in_the_order_of_the_plan(tmp_path):
+    store = Store(tmp_path)
+    run, done = store.start("test", SLOTS)
+    assert done == set()
+    for slot in reversed(SLOTS):
+        store.add(run, observed(slot))
+    assert store.observations(run) == [observed(slot) for slot in SLOTS]
+
+
+def test_an_unfinished_run_is_resumed_by_another_process_and_a_finished_one_is_not(tmp_path):
+    first = Store(tmp_path)
+    run, _ = first.start("test", SLOTS)
+    first.add(run, observed(SLOTS[0]))  # not closed: as after kill -9
+    second = Store(tmp_path)
+    resumed, done = second.start("test", SLOTS)
+    assert (resumed.id, done) == (run.id, {SLOTS[0].key()})
+    second.finish(resumed)
+    third, done = second.start("test", SLOTS)
+    assert third.id != run.id
+    assert done == set()
+    second.add(third, observed(SLOTS[0], 0.7))
+    assert [r.id for r in second.runs()] == [run.id, third.id]
+    assert second.observations(run)[0].metrics["rebound_ratio"][0] == 0.8
+
+
+def test_another_plan_is_another_run(tmp_path):
+    store = Store(tmp_path)
+    first, _ = store.start("test", SLOTS)
+    second, _ = store.start("test", SLOTS[:2])
+    assert first.id != second.id
+
+
+def test_missing_results_and_runs_are_said_in_one_line(tmp_path):
+    with pytest.raises(StoreError, match="there are no results"):
+        Store(tmp_path / "nowhere", create=False)
+    store = Store(tmp_path)
+    with pytest.raises(StoreError, match="no run 'x'"):
+        store.run("x")
+
+
+def test_a_file_that_is_no_store_is_said_in_one_line(tmp_path):
+    (tmp_path / "results.sqlite").write_text("this is not a database, but long enough to look like one" * 20)
+    with pytest.raises(StoreError, match="out: cannot use"):
+        Store(tmp_path)

@@ -1,0 +1,111 @@
+"""An abort, a segfault, an exit, a hang or a leak costs that one cell; workers die with their parent."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from validation.cells import Outcome, Slot
+from validation.workers import run_cells
+
+DT = 1 / 240
+
+
+def evil(profile):
+    return Slot("impact", (), 2, "evil", profile, DT)
+
+
+@pytest.mark.parametrize(
+    ("profile", "outcome", "reason"),
+    [
+        ("abort", Outcome.CRASHED, "SIGABRT"),
+        ("segfault", Outcome.CRASHED, "SIGSEGV"),
+        ("exit", Outcome.CRASHED, "exit code 7"),
+        ("leak", Outcome.CRASHED, "MemoryError"),
+        ("raise", Outcome.CRASHED, "RuntimeError: building failed"),
+        ("refuse", Outcome.UNSUPPORTED, "it does not want to"),
+    ],
+)
+def test_what_an_engine_does_to_its_process_costs_only_its_cell(plugins, profile, outcome, reason):
+    healthy = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (1.0, 2.0)]
+    found = {o.slot: o for o in run_cells([healthy[0], evil(profile), healthy[1]], jobs=1, memory=4 * 2**30)}
+    assert len(found) == 3
+    bad = found[evil(profile)]
+    assert bad.outcome is outcome
+    assert reason in bad.reason
+    assert "\n" not in bad.reason
+    if outcome is Outcome.CRASHED:
+        assert f"about to {profile}" in bad.log
+    for slot in healthy:
+        assert found[slot].outcome is Outcome.OK
+
+
+def test_a_hanging_cell_is_timed_out_and_the_next_one_runs(plugins):
+    slots = [evil("hang"), evil("refuse")]
+    found = {o.slot: o for o in run_cells(slots, jobs=1, timeout=8.0)}
+    assert found[slots[0]].outcome is Outcome.TIMED_OUT
+    assert "8 s" in found[slots[0]].reason
+    assert found[slots[1]].outcome is Outcome.UNSUPPORTED
+
+
+def test_a_broken_plugin_is_a_row_with_its_reason(plugins):
+    slot = Slot("impact", (), 2, "broken", "default", DT)
+    (observation,) = run_cells([slot])
+    assert observation.outcome is Outcome.NOT_INSTALLED
+    assert "this plugin is broken" in observation.reason
+
+
+PARENT = """
+import sys
+from validation.cells import Slot
+from validation.workers import run_cells
+if __name__ == "__main__":
+    sys.path.insert(0, sys.argv[1])
+    for observation in run_cells([Slot("impact", (), 2, "evil", "hang", 1 / 240)]):
+        print(observation)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the death signal of a parent is a Linux facility")
+def test_workers_die_with_a_parent_that_is_killed(plugins, tmp_path):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    parent = subprocess.Popen([sys.executable, str(script), str(plugins)])
+    workers = []
+    deadline = time.monotonic() + 60.0
+    while not workers and time.monotonic() < deadline:
+        time.sleep(0.2)
+        workers = [pid for pid in children(parent.pid) if "spawn_main" in command_line(pid)]
+    assert workers
+    os.kill(parent.pid, signal.SIGKILL)
+    parent.wait()
+    while any(alive(pid) for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not any(alive(pid) for pid in workers)
+
+
+def children(pid):
+    found = []
+    for task in os.listdir(f"/proc/{pid}/task"):
+        with open(f"/proc/{pid}/task/{task}/children") as stream:
+            found += [int(word) for word in stream.read().split()]
+    return found
+
+
+def command_line(pid):
+    try:
+        with open(f"/proc/{pid}/cmdline") as stream:
+            return stream.read()
+    except OSError:
+        return ""
+
+
+def alive(pid):
+    try:
+        with open(f"/proc/{pid}/stat") as stream:
+            return stream.read().rsplit(")", 1)[1].split()[0] not in ("Z", "X")
+    except OSError:
+        return False
