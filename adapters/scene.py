@@ -238,7 +238,7 @@ class Scene:
 
     def hash(self) -> str:
         """Sixteen hex digits of the SHA-256 over all physics of the scene (parameters' labels aside)."""
-        data = {key: value for key, value in self.as_dict().items() if key != "params"}
+        data = {key: _canonical(value) for key, value in self.as_dict().items() if key != "params"}
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -253,6 +253,15 @@ def scene_from_dict(data: Mapping[str, Any]) -> Scene:
     rest = {key: _as_tuple(value) for key, value in data.items() if key not in ("bodies", "pairs", "params")}
     pairs = tuple(Pair(**pair) for pair in data["pairs"])
     return Scene(bodies=tuple(bodies), pairs=pairs, params=dict(data.get("params", {})), **rest)
+
+
+def _canonical(value: Any) -> Any:
+    """Numbers as floats without a negative zero, so that equal scenes have equal hashes (1 is 1.0, -0.0 is 0.0)."""
+    if isinstance(value, dict):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_canonical(item) for item in value]
+    return float(value) + 0.0 if isinstance(value, int | float) else value
 
 
 def _as_tuple(value: Any) -> Any:
@@ -312,6 +321,8 @@ def _validate_body(body: Body, dimension: int) -> None:
         _positive(f"{body.name}.inertia", body.inertia)
     if isinstance(body.inertia, tuple) == planar and body.motion == "free":
         raise SceneError(f"{body.name}.inertia: needs {'one number' if planar else 'three principal moments'}")
+    if isinstance(body.inertia, tuple) and body.motion == "free":
+        _length(f"{body.name}.inertia", body.inertia, 3)
     for name, values, length in (
         ("pose", body.pose, 3 if planar else 7),
         ("twist", body.twist, 3 if planar else 6),

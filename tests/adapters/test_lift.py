@@ -1,0 +1,109 @@
+"""The one lift: planar states survive the way to three dimensions and back, and what leaves the plane is seen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+
+
+def planar_scene(pose: tuple[float, ...], twist: tuple[float, ...]) -> Scene:
+    bodies = (
+        Body("floor", HalfSpace((-0.6, 0.8), 0.25), motion="fixed"),
+        Body("box", Box((0.5, 0.2)), 2.0, 0.3, pose, twist, force=(1.0, -2.0), torque=(0.7,)),
+        Body("disc", Disc(0.4), 1.5, 0.12, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), "prescribed"),
+    )
+    pairs = (Pair(restitution=0.4, friction=0.3), Pair("box", "disc", 0.1, 0.2))
+    return Scene("planar", 3, 2, bodies, pairs, (1.5, -9.0), 2.0, {"e": 0.4})
+
+
+def turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Rotate v by the quaternion q = (w, x, y, z), from the definition q v q*."""
+    w, u = q[0], q[1:]
+    return v + 2.0 * w * np.cross(u, v) + 2.0 * np.cross(u, np.cross(u, v))
+
+
+def test_pose_and_twist_survive_the_round_trip() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        pose = (*rng.normal(size=2), rng.uniform(-math.pi, math.pi))
+        twist = tuple(rng.normal(size=3))
+        lifted = lift(planar_scene(pose, twist)).bodies[1]
+        back, outside = lower_pose(np.array([lifted.pose]))
+        speed, out = lower_twist(np.array([lifted.twist]))
+        # Half-angle sine and cosine and one arctangent: a few units of round-off of an angle up to pi.
+        assert np.allclose(back[0], pose, rtol=0.0, atol=2e-15)
+        assert tuple(speed[0]) == twist
+        assert outside == out == 0.0
+
+
+def test_a_body_point_lands_where_the_plane_says() -> None:
+    theta = 0.7
+    lifted = lift(planar_scene((2.0, 3.0, theta), (0.0, 0.0, 0.0))).bodies[1]
+    point = np.array(lifted.pose[:3]) + turn(np.array(lifted.pose[3:]), np.array([0.5, 0.0, 0.2]))
+    c, s = math.cos(theta), math.sin(theta)
+    assert np.allclose(point, [2.0 + c * 0.5 - s * 0.2, 0.0, 3.0 + s * 0.5 + c * 0.2], atol=1e-15)
+
+
+def test_a_counter_clockwise_spin_moves_points_as_in_the_plane() -> None:
+    lifted = lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))).bodies[1]
+    arm = np.array([0.5, 0.0, 0.0])
+    assert np.allclose(np.cross(lifted.twist[3:], arm), [0.0, 0.0, 1.0])  # a point to the right goes up
+
+
+def test_a_positive_torque_lifts_to_the_axis_of_a_positive_spin() -> None:
+    body = lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))).bodies[1]
+    assert np.allclose(np.array(body.torque) / 0.7, np.array(body.twist[3:]) / 2.0)
+
+
+def test_shapes_materials_and_loads_keep_their_meaning() -> None:
+    flat = planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    lifted = lift(flat)
+    floor, box, disc = lifted.bodies
+    assert floor.shape == HalfSpace((-0.6, 0.0, 0.8), 0.25)
+    assert isinstance(box.shape, Box) and (box.shape.half_extents[0], box.shape.half_extents[2]) == (0.5, 0.2)
+    assert disc.shape == Sphere(0.4) and disc.motion == "prescribed"
+    assert box.mass == 2.0 and box.inertia == (0.3, 0.3, 0.3)
+    assert box.force == (1.0, 0.0, -2.0) and lifted.gravity == (1.5, 0.0, -9.0)
+    assert lifted.pairs == flat.pairs and lifted.duration == flat.duration
+    assert lifted.material("disc", "box") == flat.material("disc", "box")
+
+
+def test_a_disc_keeps_its_own_moment_not_that_of_a_sphere() -> None:
+    assert lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))).bodies[2].inertia == (0.12, 0.12, 0.12)
+
+
+@pytest.mark.parametrize(("entry", "value"), [(1, 1e-3), (4, 1e-3), (6, 1e-3)])
+def test_a_pose_that_leaves_the_plane_is_seen(entry: int, value: float) -> None:
+    pose = np.array([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]])
+    pose[0, entry] = value
+    pose[0, 3:] /= np.linalg.norm(pose[0, 3:])
+    # A tilt is twice the quaternion's component; 1e-3 relative covers sine against angle.
+    assert lower_pose(pose)[1] == pytest.approx(value if entry == 1 else 2.0 * value, rel=1e-3)
+
+
+@pytest.mark.parametrize("entry", [1, 3, 5])
+def test_a_twist_that_leaves_the_plane_is_seen(entry: int) -> None:
+    twist = np.zeros((2, 6))
+    twist[1, entry] = -0.25
+    assert lower_twist(twist)[1] == 0.25
+
+
+def test_an_angle_does_not_depend_on_the_sign_of_the_quaternion() -> None:
+    q = np.array([math.cos(1.2), 0.0, -math.sin(1.2), 0.0])
+    pose = np.array([[0.0, 0.0, 0.0, *q], [0.0, 0.0, 0.0, *-q]])
+    assert np.allclose(lower_pose(pose)[0][:, 2], 2.4, atol=1e-15)
+
+
+def test_contacts_lose_only_what_is_out_of_the_plane() -> None:
+    row = (0, 1, (1.0, 2.0, 3.0), (0.6, 0.0, 0.8), (4.0, 5.0, 6.0), -0.1)
+    flat = lower_contacts(Contacts.from_rows([row], 3))
+    assert flat.point.tolist() == [[1.0, 3.0]]
+    assert flat.normal.tolist() == [[0.6, 0.8]]
+    assert flat.impulse.tolist() == [[4.0, 6.0]]
+    assert (flat.a[0], flat.b[0], flat.gap[0]) == (0, 1, -0.1)
