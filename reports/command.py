@@ -15,9 +15,10 @@ from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
 from reports import exports, listing
-from reports.findings import lines
+from reports.findings import finding_line, lines
 from reports.matrix import legend, matrix_of, table_of, versions_of
 from reports.progress import run_plan
+from validation.acceptance import accept as write_findings
 from validation.cells import Slot, parse_dt, slot_from_dict
 from validation.plan import Request, slots
 from validation.posed import is_file
@@ -275,6 +276,26 @@ def check_adapter_(name: str, as_json: bool) -> None:
         for finding in findings:
             click.echo(str(finding))
     sys.exit(0 if all(finding.holds for finding in findings) else 1)
+
+
+@main.command()
+@click.argument("run", default="latest")
+@click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
+@OUT
+def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
+    """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
+
+    Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
+    listed to be shown, not to be hidden.
+    """
+    for name in engine:
+        registry.find(name)
+    counts, unexplained = write_findings(exports.load_rows(out, run), engine)
+    for name, count in counts.items():
+        click.echo(f"{name}: {count} rows listed")
+    for row in unexplained:
+        click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
+    sys.exit(1 if unexplained else 0)
 
 
 if __name__ == "__main__":

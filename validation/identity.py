@@ -12,10 +12,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import reference_solver
-
-import adapters
-import validation
 from adapters.registry import GROUP
 
 
@@ -26,8 +22,11 @@ def _hash_files(paths: list[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
-def _sources(package: Any) -> list[Path]:
-    return list(Path(package.__file__).parent.rglob("*.py"))
+def _sources(package: str) -> list[Path]:
+    """Source files of a package, found without importing it (the solver would load its compiler)."""
+    spec = find_spec(package)
+    folders = list(spec.submodule_search_locations or []) if spec else []
+    return [path for folder in folders for path in Path(folder).rglob("*.py")]
 
 
 @cache
@@ -40,20 +39,20 @@ def adapter_hash(engine: str) -> str:
     spec = find_spec(entry.module)
     own = [Path(spec.origin)] if spec and spec.origin else []
     engines = {e.module.rsplit(".", 1)[-1] + ".py" for e in entry_points(group=GROUP)}
-    shared = [p for p in _sources(adapters) if p.name not in engines]
-    solver = _sources(reference_solver) if entry.module == "adapters.reference" else []
+    shared = [p for p in _sources("adapters") if p.name not in engines]
+    solver = _sources("reference_solver") if entry.module == "adapters.reference" else []
     return _hash_files([*shared, *own, *solver])
 
 
 @cache
 def code_hash() -> str:
     """Hash of all our code that decides stored measurements (not of what judges or shows them)."""
-    return _hash_files([*_sources(adapters), *_sources(reference_solver), *_sources(validation)])
+    return _hash_files([*_sources("adapters"), *_sources("reference_solver"), *_sources("validation")])
 
 
 def commit() -> str:
     """Commit of the checkout, with ``+`` if it has uncommitted changes; empty outside a checkout."""
-    root = Path(validation.__file__).parent.parent
+    root = Path(__file__).resolve().parent.parent
     try:
         head = subprocess.run(
             ["git", "-C", str(root), "rev-parse", "--short=12", "HEAD"],
