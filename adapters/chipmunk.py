@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -149,7 +150,7 @@ class ChipmunkEngine(Engine):
             Quirk("nothing is swept: a fast body passes a thin one", "the ground is 1 km thick", "cpSpaceStep.c:400"),
         ),
     )
-    profiles = {"default": default_profile, "tuned": tuned_profile}
+    profiles = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
 
     def version(self) -> str:
         """Version of pymunk; the string of the bundled C library is stale and says nothing."""
@@ -220,8 +221,8 @@ def _factors_by_logarithm(n: int, pairs: list[tuple[int, int, float]]) -> list[f
     rows = np.zeros((len(positive), n))
     for row, (i, j, _) in enumerate(positive):
         rows[row, [i, j]] = 1.0
-    logs = np.linalg.lstsq(rows, np.log([value for _, _, value in positive]), rcond=None)[0] if positive else []
-    return [float(np.exp(logs[k])) if positive and rows[:, k].any() else 0.0 for k in range(n)]
+    logs = np.linalg.lstsq(rows, np.log([value for _, _, value in positive]), rcond=None)[0]
+    return [float(np.exp(logs[k])) if rows[:, k].any() else 0.0 for k in range(n)]
 
 
 def _moment(body: Body) -> float:
@@ -418,7 +419,8 @@ def _ground(shape: HalfSpace, body: Any) -> list[tuple[float, float]]:
 
     The plane is given in world axes, so whatever pose the body has is taken out again.
     """
-    (nx, ny), (tx, ty) = shape.normal, (shape.normal[1], -shape.normal[0])
+    nx, ny = shape.normal
+    tx, ty = ny, -nx
     corners = []
     for along, depth in ((-1.0, GROUND_DEPTH), (-1.0, 0.0), (1.0, 0.0), (1.0, GROUND_DEPTH)):
         height, side = shape.offset - depth, along * GROUND_HALF_WIDTH
@@ -477,9 +479,7 @@ def touching_pairs(scene: Scene) -> list[tuple[int, int, Array, float]]:
     return sorted(found, key=lambda pair: pair[:2])
 
 
-def overlap_displacement(
-    scene: Scene, touching: list[tuple[int, int, Array, float]], overlap: float
-) -> Array | None:
+def overlap_displacement(scene: Scene, touching: list[tuple[int, int, Array, float]], overlap: float) -> Array | None:
     """Smallest translation of each free body after which touching pairs overlap by ``overlap``, (n, 2) [m].
 
     One equation per pair, ``n . (d_j - d_i) = -overlap - gap``; pairs that the scene itself poses deeper keep their

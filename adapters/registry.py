@@ -52,11 +52,14 @@ def find(name: str) -> Found:
     engine: Engine | None = None
     try:
         engine = registered[name].load()()
+        if not isinstance(engine, Engine):
+            raise TypeError(f"{registered[name].value} is not an adapters.Engine")
         return Found(name, engine, engine.version())
     except ImportError as error:
         package = engine.facts.package if engine else name
-        return Found(name, None, "", f"{error}; pip install 'contact-crosscheck[{name}]' ({package})")
-    except Exception as error:  # a third-party plugin may raise anything; only its rows may suffer
+        missing = str(error).partition("\n")[0]
+        return Found(name, None, "", f"{missing}; pip install 'contact-crosscheck[{name}]' ({package})")
+    except (Exception, SystemExit) as error:  # a third-party plugin may raise anything; only its rows may suffer
         return Found(name, None, "", f"{type(error).__name__}: {error}".splitlines()[0])
 
 

@@ -26,11 +26,22 @@ class Sampling:
         Steps between two samples of the state.
     contacts_from
         Contacts and impulses are recorded at every sample after this time [s]; None records none. Engines
-        report the impulses of their last step only, so recording them needs stride 1 from there on.
+        report the impulses of their last step only, so recording them needs stride 1.
+
+    Raises
+    ------
+    ValueError
+        For a stride below 1, or one above 1 where contacts are recorded.
     """
 
     stride: int = 1
     contacts_from: float | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.stride, bool) or not isinstance(self.stride, int) or self.stride < 1:
+            raise ValueError(f"stride: {self.stride!r} must be a whole number of steps, at least 1")
+        if self.contacts_from is not None and self.stride != 1:
+            raise ValueError(f"stride: {self.stride} must be 1 where contacts are recorded")
 
 
 @dataclass(frozen=True)

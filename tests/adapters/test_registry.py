@@ -1,0 +1,148 @@
+"""Discovery: engines load late, and a missing or broken plugin costs only its own rows."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from adapters import registry
+from adapters.engine import EngineError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PLUGINS = """
+import sys
+from tests_plugin_base import Healthy
+
+class MissingPackage(Healthy):
+    def version(self):
+        import package_that_is_not_there
+
+class BrokenVersion(Healthy):
+    def version(self):
+        raise ZeroDivisionError("first line\\nsecond line")
+
+class BrokenInit(Healthy):
+    def __init__(self):
+        raise RuntimeError("cannot start")
+
+class NotAnEngine:
+    def version(self):
+        return "1"
+
+def leave():
+    sys.exit("left the process")
+"""
+BASE = """
+from adapters.engine import Engine, EngineFacts, Scheme
+
+class Healthy(Engine):
+    facts = EngineFacts("healthy", "Healthy", "healthy-package", frozenset({2}), Scheme("none", 0), 0.01)
+    profiles = {}
+    def version(self): return "1.2"
+    def refuses(self, scene, profile): return None
+    def build(self, scene, dt, settings): raise NotImplementedError
+    def declares(self, profile, needs, dt): return {}
+"""
+
+
+@pytest.fixture
+def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Registers one healthy engine and one of each kind of broken one."""
+    (tmp_path / "tests_plugins.py").write_text(PLUGINS)
+    (tmp_path / "tests_plugin_base.py").write_text(BASE)
+    (tmp_path / "tests_plugin_syntax.py").write_text("def (")
+    (tmp_path / "tests_plugin_import.py").write_text("raise ImportError('two\\nlines')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    values = {
+        "zeta": "tests_plugin_base:Healthy",
+        "healthy": "tests_plugin_base:Healthy",
+        "missing_package": "tests_plugins:MissingPackage",
+        "broken_version": "tests_plugins:BrokenVersion",
+        "broken_init": "tests_plugins:BrokenInit",
+        "not_an_engine": "tests_plugins:NotAnEngine",
+        "leaves": "tests_plugins:leave",
+        "no_module": "tests_plugin_nowhere:Engine",
+        "no_class": "tests_plugins:Nowhere",
+        "syntax": "tests_plugin_syntax:Engine",
+        "two_lines": "tests_plugin_import:Engine",
+        "chipmunk": "tests_plugin_base:Healthy",
+    }
+    entries = [EntryPoint(name, value, registry.GROUP) for name, value in values.items()]
+    monkeypatch.setattr(registry, "entry_points", lambda group: [e for e in entries if e.group == group])
+    registry.find.cache_clear()
+    yield
+    registry.find.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("tests_plugin")]:
+        del sys.modules[name]
+
+
+def test_our_engines_come_first_and_others_by_name(plugins: None) -> None:
+    names = registry.names()
+    assert names[0] == "chipmunk" and names[1:] == sorted(names[1:]) and len(names) == 12
+
+
+def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
+    found = registry.find("healthy")
+    assert found.engine is not None and (found.version, found.reason) == ("1.2", "")
+    assert registry.load("healthy") is found.engine
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("missing_package", "package_that_is_not_there"),
+        ("broken_version", "ZeroDivisionError: first line"),
+        ("broken_init", "RuntimeError: cannot start"),
+        ("not_an_engine", "tests_plugins:NotAnEngine is not an adapters.Engine"),
+        ("leaves", "SystemExit: left the process"),
+        ("no_module", "tests_plugin_nowhere"),
+        ("no_class", "Nowhere"),
+        ("syntax", "SyntaxError"),
+        ("two_lines", "two; pip install"),
+    ],
+)
+def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: None, name: str, reason: str) -> None:
+    found = registry.find(name)
+    assert found.engine is None and found.version == ""
+    assert reason in found.reason and "\n" not in found.reason
+    with pytest.raises(EngineError, match=f"^engine: {name} is not installed"):
+        registry.load(name)
+    assert registry.find("healthy").engine is not None
+
+
+def test_a_missing_package_comes_with_its_pip_line(plugins: None) -> None:
+    reason = registry.find("missing_package").reason
+    assert reason.endswith("pip install 'contact-crosscheck[missing_package]' (healthy-package)")
+
+
+@pytest.mark.parametrize(("asked", "hint"), [("helthy", "did you mean 'healthy'"), ("qqq", "known: chipmunk")])
+def test_an_unknown_engine_gets_a_hint(plugins: None, asked: str, hint: str) -> None:
+    with pytest.raises(EngineError, match=f"there is no engine called '{asked}'") as caught:
+        registry.find(asked)
+    assert hint in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_our_engines_are_registered_under_their_own_names() -> None:
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    entries = project["entry-points"][registry.GROUP]
+    assert set(registry.SHOWN_FIRST) == set(entries)
+    assert all(value.startswith(f"adapters.{name}:") for name, value in entries.items())
+
+
+def test_importing_adapters_imports_no_engine_and_no_numba() -> None:
+    code = (
+        "import sys; import adapters, adapters.registry, adapters.receipts\n"
+        "import adapters.reference, adapters.chipmunk, adapters.bullet, adapters.mujoco\n"
+        "print([m for m in ('pymunk', 'pybullet', 'mujoco', 'numba', 'reference_solver') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,277 @@
+"""The only loop that steps an engine: what it records, when it stops, and that it always closes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Scheme, Setting, Simulation
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.stepping import posed_for, run, step_count
+from adapters.trajectory import ContactRecord, Sampling, load_trajectory
+
+
+class Flight(Simulation):
+    """Exact free flight; ``spoil(simulation)`` runs after every advance."""
+
+    def __init__(self, scene: Scene, dt: float, spoil: Callable[[Flight], None]) -> None:
+        self.scene, self.dt, self.spoil = scene, dt, spoil
+        self.steps, self.calls, self.closed = 0, [], 0
+        self._pose = np.array([body.pose for body in scene.bodies])
+        self._twist = np.array([body.twist for body in scene.bodies])
+        self.initial_change = ("moved by nothing",)
+
+    def advance(self, steps: int) -> None:
+        self.calls.append(steps)
+        self.steps += steps
+        d = self.scene.dimension
+        gained = self.steps * self.dt * np.array(self.scene.gravity)
+        self._twist[:, :d] = [body.twist[:d] + gained for body in self.scene.bodies]
+        self.spoil(self)
+
+    def pose(self) -> np.ndarray:
+        return self._pose.copy()
+
+    def twist(self) -> np.ndarray:
+        return self._twist.copy()
+
+    def contacts(self) -> Contacts:
+        d = self.scene.dimension
+        row = (0, 1, (0.0,) * d, (1.0,) * d, (float(self.steps),) * d, 0.0)
+        return Contacts.from_rows([row] * (self.steps % 3), d)
+
+    def readback(self) -> dict[str, Any]:
+        return {"dt": self.dt}
+
+    def certificate(self) -> dict[str, Any]:
+        return {"residual": 0.0}
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+class Toy(Engine):
+    profiles = MappingProxyType({"only": lambda needs, dt: [Setting("iterations", 3, "a toy")]})
+
+    def __init__(self, dimensions: set[int], spoil: Callable[[Flight], None] = lambda flight: None) -> None:
+        self.facts = EngineFacts("toy", "Toy", "toy", frozenset(dimensions), Scheme("none", 0), 0.01)
+        self.spoil = spoil
+        self.built: list[Flight] = []
+
+    def version(self) -> str:
+        return "1"
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        self.built.append(Flight(scene, dt, self.spoil))
+        return self.built[-1]
+
+    def declares(self, profile: str, needs: Any, dt: float) -> dict:
+        return {}
+
+
+def scene(**changes: Any) -> Scene:
+    bodies = (
+        Body("a", Disc(0.5), 1.0, 0.1, (0.0, 2.0, 0.3), (1.0, 0.0, 0.5)),
+        Body("b", Box((0.5, 0.5)), 1.0, 0.1, (3.0, 2.0, 0.0)),
+    )
+    base = Scene("flight", 1, 2, bodies, (), (0.0, -10.0), 1.0)
+    return replace(base, **changes)
+
+
+@pytest.mark.parametrize(
+    ("duration", "dt", "steps"),
+    [(1.0, 0.1, 10), (5.0, 1 / 240, 1200), (1.0, 0.3, 4), (0.5025, 1 / 240, 121), (1e-9, 1.0, 1), (0.3, 0.1, 3)],
+)
+def test_steps_cover_the_duration_without_one_too_many_from_rounding(duration: float, dt: float, steps: int) -> None:
+    assert step_count(duration, dt) == steps
+
+
+def test_every_step_is_sampled_from_the_start_state_on() -> None:
+    toy = Toy({2})
+    trajectory = run(toy, scene(), 0.1, {})
+    assert trajectory.t.tolist() == [k * 0.1 for k in range(11)]
+    assert trajectory.pose.shape == (11, 2, 3) and trajectory.twist.shape == (11, 2, 3)
+    assert trajectory.pose[0].tolist() == [list(b.pose) for b in scene().bodies]
+    assert trajectory.twist[0].tolist() == [list(b.twist) for b in scene().bodies]
+    assert trajectory.twist[-1, 0, 1] == pytest.approx(-10.0, rel=1e-15)
+    assert trajectory.finish == "completed" and trajectory.reason == ""
+    assert trajectory.initial_change == ("moved by nothing",)
+    assert trajectory.readback == {"dt": 0.1} and trajectory.certificate == {"residual": 0.0}
+    assert toy.built[0].calls == [1] * 10 and toy.built[0].closed == 1
+
+
+def test_a_stride_ends_on_the_last_step_even_if_it_does_not_divide() -> None:
+    toy = Toy({2})
+    trajectory = run(toy, scene(), 0.1, {}, Sampling(stride=4))
+    assert toy.built[0].calls == [4, 4, 2]
+    assert np.allclose(trajectory.t, [0.0, 0.4, 0.8, 1.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize(("stride", "contacts_from"), [(0, None), (-1, None), (1.5, None), (True, None), (2, 0.0)])
+def test_a_stride_that_would_hang_or_lose_impulses_is_refused(stride: Any, contacts_from: float | None) -> None:
+    with pytest.raises(ValueError, match="stride"):
+        Sampling(stride, contacts_from)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.1, math.nan, math.inf])
+def test_a_bad_step_is_refused_before_anything_is_built(dt: float) -> None:
+    toy = Toy({2})
+    with pytest.raises(EngineError, match=r"^dt: "):
+        run(toy, scene(), dt, {})
+    assert toy.built == []
+
+
+def test_contacts_are_recorded_from_the_asked_time_on_and_stay_with_their_step() -> None:
+    trajectory = run(Toy({2}), scene(), 0.1, {}, Sampling(1, 0.55))
+    record = trajectory.contacts
+    assert record is not None
+    assert record.step.tolist() == [6, 7, 8, 9, 10]
+    assert record.offset.tolist() == [0, 0, 1, 3, 3, 4]  # step k has k mod 3 contacts
+    assert record.impulse_between(1, 0)[:, 0].tolist() == [0.0, 7.0, 16.0, 0.0, 10.0]
+    sample, impulse = record.between(0, 1)
+    assert sample.tolist() == [1, 2, 2, 4] and impulse[:, 1].tolist() == [7.0, 8.0, 8.0, 10.0]
+
+
+def test_contacts_of_time_zero_are_those_of_the_first_step() -> None:
+    record = run(Toy({2}), scene(), 0.1, {}, Sampling(1, 0.0)).contacts
+    assert record is not None and record.step.tolist() == list(range(1, 11))
+
+
+def test_contacts_nobody_asked_for_are_not_recorded() -> None:
+    assert run(Toy({2}), scene(), 0.1, {}).contacts is None
+
+
+def spoiled(name: str, index: tuple[int, int], value: float) -> Callable[[Flight], None]:
+    def spoil(flight: Flight) -> None:
+        if flight.steps >= 4:
+            getattr(flight, name)[index] = value
+
+    return spoil
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(("name", "index"), [("_pose", (1, 2)), ("_twist", (0, 2)), ("_twist", (1, 0))])
+def test_a_state_that_is_not_finite_ends_the_run_as_diverged(name: str, index: tuple[int, int], value: float) -> None:
+    toy = Toy({2}, spoiled(name, index, value))
+    trajectory = run(toy, scene(), 0.1, {})
+    assert trajectory.finish == "diverged" and "not finite at t = 0.4 s" in trajectory.reason
+    assert len(trajectory.t) == 5 and toy.built[0].closed == 1
+
+
+# The scene explains 1 m/s + 0.5 rad/s x 0.5 m + 10 m/s^2 x 1 s = 11.25 m/s; a thousand times that is an explosion.
+@pytest.mark.parametrize(("speed", "finish"), [(11.24e3, "completed"), (11.26e3, "diverged"), (-11.26e3, "diverged")])
+def test_an_explosion_is_a_thousand_times_what_the_scene_explains(speed: float, finish: str) -> None:
+    trajectory = run(Toy({2}, spoiled("_twist", (0, 0), speed)), scene(), 0.1, {})
+    assert trajectory.finish == finish
+    assert finish == "completed" or "m/s, nothing in the scene explains it" in trajectory.reason
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        Body("a", Box((0.5, 0.1)), 1.0, 0.1, (), (0.0, 0.0, 2.0)),
+        Body("a", Box((0.5, 0.1)), 1.0, 0.1, torque=(2.0,)),
+        Body("a", Box((0.5, 0.1)), 1.0, 0.1, force=(2.0, 0.0)),
+    ],
+    ids=["spin", "torque", "force"],
+)
+def test_spin_torque_and_force_explain_speed_without_gravity(body: Body) -> None:
+    # Any of them may turn into 1 m/s (a spinning box whose corner hits something).
+    alone = scene(bodies=(body,), gravity=(0.0, 0.0))
+    assert run(Toy({2}, spoiled("_twist", (0, 0), 1.0)), alone, 0.1, {}).finish == "completed"
+
+
+def test_a_body_that_nothing_moves_must_not_move() -> None:
+    still = scene(bodies=(Body("a", Disc(0.5)),), gravity=(0.0, 0.0))
+    assert run(Toy({2}, spoiled("_twist", (0, 0), 1.0)), still, 0.1, {}).finish == "diverged"
+
+
+def test_an_engine_that_raises_is_closed_all_the_same() -> None:
+    def fail(flight: Flight) -> None:
+        raise RuntimeError("engine broke")
+
+    toy = Toy({2}, fail)
+    with pytest.raises(RuntimeError, match="engine broke"):
+        run(toy, scene(), 0.1, {})
+    assert toy.built[0].closed == 1
+
+
+def test_a_planar_scene_is_lifted_for_a_spatial_engine_and_read_back_planar() -> None:
+    toy = Toy({3})
+    flat, lifted = run(Toy({2}), scene(), 0.1, {}), run(toy, scene(), 0.1, {}, Sampling(1, 0.0))
+    assert toy.built[0].scene.dimension == 3
+    assert np.allclose(lifted.pose, flat.pose, atol=1e-15) and np.allclose(lifted.twist, flat.twist, atol=1e-14)
+    assert lifted.out_of_plane == 0.0
+    assert lifted.contacts is not None and lifted.contacts.rows.impulse.shape[1] == 2
+
+
+def test_what_leaves_the_plane_at_any_sample_is_kept() -> None:
+    def sideways(flight: Flight) -> None:
+        flight._twist[0, 1] = 0.125 if flight.steps == 3 else 0.0
+
+    assert run(Toy({3}, sideways), scene(), 0.1, {}).out_of_plane == 0.125
+
+
+def test_an_engine_of_both_dimensions_gets_the_scene_as_it_is() -> None:
+    assert posed_for(Toy({2, 3}), scene()).dimension == 2
+
+
+def test_a_spatial_scene_is_refused_by_a_planar_engine() -> None:
+    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+    spatial = Scene("s", 1, 3, (floor,), (), (0.0, 0.0, -9.81), 1.0)
+    with pytest.raises(EngineError, match=r"^dimension: toy is planar"):
+        run(Toy({2}), spatial, 0.1, {})
+
+
+def test_rows_turn_so_that_the_lower_index_comes_first() -> None:
+    contacts = Contacts.from_rows([(2, 1, (5.0, 6.0), (0.0, 1.0), (3.0, 4.0), -0.1)], 2)
+    assert (contacts.a[0], contacts.b[0], contacts.gap[0]) == (1, 2, -0.1)
+    assert contacts.point.tolist() == [[5.0, 6.0]]
+    assert contacts.normal.tolist() == [[0.0, -1.0]] and contacts.impulse.tolist() == [[-3.0, -4.0]]
+
+
+def test_a_missing_impulse_stays_missing_in_the_sum() -> None:
+    rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (0.0, 1.0), (math.nan, math.nan), 0.0)], 2)
+    record = ContactRecord(np.array([1]), np.array([0, 1]), rows)
+    assert np.isnan(record.impulse_between(0, 1)).all()
+
+
+def test_the_state_hash_sees_one_bit_and_ignores_the_sign_of_zero() -> None:
+    trajectory = run(Toy({2}), scene(), 0.1, {})
+    pose = trajectory.pose.copy()
+    assert replace(trajectory, pose=np.where(pose == 0.0, -0.0, pose)).state_hash() == trajectory.state_hash()
+    pose[5, 1, 1] = np.nextafter(pose[5, 1, 1], np.inf)
+    assert replace(trajectory, pose=pose).state_hash() != trajectory.state_hash()
+    assert run(Toy({2}), scene(), 0.1, {}).state_hash() == trajectory.state_hash()
+
+
+def test_a_trajectory_survives_its_file(tmp_path: Path) -> None:
+    made = run(Toy({2}, spoiled("_pose", (1, 2), math.nan)), scene(), 0.1, {}, Sampling(1, 0.0))
+    made.save(tmp_path / "t.npz")
+    again = load_trajectory(tmp_path / "t.npz")
+    assert again.state_hash() == made.state_hash()
+    assert (again.finish, again.reason, again.initial_change) == (made.finish, made.reason, made.initial_change)
+    assert again.contacts is not None and made.contacts is not None
+    assert again.contacts.impulse_between(0, 1).tolist() == made.contacts.impulse_between(0, 1).tolist()
+    assert json.dumps(again.readback) == json.dumps(made.readback)
+
+
+def test_settings_take_an_iteration_count_only_where_there_is_one() -> None:
+    toy = Toy({2})
+    assert [s.value for s in toy.settings("only", None, 0.1, 7)] == [7]  # type: ignore[arg-type]
+    with pytest.raises(EngineError, match=r"^profile: toy has no profile 'best'"):
+        toy.settings("best", None, 0.1)  # type: ignore[arg-type]
+    toy.profiles = {"free": lambda needs, dt: [Setting("slop", 0.1, "a toy")]}
+    with pytest.raises(EngineError, match=r"^iterations: "):
+        toy.settings("free", None, 0.1, 7)  # type: ignore[arg-type]
