@@ -1,0 +1,9 @@
+"""The command: ``crosscheck``. Tables and progress go to stderr, machine output to stdout.
+
+One module per group of subcommands; importing it registers them.
+"""
+
+from reports.command import inspecting, running
+from reports.command.group import main
+
+__all__ = ["inspecting", "main", "running"]

@@ -1,0 +1,5 @@
+"""Runs the command as ``python -m reports.command``."""
+
+from reports.command import main
+
+main()
