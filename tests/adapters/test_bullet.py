@@ -1,0 +1,430 @@
+"""Bullet's adapter: physics through the one step loop, and the fact sheet's key figures."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
+
+from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, needs, run
+from adapters.bullet import BulletEngine, _shares
+from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, fall
+from adapters.engine import EngineError
+
+ENGINE = BulletEngine()
+PROFILES = ("default", "tuned", "one")
+DT = 1.0 / 240.0
+EVERY_STEP = Sampling(1, 0.0)
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+FLOOR_2D = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def drive(scene, profile="tuned", dt=DT, sampling=EVERY_STEP, **changes):
+    settings = {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)} | changes
+    return run(ENGINE, scene, dt, settings, sampling)
+
+
+def ball(height, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), name="ball", x=0.0, mass=0.5, inertia=0.05):
+    pose = (x, 0.0, height, *UPRIGHT)
+    return Body(name, Sphere(0.5), mass, (inertia,) * 3, pose, (*velocity, *spin))
+
+
+def scene_of(*bodies, e=0.0, mu=0.0, gravity=(0.0, 0.0, 0.0), duration=0.25, pairs=None):
+    return Scene("t", 1, 3, bodies, pairs or (Pair(restitution=e, friction=mu),), gravity, duration)
+
+
+def planar(*bodies, e=0.0, mu=0.0, gravity=(0.0, 0.0), duration=0.25):
+    return Scene("t", 1, 2, bodies, (Pair(restitution=e, friction=mu),), gravity, duration)
+
+
+def hit(gap, v, e, **kwargs):
+    return scene_of(FLOOR, ball(0.5 + gap, (0.0, 0.0, -v)), e=e, duration=gap / v + 0.1, **kwargs)
+
+
+# ---- the engine stays outside until it is asked, and is quiet ----------------------------------------------------
+
+
+def test_importing_the_adapter_imports_no_engine_and_building_prints_nothing():
+    code = (
+        "import sys, adapters, adapters.bullet as b\n"
+        "assert 'pybullet' not in sys.modules\n"
+        "e = b.BulletEngine(); e.version(); assert 'pybullet' not in sys.modules\n"
+        "from adapters import *\n"
+        "s = Scene('t', 1, 2, (Body('d', Disc(.5)),), (Pair(),), (0., -9.8), .1)\n"
+        "run(e, s, .01, {x.name: x.value for x in e.settings('tuned', needs(s), .01)})\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+# ---- rebounds ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 1000])
+@pytest.mark.parametrize("v", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("e", [0.3, 0.8, 1.0])
+def test_tuned_rebound_is_e_to_round_off_at_any_step_and_phase(dt, v, e):
+    for phase in (0.13, 0.5, 0.87):
+        end = drive(hit((3.0 + phase) * v * dt, v, e), dt=dt).twist[-1, 1, 2]
+        assert end / v == pytest.approx(e, abs=1e-14)  # a handful of operations of 2e-16 each
+
+
+def test_worked_example_gives_4_8_metres_per_second_and_5_4_newton_seconds():
+    record = drive(hit(0.315, 6.0, 0.8))
+    assert record.twist[-1, 1, 2] == pytest.approx(4.8, abs=1e-14)
+    assert record.contacts.impulse_between(0, 1).sum(axis=0)[2] == pytest.approx(5.4, abs=1e-14)
+
+
+def test_default_law_first_seen_apart_takes_gap_over_dt_off_the_rebound():
+    v, e, gap = 8.0, 0.8, 0.004  # seen apart at once, and (1 + e) v dt > gap: it bounces in the first step
+    record = drive(hit(gap, v, e), "default", linearDamping=0.0)
+    # 1e-11: a gap known to 2e-15 m (a few ulp of the floor's 20 m half depth) over dt.
+    assert record.twist[-1, 1, 2] == pytest.approx(e * v - (gap + 1e-5) / DT, abs=1e-11)
+
+
+def test_default_law_first_seen_overlapping_adds_baumgarte_to_the_rebound():
+    v, e, gap = 8.0, 0.8, 0.025  # out of reach at .025, overlapping at .025 - v dt = -.0083
+    record = drive(hit(gap, v, e), "default", linearDamping=0.0)
+    assert record.twist[-1, 1, 2] == pytest.approx(e * v + 0.08 * (v * DT - gap - 1e-5) / DT, abs=1e-11)
+
+
+def test_default_ball_at_1_metre_per_second_does_not_bounce():
+    assert abs(drive(hit(0.0525, 1.0, 0.8), "default").twist[-1, 1, 2]) < 1e-12
+
+
+def test_one_errs_by_less_than_its_contact_erp():
+    errors = []
+    for phase in np.linspace(0.05, 0.95, 7):
+        end = drive(hit((3.0 + phase) * 2.0 * DT, 2.0, 0.8), "one").twist[-1, 1, 2]
+        errors.append(end / 2.0 - 0.8)
+    assert min(errors) >= 0.0 and 0.005 < max(errors) < 0.01
+
+
+@pytest.mark.parametrize(("profile", "law"), [("default", DEFAULT), ("tuned", IMPACT), ("one", ONE)])
+@pytest.mark.parametrize(("v", "e", "gap"), [(0.7, 0.6, 0.031), (3.3, 0.9, 0.12), (17.0, 0.2, 0.9), (40.0, 1.0, 2.2)])
+def test_recurrence_follows_every_sample_of_a_hit(profile, law, v, e, gap):
+    record = drive(hit(gap, v, e), profile)
+    predicted = fall(law, 0.5, gap, -v, e, 0.0, DT, len(record.t) - 1)
+    # 2e-15 m of the gap over dt, twice amplified by 1/(v dt) at most where a slow approach is braked step by step.
+    assert np.allclose(predicted.velocity, record.twist[:, 1, 2], rtol=0.0, atol=1e-9 * v)
+    total = record.contacts.impulse_between(0, 1).sum(axis=0)[2]
+    assert 0.5 * predicted.impulse.sum() == pytest.approx(total, abs=1e-9 * v)
+
+
+@pytest.mark.parametrize(("profile", "law", "e"), [("default", DEFAULT, 0.8), ("tuned", REST, 0.0), ("one", ONE, 0.5)])
+def test_recurrence_follows_a_dropped_ball(profile, law, e):
+    scene = scene_of(FLOOR, ball(1.237), e=e, gravity=(0.0, 0.0, -9.81), duration=0.7)
+    record = drive(scene, profile)
+    predicted = fall(law, 0.5, 0.737, 0.0, e, 9.81, DT, len(record.t) - 1)
+    assert np.allclose(predicted.gap, record.pose[:, 1, 2] - 0.5, rtol=0.0, atol=1e-9)
+
+
+def test_tilted_half_space_returns_a_ball_along_its_own_normal():
+    normal = np.array([1.0, 2.0, 2.0]) / 3.0
+    wall = Body("wall", HalfSpace(tuple(normal), 0.7), motion="fixed")
+    start, velocity = normal * (0.7 + 0.5 + 0.055), -3.0 * normal + 0.5 * np.array([2.0, 1.0, -2.0]) / 3.0
+    striker = Body("ball", Sphere(0.5), 2.0, (0.2,) * 3, (*start, *UPRIGHT), (*velocity, 0.0, 0.0, 0.0))
+    end = drive(scene_of(wall, striker, e=0.5)).twist[-1, 1, :3]
+    # 1e-12: round-off of the nearest point on a turned box 400 m wide (4e-14 m) tilts the normal.
+    assert np.allclose(end, velocity + (1.0 + 0.5) * 3.0 * normal, rtol=0.0, atol=1e-12)
+
+
+# ---- impulses ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("ball_first", [False, True])
+def test_impulse_acts_on_the_higher_index_along_the_normal_and_equals_m_dv(profile, ball_first):
+    striker = ball(0.55, (0.0, 0.0, -6.0))
+    bodies = (striker, FLOOR) if ball_first else (FLOOR, striker)
+    index, sign = (0, -1.0) if ball_first else (1, 1.0)
+    record = drive(scene_of(*bodies, e=0.5, duration=0.2), profile, linearDamping=0.0)
+    change = record.twist[-1, index, 2] - record.twist[0, index, 2]
+    total = record.contacts.impulse_between(0, 1).sum(axis=0)
+    assert total[2] == pytest.approx(sign * 0.5 * change, abs=1e-12)  # round-off of the 48 steps
+    assert np.all(record.contacts.rows.normal[:, 2] == sign)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_resting_box_is_carried_by_m_g_dt_and_its_weight_stays_counted_once(profile):
+    box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))
+    record = drive(scene_of(FLOOR, box, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=1.0), profile)
+    late = record.contacts.impulse_between(0, 1)[-60:, 2]
+    # 1e-6: residual that the shipped profile stops at is 3e-4 m/s per row, of which a flat box keeps 1e-8.
+    assert np.allclose(late, 2.0 * 9.81 * DT, rtol=1e-6)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_friction_impulse_is_m_dv_and_opposes_the_slide(profile):
+    box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (2.0, -1.0, 0.0, 0.0, 0.0, 0.0))
+    scene = scene_of(FLOOR, box, mu=0.4, gravity=(0.0, 0.0, -9.81), duration=0.2)
+    record = drive(scene, profile, linearDamping=0.0, angularDamping=0.0)
+    total = record.contacts.impulse_between(0, 1).sum(axis=0)
+    change = 2.0 * (record.twist[-1, 1, :3] - record.twist[0, 1, :3])
+    assert np.allclose(total[:2], change[:2], rtol=0.0, atol=1e-11)
+    assert total[0] < 0.0 < total[1]
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_pair_friction_decelerates_by_mu_g(profile):
+    box = Body("box", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for mu in (0.1, 0.5):
+        scene = scene_of(FLOOR, box, mu=mu, gravity=(0.0, 0.0, -9.81), duration=0.5)
+        record = drive(scene, profile, linearDamping=0.0, angularDamping=0.0)
+        measured = (3.0 - record.twist[-1, 1, 0]) / (9.81 * record.t[-1])
+        assert measured == pytest.approx(mu, rel=0.01)  # fact sheet: 0.7 % from contacts switching under a fast box
+
+
+# ---- signs, inertia, loads ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_positive_planar_torque_turns_counter_clockwise_by_the_stated_inertia(profile):
+    disc = Body("disc", Disc(0.5), 2.0, 0.7, torque=(0.3,))
+    record = drive(planar(disc), profile, angularDamping=0.0, linearDamping=0.0)
+    assert record.twist[-1, 0, 2] == pytest.approx(0.3 / 0.7 * record.t[-1], rel=1e-12)
+    assert record.pose[-1, 0, 2] > 0.0 and record.out_of_plane == 0.0
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_box_that_lands_on_a_corner_turns_away_from_it(profile, side):
+    # Turned by a negative angle a square stands on the corner right of its centre: the floor lifts that side.
+    tilt = -0.3 * side
+    lowest = 0.5 * (math.cos(0.3) + math.sin(0.3))
+    box = Body("box", Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, lowest + 0.02, tilt), (0.0, -2.0, 0.0))
+    record = drive(planar(FLOOR_2D, box, e=0.5, mu=0.0, duration=0.05), profile)
+    assert side * record.twist[-1, 1, 2] > 0.5
+
+
+def test_corner_strike_obeys_the_impulse_formula_with_the_stated_inertia():
+    mass, moment, v, e, tilt = 1.3, 0.4, 2.0, 0.5, -0.3
+    lowest = 0.5 * (math.cos(tilt) - math.sin(tilt))
+    arm = 0.5 * (math.cos(tilt) + math.sin(tilt))  # horizontal distance of the corner right of the centre
+    box = Body("box", Box((0.5, 0.5)), mass, moment, (0.0, lowest + 0.02, tilt), (0.0, -v, 0.0))
+    # Ends before the other corner comes down.
+    record = drive(planar(FLOOR_2D, box, e=e, duration=0.03))
+    j = (1.0 + e) * v / (1.0 / mass + arm * arm / moment)
+    # 1e-12: the corner's position carries the tilt's round-off.
+    assert record.twist[-1, 1, 1] == pytest.approx(-v + j / mass, abs=1e-12)
+    assert record.twist[-1, 1, 2] == pytest.approx(arm * j / moment, abs=1e-12)
+
+
+def test_disc_that_starts_touching_rolls_with_its_own_moment_not_the_spheres():
+    disc = Body("disc", Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0))
+    record = drive(planar(FLOOR_2D, disc, mu=0.5, gravity=(0.0, -9.81), duration=0.5))
+    # Angular momentum about the contact line: 2/3 for a disc, 5/7 for a sphere; 1e-5: fact sheet, box floor.
+    assert record.twist[-1, 1, 0] == pytest.approx(2.0 * 2.0 / 3.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_force_torque_and_three_moments_act_as_stated(profile):
+    moments = (0.3, 0.5, 0.9)
+    for axis in range(3):
+        torque = tuple(0.02 if k == axis else 0.0 for k in range(3))
+        force = tuple(1.5 if k == axis else 0.0 for k in range(3))
+        body = Body("b", Box((0.5,) * 3), 2.5, moments, force=force, torque=torque)
+        record = drive(scene_of(body, duration=0.1), profile, linearDamping=0.0, angularDamping=0.0)
+        assert record.twist[-1, 0, axis] == pytest.approx(1.5 / 2.5 * record.t[-1], rel=1e-12)
+        assert record.twist[-1, 0, 3 + axis] == pytest.approx(0.02 / moments[axis] * record.t[-1], rel=1e-12)
+
+
+def test_force_acts_at_the_centre_in_world_axes_of_a_turned_body():
+    half = math.sqrt(0.5)
+    body = Body("b", Box((0.2, 0.5, 0.3)), 1.0, (0.1, 0.2, 0.3), (1.0, 2.0, 3.0, half, 0.0, 0.0, half), force=(1, 0, 0))
+    end = drive(scene_of(body, duration=0.1)).twist[-1, 0]
+    assert end[0] == pytest.approx(0.1, rel=1e-12) and np.all(end[1:] == 0.0)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_gravity_pulls_in_any_direction_with_semi_implicit_steps(profile):
+    g = (1.0, -2.0, -3.0)
+    record = drive(scene_of(ball(5.0), gravity=g, duration=0.2), profile, linearDamping=0.0)
+    t = record.t[:, None]
+    assert np.allclose(record.twist[:, 0, :3], np.multiply(t, g), rtol=0.0, atol=1e-13)
+    fallen = record.pose[:, 0, :3] - record.pose[0, 0, :3]
+    assert np.allclose(fallen, 0.5 * t * (t + DT) * np.array(g), rtol=0.0, atol=1e-13)
+    assert ENGINE.facts.scheme.position_offset == 1
+
+
+def test_default_drag_is_linear_and_quadratic_and_tuned_has_none():
+    flying = scene_of(ball(5.0, (10.0, 0.0, 0.0)), duration=1.0)
+    assert drive(flying, "default").twist[-1, 0, 0] == pytest.approx(6.90, abs=0.01)  # fact sheet
+    assert drive(flying, "tuned").twist[-1, 0, 0] == 10.0
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_prescribed_wall_keeps_its_motion_and_sends_a_ball_off_at_1_plus_e(profile):
+    pose, twist = (-1.1, 0.0, 0.0, *UPRIGHT), (2.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wall = Body("wall", Box((0.5, 2.0, 2.0)), pose=pose, twist=twist, motion="prescribed")
+    scene = scene_of(wall, ball(0.0, x=0.0, mass=3.0), e=0.5, gravity=(0.0, -9.81, 0.0), duration=0.2)
+    record = drive(scene, profile)
+    assert np.allclose(record.twist[:, 0, :3], twist[:3], rtol=0.0, atol=2e-8)  # recoil of a 1e9th
+    assert np.allclose(record.pose[-1, 0, :3], (-1.1 + 2.0 * record.t[-1], 0.0, 0.0), rtol=0.0, atol=1e-8)
+    assert "prescribed motion of wall" in record.initial_change[0]
+    if profile == "tuned":
+        assert record.twist[-1, 1, 0] == pytest.approx((1.0 + 0.5) * 2.0, abs=2e-8)
+
+
+# ---- materials ---------------------------------------------------------------------------------------------------
+
+
+def test_every_pair_gets_its_own_coefficients():
+    pairs = (Pair("floor", "a", 0.8), Pair("floor", "b", 0.5), Pair("a", "b", 0.3), Pair())
+    bodies = (FLOOR, ball(0.6, (0, 0, -2.0), name="a", x=-2.0), ball(0.6, (0, 0, -2.0), name="b", x=2.0))
+    end = drive(scene_of(*bodies, pairs=pairs)).twist[-1]
+    assert end[1, 2] == pytest.approx(1.6, abs=1e-12) and end[2, 2] == pytest.approx(1.0, abs=1e-12)
+    bodies = (FLOOR, ball(5.0, (1.0, 0, 0), name="a", x=-0.6), ball(5.0, (-1.0, 0, 0), name="b", x=0.6))
+    end = drive(scene_of(*bodies, pairs=pairs)).twist[-1]
+    assert end[2, 0] - end[1, 0] == pytest.approx(0.3 * 2.0, abs=1e-12)
+
+
+def test_pair_of_zero_is_given_to_a_body_that_touches_nothing_rough():
+    names = ("floor", "a", "b")
+    pairs = (Pair("floor", "a", friction=0.5), Pair("floor", "b"), Pair("a", "b"))
+    scene = scene_of(FLOOR, *(ball(5.0, name=n, x=k) for k, n in enumerate(names[1:])), pairs=pairs)
+    shares = _shares(scene, "friction")
+    assert shares[0] * shares[1] == pytest.approx(0.5, rel=1e-15) and shares[2] == 0.0
+
+
+def test_table_that_no_product_gives_is_refused_in_one_line():
+    names = ("a", "b", "c")
+    pairs = tuple(Pair(i, j, friction=0.5) for i, j in zip(names, names[1:] + names[:1], strict=True))
+    bodies = (FLOOR, *(ball(5.0 + 2 * k, name=n) for k, n in enumerate(names)))
+    scene = scene_of(*bodies, pairs=(*pairs, Pair("floor", "*", friction=0.2), Pair("floor", "a", friction=0.9)))
+    reason = ENGINE.refuses(scene, "tuned")
+    assert reason.startswith("friction: ") and "\n" not in reason
+    with pytest.raises(EngineError, match="friction: "):
+        drive(scene)
+
+
+# ---- state, readback, determinism --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_state_before_the_first_step_is_the_scene_in_its_order(profile):
+    post = Body("post", Box((0.2, 0.3, 0.4)), pose=(9.0, 1.0, 2.0, 0.6, 0.0, 0.8, 0.0), motion="fixed")
+    scene = scene_of(ball(3.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), FLOOR, post)
+    record = drive(scene, profile)
+    assert np.allclose(record.pose[0], [body.pose for body in scene.bodies], rtol=0.0, atol=1e-15)
+    assert np.allclose(record.twist[0], [body.twist for body in scene.bodies], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_readback_is_what_was_asked(profile):
+    body = Body("b", Box((0.5,) * 3), 2.5, (0.3, 0.5, 0.9), (0.0, 0.0, 3.0, *UPRIGHT))
+    held = drive(scene_of(FLOOR, body, e=0.4, mu=0.3, gravity=(0.0, 1.0, -9.0)), profile).readback
+    assert held["fixedTimeStep"] == DT and held["numSolverIterations"] == 50 and held["numSubSteps"] == 0
+    assert [held[f"gravityAcceleration{axis}"] for axis in "XYZ"] == [0.0, 1.0, -9.0]
+    floor, box = held["bodies"]["floor"], held["bodies"]["b"]
+    assert box["mass"] == pytest.approx(2.5, rel=1e-15) and box["inertia"] == pytest.approx((0.3, 0.5, 0.9), rel=1e-15)
+    assert floor["friction"] * box["friction"] == pytest.approx(0.3, rel=1e-15)
+    # Bullet does not fill restitution in for rigid bodies; there it must be absent rather than stale.
+    assert ("restitution" in box) == (profile == "default")
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_two_builds_give_the_same_bits_even_if_another_client_spoilt_the_global(profile):
+    import pybullet
+
+    boxes = [Body(f"b{k}", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.1 * k, 0.0, 0.5 + k, *UPRIGHT)) for k in range(3)]
+    scene = scene_of(FLOOR, *boxes, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=0.5)
+    first = drive(scene, profile)
+    other = pybullet.connect(pybullet.DIRECT)
+    pybullet.setPhysicsEngineParameter(contactBreakingThreshold=0.5, physicsClientId=other)
+    pybullet.disconnect(other)
+    assert drive(scene, profile).state_hash() == first.state_hash()
+    assert first.pose[-1, 3, 2] > 2.4  # and it stands
+
+
+def test_worlds_built_side_by_side_do_not_share_anything():
+    def build(scene):
+        return ENGINE.build(scene, DT, {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)})
+
+    alone = drive(hit(0.02, 3.0, 0.8)).twist[-1, 1, 2]
+    first, second = build(hit(0.02, 3.0, 0.8)), build(scene_of(ball(3.0), gravity=(0.0, 0.0, -9.81)))
+    second.advance(20)
+    first.advance(20)
+    assert first.twist()[1, 2] == alone and second.twist()[0, 2] == pytest.approx(-9.81 * 20 * DT, rel=1e-12)
+    for simulation in (first, second, first):
+        simulation.close()
+
+
+# ---- refusals ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"contactErp": 0.1}, "contactErp: bullet has no such setting"),
+        ({"contactERP": -0.1}, "contactERP: -0.1 must be finite and not negative"),
+        ({"linearDamping": math.nan}, "linearDamping: nan must be finite"),
+        ({"contactSlop": "thin"}, "contactSlop: 'thin' is not a number"),
+        ({"iterations": 0}, "iterations: 0 must be a whole number of at least 1"),
+        ({"iterations": 2.5}, "iterations: 2.5 must be a whole number"),
+    ],
+)
+def test_bad_settings_are_refused_in_one_line(changes, message):
+    with pytest.raises(EngineError) as error:
+        drive(hit(0.02, 1.0, 0.5), **changes)
+    assert str(error.value).startswith(message) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.1, math.nan, math.inf])
+def test_bad_steps_are_refused(dt):
+    with pytest.raises(EngineError, match=r"dt: .* must be a positive, finite"):
+        ENGINE.build(hit(0.02, 1.0, 0.5), dt, {})
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        (scene_of(Body("b", Sphere(1e-3), 1.0, (1.0,) * 3)), "b.shape: "),
+        (scene_of(Body("b", Sphere(0.5), 1e-13, (1.0,) * 3)), "b: "),
+        (scene_of(Body("b", Sphere(0.5), 1.0, (1.0, 1.0, 1e-14))), "b: "),
+        (scene_of(FLOOR, ball(2.0), mu=11.0), "friction: "),
+    ],
+)
+def test_what_bullet_cannot_hold_is_refused_with_a_reason(scene, message):
+    assert ENGINE.refuses(scene, "tuned").startswith(message)
+    assert ENGINE.refuses(hit(0.02, 1.0, 0.5), "tuned") is None
+
+
+def test_settings_follow_the_scenes_needs_and_carry_their_reasons():
+    impact, rest = needs(hit(0.02, 1.0, 0.5)), needs(scene_of(FLOOR, ball(1.0), gravity=(0.0, 0.0, -9.81)))
+    names = {s.name: s.value for s in ENGINE.settings("tuned", impact, DT)}
+    assert names["splitImpulsePenetrationThreshold"] == 0.0 and names["contactSlop"] == 1e-6
+    names = {s.name: s.value for s in ENGINE.settings("tuned", rest, DT)}
+    assert "splitImpulsePenetrationThreshold" not in names and names["contactSlop"] == 1e-5
+    for profile in PROFILES:
+        assert all(setting.because for setting in ENGINE.settings(profile, rest, DT))
+    assert {s.name: s.value for s in ENGINE.settings("one", rest, DT, 7)}["iterations"] == 7
+
+
+# ---- fact sheet --------------------------------------------------------------------------------------------------
+
+
+def test_ten_boxes_drift_as_the_fact_sheet_says_and_carry_their_weight():
+    boxes = [Body(f"b{k}", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5 + k, *UPRIGHT)) for k in range(10)]
+    scene = scene_of(FLOOR, *boxes, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=5.0)
+    record = drive(scene, sampling=Sampling(1, 4.0))
+    drift = np.abs(record.pose[-1, :, :2] - record.pose[0, :, :2]).max()
+    assert drift == pytest.approx(0.68e-3, abs=0.01e-3)  # fact sheet, per axis
+    bottom = record.contacts.impulse_between(0, 1)[:, 2] / (10 * 9.81 * DT)
+    assert bottom.mean() == pytest.approx(1.0, abs=1e-6) and bottom.std() < 1e-5
+
+
+@pytest.mark.parametrize(("ratio", "slides"), [(0.5, False), (0.999, False), (1.001, True), (1.1, True)])
+def test_tuned_box_sticks_below_the_cone_and_slides_above(ratio, slides):
+    theta = math.atan(0.5 * ratio)
+    gravity = (9.81 * math.sin(theta), 0.0, -9.81 * math.cos(theta))
+    box = Body("box", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))
+    end = drive(scene_of(FLOOR, box, mu=0.5, gravity=gravity, duration=1.0)).twist[-1, 1, 0]
+    if slides:
+        assert end == pytest.approx(9.81 * (math.sin(theta) - 0.5 * math.cos(theta)), rel=5e-3)
+    else:
+        assert abs(end) < 1e-6
