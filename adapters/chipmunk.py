@@ -272,7 +272,8 @@ class ChipmunkSimulation(Simulation):
 
         self.scene, self.dt = scene, dt
         self.space = pymunk.Space(threaded=False)
-        self.space.gravity = scene.gravity
+        gx, gy = scene.gravity
+        self.space.gravity = (gx, gy)
         self.space.iterations = settings["iterations"]
         self.space.collision_slop = settings["collision_slop"]
         self.space.collision_bias = settings["collision_bias"]
@@ -411,23 +412,17 @@ def _shape(shape: Any, body: Any, skin: float) -> Any:
         hx, hy = shape.half_extents
         return pymunk.Poly(body, [(-hx, -hy), (hx, -hy), (hx, hy), (-hx, hy)], radius=skin)
     assert isinstance(shape, HalfSpace)
-    return pymunk.Poly(body, _ground(shape, body), radius=skin)
+    return pymunk.Poly(body, _ground(shape), radius=skin)
 
 
-def _ground(shape: HalfSpace, body: Any) -> list[tuple[float, float]]:
-    """Corners of a thick slab whose upper face is the half-space's, in the body's own axes.
-
-    The plane is given in world axes, so whatever pose the body has is taken out again.
-    """
+def _ground(shape: HalfSpace) -> list[tuple[float, float]]:
+    """Corners of a thick slab whose upper face is the half-space's."""
     nx, ny = shape.normal
-    tx, ty = ny, -nx
     corners = []
     for along, depth in ((-1.0, GROUND_DEPTH), (-1.0, 0.0), (1.0, 0.0), (1.0, GROUND_DEPTH)):
         height, side = shape.offset - depth, along * GROUND_HALF_WIDTH
-        corners.append((height * nx + side * tx, height * ny + side * ty))
-    if tuple(body.position) == (0.0, 0.0) and body.angle == 0.0:
-        return corners
-    return [tuple(body.world_to_local(corner)) for corner in corners]
+        corners.append((height * nx + side * ny, height * ny - side * nx))
+    return corners
 
 
 def _size(shape: Any) -> list[float]:

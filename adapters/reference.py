@@ -39,13 +39,15 @@ SOURCE = "reference_solver/README.md"
 #: Why each of the solver's settings has its value; the values themselves are the solver's own.
 REASONS = {
     "iterations": "what textbooks and engines use: an answer at a fixed cost, whatever is left unsolved",
-    "residual": "sweep until every contact equation holds to this share of its own impulse; null: fixed sweeps",
-    "max_sweeps": "limit of the residual stop; reaching it is reported as not converged",
-    "relaxation": "1 is plain projected Gauss-Seidel",
+    "residual": "sweep until every contact equation holds to this share of its own speed; null: fixed sweeps",
+    "max_sweeps": "bound of the residual stop for broken problems; reaching it is reported as not converged",
+    "relaxation": "1 is plain projected Gauss-Seidel; null estimates the best factor from the residuals",
     "position_correction": "split: overlap is corrected through pseudo-velocities that carry no energy",
     "beta": "share of an overlap that is corrected per step",
-    "slop": "overlap that is left alone, so that resting contacts do not flicker",
+    "slop": "overlap that is left alone [m]",
     "warm_starting": "each contact starts from its impulse of the step before, matched by feature",
+    "solver": "scalar: row after row, the textbook; block: the rows of a manifold together, which does not stall",
+    "margin": "touching counts as contact to this share of the smallest half width, nothing farther away does",
 }
 
 
@@ -65,7 +67,7 @@ def reference_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def _as_settings(chosen: Any) -> list[Setting]:
     return [
-        Setting(field.name, getattr(chosen, field.name), REASONS.get(field.name, ""), SOURCE)
+        Setting(field.name, getattr(chosen, field.name), REASONS[field.name], SOURCE)
         for field in fields(chosen)
         if field.name != "dt"
     ]

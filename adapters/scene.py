@@ -98,7 +98,10 @@ class Box:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Everything with ``normal . x <= offset`` [m] is solid; ``normal`` is a unit vector. Never moves."""
+    """Everything with ``normal . x <= offset`` [m] is solid, in world axes; ``normal`` is a unit vector.
+
+    It never moves, and its body's pose stays empty: normal and offset say where it lies.
+    """
 
     normal: tuple[float, ...]
     offset: float = 0.0
@@ -268,15 +271,19 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _identity(dimension: int) -> tuple[float, ...]:
+    """Pose at the origin, not turned."""
+    return (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
 def _complete(body: Body, dimension: int) -> Body:
     """Fill an empty pose, twist, force or torque with rest at the origin and no load."""
-    identity = (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     return Body(
         body.name,
         body.shape,
         body.mass,
         body.inertia,
-        body.pose or identity,
+        body.pose or _identity(dimension),
         body.twist or (0.0,) * (3 if dimension == 2 else 6),
         body.motion,
         body.force or (0.0,) * dimension,
@@ -314,6 +321,8 @@ def _validate_body(body: Body, dimension: int) -> None:
         _length(f"{body.name}.shape.normal", body.shape.normal, dimension)
         if body.motion != "fixed":
             raise SceneError(f"{body.name}.motion: a half-space must be fixed")
+        if body.pose != _identity(dimension):
+            raise SceneError(f"{body.name}.pose: a half-space lies where its normal and offset say, leave it empty")
     if body.motion not in ("free", "fixed", "prescribed"):
         raise SceneError(f"{body.name}.motion: {body.motion!r} must be free, fixed or prescribed")
     if body.motion == "free":

@@ -70,6 +70,7 @@ FAULTS: list[tuple[Callable[[], object], str]] = [
     (lambda: scene(replace(FLOOR, shape=HalfSpace((0.0, 1.0), NAN))), "floor.shape.offset"),
     (lambda: scene(replace(FLOOR, shape=HalfSpace((0.0, 0.0, 1.0)))), "floor.shape.normal"),
     (lambda: scene(replace(FLOOR, motion="free")), "floor.motion"),
+    (lambda: scene(replace(FLOOR, pose=(0.0, 1.0, 0.0))), "floor.pose"),
     (lambda: scene(pairs=(Pair(restitution=1.2),)), "restitution"),
     (lambda: scene(pairs=(Pair(restitution=-0.1),)), "restitution"),
     (lambda: scene(pairs=(Pair(restitution=NAN),)), "restitution"),
