@@ -1,13 +1,44 @@
-"""Parameter receipts: tiny probe scenes measure what an engine realises, through its own adapter."""
+"""Parameter receipts: what a profile realises, measured through its own adapter, against what it declares.
+
+    asked        by the scene: the pair's e and mu; 1 for ratios; 0 for losses and delays
+    declared     by `Engine.declares`; where that is silent, as asked
+    measured     on the probes, at the sample farthest from what is declared
+    holds        |measured - declared| <= band
+
+Probes run with exactly the settings that the judged scene gets, so that the judged configuration is measured.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from adapters.engine import Declared, Engine, EngineError
+from adapters.needs import Needs
+from adapters.probes import (
+    GRAVITY,
+    HALF_EXTENTS,
+    LANDING_SPEED,
+    PROBES,
+    SLIDE_SPEED,
+    SLIDE_TIME,
+    STEPS,
+    Case,
+    Samples,
+)
+from adapters.stepping import posed_for, run
+
 #: What the probes measure. ``restitution`` and ``friction`` are the pair's effective coefficients; ``mass``,
-#: ``inertia``, ``gravity``, ``step`` and ``size`` are ratios measured / asked; the dampings are the fraction of
-#: speed lost in one second.
+#: ``inertia``, ``gravity``, ``step`` and ``size`` are ratios measured / asked; ``sampling`` is how many steps late a
+#: state is read; the dampings are the fraction of speed lost in one second; ``turn`` is +1 if positive torques and
+#: contact forces turn bodies counter-clockwise where they should, -1 if not.
 QUANTITIES = (
     "gravity",
     "step",
+    "sampling",
     "mass",
     "inertia",
     "size",
@@ -15,4 +46,146 @@ QUANTITIES = (
     "angular_damping",
     "restitution",
     "friction",
+    "turn",
 )
+
+#: Band of everything an engine gets exactly: some thousand roundings of 2.2e-16 each.
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """One quantity: asked, declared, measured; NaN where the engine refused the probe, with its reason."""
+
+    quantity: str
+    asked: float
+    declared: float
+    band: float
+    measured: float
+    holds: bool
+    because: str
+
+
+def receipts(
+    engine: Engine, profile: str, needs: Needs, dt: float, iterations: int | None = None
+) -> tuple[Receipt, ...]:
+    """Measure what ``profile`` realises for a scene with ``needs``.
+
+    Measurements are kept per engine, profile, settings, step, dimension and pair values.
+
+    Raises
+    ------
+    EngineError
+        For an unknown profile, or if the engine fails on a probe that it did not refuse.
+    """
+    settings = engine.settings(profile, needs, dt, iterations)
+    values = tuple((setting.name, _frozen(setting.value)) for setting in settings)
+    case = Case(needs.dimension, needs.restitution, needs.friction, dt, engine.facts.scheme.position_offset)
+    names = tuple(name for name in PROBES if _applies(name, needs))
+    declared = engine.declares(profile, needs, dt)
+    for quantity in declared:
+        if quantity not in QUANTITIES:
+            raise EngineError(f"declares: {engine.name}/{profile} declares {quantity!r}, no probe measures it")
+    samples, silent = _measured(engine, profile, values, case, names)
+    wanted = [q for q in QUANTITIES if any(q in PROBES[name].quantities for name in names)]
+    return tuple(_receipt(q, needs, case, declared, dict(samples).get(q, ()), dict(silent).get(q)) for q in wanted)
+
+
+def _applies(probe: str, needs: Needs) -> bool:
+    """Rebounds are measured where something rebounds, friction where there is any."""
+    if probe == "rebound":
+        return needs.regime == "impact"
+    return needs.friction > 0.0 if probe == "slide" else True
+
+
+def _frozen(value: Any) -> Any:
+    """Hashable equal of a setting's value."""
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in value)
+    if isinstance(value, Mapping):
+        raise EngineError("settings: a setting is a number, a word or a list of them, not a table")
+    return value
+
+
+Silent = tuple[tuple[str, tuple[str, bool]], ...]
+
+
+@lru_cache(maxsize=1024)
+def _measured(
+    engine: Engine, profile: str, values: tuple[tuple[str, Any], ...], case: Case, names: tuple[str, ...]
+) -> tuple[tuple[tuple[str, tuple[float, ...]], ...], Silent]:
+    """Samples by quantity, and for quantities without: the reason and whether the engine refused."""
+    samples: dict[str, tuple[float, ...]] = {}
+    silent: dict[str, tuple[str, bool]] = {}
+    for name in names:
+        found = _probe(engine, profile, dict(values), case, name)
+        if isinstance(found, dict):
+            for quantity, numbers in found.items():
+                samples[quantity] = samples.get(quantity, ()) + tuple(float(x) for x in numbers)
+        else:
+            silent.update((quantity, found) for quantity in PROBES[name].quantities)
+    return tuple(samples.items()), tuple(silent.items())
+
+
+def _probe(engine: Engine, profile: str, values: dict[str, Any], case: Case, name: str) -> Samples | tuple[str, bool]:
+    """Run one probe: its samples, or why there are none and whether the engine refused."""
+    probe = PROBES[name]
+    scene = probe.make(case)
+    refusal = engine.refuses(posed_for(engine, scene), profile)
+    if refusal:
+        return f"probe {name} refused: {refusal}", True
+    trajectory = run(engine, scene, case.dt, values, probe.sampling(case, scene))
+    if trajectory.finish == "diverged":
+        return f"probe {name} diverged: {trajectory.reason}", False
+    return probe.read(case, scene, trajectory)
+
+
+def _receipt(
+    quantity: str,
+    needs: Needs,
+    case: Case,
+    declarations: Mapping[str, Declared],
+    samples: tuple[float, ...],
+    silent: tuple[str, bool] | None,
+) -> Receipt:
+    asked = _asked(quantity, needs)
+    declared = declarations.get(quantity) or Declared(asked, *_default_band(quantity, case, declarations))
+    if silent and not (silent[1] and samples):
+        return Receipt(quantity, asked, declared.value, declared.band, math.nan, silent[1], silent[0])
+    measured = max(samples, key=lambda x: math.inf if math.isnan(x) else abs(x - declared.value))
+    holds = abs(measured - declared.value) <= declared.band
+    return Receipt(quantity, asked, declared.value, declared.band, measured, holds, declared.because)
+
+
+def _asked(quantity: str, needs: Needs) -> float:
+    given = {"restitution": needs.restitution, "friction": needs.friction, "sampling": 0.0}
+    return given.get(quantity, 0.0 if quantity.endswith("damping") else 1.0)
+
+
+def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -> tuple[float, str]:
+    """Band of what is as asked, and why: round-off, what the probe can resolve, and drag that is declared."""
+    if quantity == "turn":
+        return 0.0, "a sign"
+    if quantity == "size":
+        # A predicted contact acts up to a step of approach and one of rebound early, another one up to a step late.
+        path = (1.0 + case.restitution) * LANDING_SPEED * case.dt
+        return path / HALF_EXTENTS[0] + ROUND_OFF, "one step of motion, and a predicted rebound"
+    band, because = ROUND_OFF, "exact but for round-off"
+    if quantity == "friction":
+        band = 2.0 * case.dt / SLIDE_TIME * case.friction + ROUND_OFF
+        because = "one step at each end of the window may hold a friction without its load"
+    drag = _drag(quantity, case, declared)
+    return (band + drag, f"{because}; and declared drag") if drag else (band, because)
+
+
+def _drag(quantity: str, case: Case, declared: Mapping[str, Declared]) -> float:
+    """Largest effect of declared damping on a probe; drag may grow with the square of a speed above 1 m/s."""
+    which = "angular_damping" if quantity == "inertia" else "linear_damping"
+    if which not in declared or quantity in ("step", "linear_damping", "angular_damping", "restitution"):
+        return 0.0
+    rate, window = -math.log1p(-min(declared[which].value + declared[which].band, 0.99)), STEPS * case.dt
+    if quantity == "friction":
+        speed = max(SLIDE_SPEED, case.friction * GRAVITY * SLIDE_TIME / 0.85)
+        return rate * speed * speed / GRAVITY
+    share = rate * window * max(1.0, GRAVITY * window)
+    return STEPS * share if quantity == "sampling" else share
