@@ -1,0 +1,70 @@
+"""The one decorator of all kernels, and the folder that keeps their machine code.
+
+numba's own cache key covers only the file a kernel stands in: after an edit elsewhere a caller would run stale
+code. The folder is therefore named after a hash of *all* solver sources and the numba version. If no folder is
+writable, kernels compile anew in every process: slower, never wrong, and an import never fails for it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+from numba.core import config
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def source_hash() -> str:
+    """Return 16 hex digits over the path and content of all solver sources and the numba version."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _base_folder() -> Path:
+    """Folder for caches: ``NUMBA_CACHE_DIR`` where set, else the user's cache folder."""
+    if config.CACHE_DIR:
+        return Path(config.CACHE_DIR)
+    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
+
+
+def cache_folder() -> Path | None:
+    """Return the folder for this state of the sources, created and proved writable; None if there is none."""
+    try:
+        folder = _base_folder() / f"kernels-{source_hash()}"
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except (OSError, RuntimeError):  # RuntimeError: no home directory can be determined
+        return None
+
+
+CACHE_FOLDER = cache_folder()
+
+
+def kernel(function: F) -> F:
+    """Compile a module-level function in double precision, IEEE order kept (no fastmath), cached on disk.
+
+    With ``NUMBA_DISABLE_JIT=1`` the function stays plain Python. Kernels take flags as integer arguments and
+    call other kernels as module globals: a closure over a compiled function would miss the cache in every run.
+    """
+    before = config.CACHE_DIR
+    if CACHE_FOLDER is not None:
+        config.CACHE_DIR = str(CACHE_FOLDER)
+    try:
+        # error_model numpy: no hidden zero-division branches; a zero denominator is excluded by validation.
+        compiled: F = numba.njit(function, cache=CACHE_FOLDER is not None, error_model="numpy")
+        return compiled
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,270 @@
+"""What is simulated: shapes, bodies and the pair values of restitution and friction.
+
+SI units. Planar: y up, pose (x, y, angle counter-clockwise), twist (vx, vy, omega). Spatial: z up, pose
+(x, y, z, qw, qx, qy, qz) with the quaternion turning body axes into world axes, twist (vx, vy, vz, wx, wy, wz)
+in world axes. Normals point from body A to body B, and A has the lower index. Separation < 0 is overlap.
+Everything is checked here, because compiled kernels check nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Motion = Literal["free", "fixed", "prescribed"]
+Array = NDArray[np.float64]
+
+#: Numbers per pose and twist, by dimension.
+POSE_SIZE = {2: 3, 3: 7}
+TWIST_SIZE = {2: 3, 3: 6}
+
+#: A quaternion or a normal this close to unit length is normalised in silence; further off it is a mistake.
+UNIT_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Planar disc of ``radius`` [m]."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_positive("radius", self.radius)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Sphere of ``radius`` [m]."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        _require_positive("radius", self.radius)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Box about its centre with two (planar) or three (spatial) ``half_extents`` [m]."""
+
+    half_extents: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "half_extents", _vector("half_extents", self.half_extents, (2, 3)))
+        for value in self.half_extents:
+            _require_positive("half_extents", value)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """Solid region ``normal . x <= offset`` in body axes; ``normal`` leaves the solid, ``offset`` in m."""
+
+    normal: tuple[float, ...]
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "normal", _unit("normal", _vector("normal", self.normal, (2, 3))))
+        _require_finite("offset", self.offset)
+
+
+Shape = Disc | Sphere | Box | HalfSpace
+
+
+@dataclass(frozen=True)
+class Body:
+    """One rigid body.
+
+    Parameters
+    ----------
+    shape
+        A shape of the model's dimension, centred on the centre of mass.
+    mass
+        [kg], ignored unless free.
+    inertia
+        About the centre of mass [kg m^2]: a number (planar) or three principal moments in body axes (spatial);
+        ignored unless free.
+    pose, twist
+        At the start, layout as in the module's docstring. A missing twist is rest.
+    motion
+        ``free``; ``fixed`` (immovable); ``prescribed`` (moves with its constant twist, whatever it meets).
+    force, torque
+        Constant external load in world axes [N, N m]; zero where missing.
+
+    Raises
+    ------
+    ValueError
+        Naming the field.
+    """
+
+    shape: Shape
+    mass: float = 0.0
+    inertia: float | tuple[float, ...] = 0.0
+    pose: tuple[float, ...] = (0.0, 0.0, 0.0)
+    twist: tuple[float, ...] | None = None
+    motion: Motion = "free"
+    force: tuple[float, ...] | None = None
+    torque: float | tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.shape, Shape):
+            raise ValueError(f"shape: {self.shape!r} is none of Disc, Sphere, Box, HalfSpace")
+        if self.motion not in ("free", "fixed", "prescribed"):
+            raise ValueError(f"motion: {self.motion!r} is none of 'free', 'fixed', 'prescribed'")
+        pose = _vector("pose", self.pose, (3, 7))
+        dimension = 2 if len(pose) == 3 else 3
+        if dimension == 3:
+            pose = pose[:3] + _unit("pose", pose[3:])
+        self._set(pose=pose)
+        self._set(twist=_load("twist", self.twist, TWIST_SIZE[dimension]))
+        self._set(force=_load("force", self.force, dimension))
+        self._set(torque=_load("torque", self.torque, 1 if dimension == 2 else 3))
+        if self.motion == "fixed" and any(self.twist or ()):
+            raise ValueError(f"twist: a fixed body must be at rest, not {self.twist!r}; use motion='prescribed'")
+        if self.motion == "free":
+            self._check_inertia(dimension)
+
+    def _check_inertia(self, dimension: int) -> None:
+        if isinstance(self.shape, HalfSpace):
+            raise ValueError("motion: a HalfSpace cannot be free")
+        _require_positive("mass", self.mass)
+        inertia = _load("inertia", self.inertia, 1 if dimension == 2 else 3)
+        for value in inertia if isinstance(inertia, tuple) else (inertia,):
+            _require_positive("inertia", value)
+        self._set(inertia=inertia)
+
+    def _set(self, **fields: Any) -> None:
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3, from the length of the pose."""
+        return 2 if len(self.pose) == 3 else 3
+
+
+@dataclass(frozen=True)
+class Model:
+    """Bodies, gravity and the law of every pair.
+
+    Parameters
+    ----------
+    dimension
+        2 or 3.
+    bodies
+        At least one, all of this dimension.
+    gravity
+        (dimension,) [m/s^2].
+    restitution, friction
+        (n, n) symmetric pair values: Newton's e, clamped to [0, 1] with a warning, and Coulomb's mu >= 0. A
+        number stands for the same value in all pairs.
+
+    Raises
+    ------
+    ValueError
+        Naming the field.
+    """
+
+    dimension: int
+    bodies: Sequence[Body]
+    gravity: tuple[float, ...]
+    restitution: Array
+    friction: Array
+
+    def __post_init__(self) -> None:
+        if self.dimension not in (2, 3):
+            raise ValueError(f"dimension: {self.dimension!r} is neither 2 nor 3")
+        if not self.bodies:
+            raise ValueError("bodies: a model needs at least one body")
+        for index, body in enumerate(self.bodies):
+            _require_dimension(f"bodies[{index}]", body, self.dimension)
+        n = len(self.bodies)
+        restitution = _pair_table("restitution", self.restitution, n)
+        if (restitution < 0.0).any() or (restitution > 1.0).any():
+            warnings.warn("restitution: clamped to [0, 1]; outside it a collision is no passive process", stacklevel=3)
+        friction = _pair_table("friction", self.friction, n)
+        if (friction < 0.0).any():
+            raise ValueError("friction: must not be negative")
+        object.__setattr__(self, "bodies", tuple(self.bodies))
+        object.__setattr__(self, "gravity", _vector("gravity", self.gravity, (self.dimension,)))
+        object.__setattr__(self, "restitution", np.clip(restitution, 0.0, 1.0))
+        object.__setattr__(self, "friction", friction)
+
+
+def smallest_extent(shape: Shape) -> float:
+    """Smallest half width of a shape [m]; infinite for a half-space. Scales margins, so that units cancel."""
+    if isinstance(shape, HalfSpace):
+        return math.inf
+    return min(shape.half_extents) if isinstance(shape, Box) else shape.radius
+
+
+def _require_finite(name: str, value: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+        raise ValueError(f"{name}: {value!r} is not a number")
+    if not math.isfinite(value):
+        raise ValueError(f"{name}: {value!r} is not finite")
+
+
+def _require_positive(name: str, value: float) -> None:
+    _require_finite(name, value)
+    if value <= 0.0:
+        raise ValueError(f"{name}: {value!r} must be positive")
+
+
+def _vector(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(x) for x in value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: {value!r} is not a sequence of numbers") from error
+    if len(numbers) not in sizes:
+        raise ValueError(f"{name}: {len(numbers)} numbers where {' or '.join(map(str, sizes))} are needed")
+    for number in numbers:
+        _require_finite(name, number)
+    return numbers
+
+
+def _load(name: str, value: Any, size: int) -> float | tuple[float, ...]:
+    """Return a vector of ``size`` numbers, a plain number for size 1, zeros where the value is missing."""
+    if size == 1:
+        number = 0.0 if value is None else value
+        _require_finite(name, number)
+        return float(number)
+    return (0.0,) * size if value is None else _vector(name, value, (size,))
+
+
+def _unit(name: str, vector: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*vector)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise ValueError(f"{name}: {vector!r} has length {length:.6g}, not 1")
+    return tuple(x / length for x in vector)
+
+
+def _require_dimension(name: str, body: Body, dimension: int) -> None:
+    if body.dimension != dimension:
+        raise ValueError(f"{name}: pose has {len(body.pose)} numbers where {POSE_SIZE[dimension]} are needed")
+    shape = body.shape
+    fits = {
+        Disc: dimension == 2,
+        Sphere: dimension == 3,
+        Box: isinstance(shape, Box) and len(shape.half_extents) == dimension,
+        HalfSpace: isinstance(shape, HalfSpace) and len(shape.normal) == dimension,
+    }
+    if not fits[type(shape)]:
+        raise ValueError(f"{name}: shape {shape!r} is not a {dimension}-D shape")
+
+
+def _pair_table(name: str, value: Any, n: int) -> Array:
+    table = np.array(value, dtype=np.float64)
+    if table.ndim == 0:
+        table = np.full((n, n), float(table))
+    if table.shape != (n, n):
+        raise ValueError(f"{name}: shape {table.shape} where ({n}, {n}) is needed")
+    if not np.isfinite(table).all():
+        raise ValueError(f"{name}: not finite")
+    if (table != table.T).any():
+        raise ValueError(f"{name}: not symmetric")
+    return table

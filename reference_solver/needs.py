@@ -1,0 +1,50 @@
+"""What a model needs, and therefore what the solver may leave out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference_solver.model import Box, Model
+
+#: Up to this many bodies all pairs are tested; sorting pays off beyond (performance notes: indifferent to ~100).
+ALL_PAIRS_LIMIT = 64
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Phenomena that a model can show. A false one is not modelled at all."""
+
+    rotation: bool
+    friction: bool
+    restitution: bool
+    broadphase: bool
+
+    def left_out(self) -> tuple[str, ...]:
+        """Names of what is not modelled."""
+        return tuple(name for name in ("rotation", "friction", "restitution", "broadphase") if not getattr(self, name))
+
+
+EVERYTHING = Needs(rotation=True, friction=True, restitution=True, broadphase=True)
+
+
+def needs(model: Model) -> Needs:
+    """Derive what the model needs from its bodies and pair tables.
+
+    Rotation is the response of spins to impulses and torques: a frictionless contact acts through the centre of
+    a disc or sphere, so that without torque its spin stays what it was.
+    """
+    free = np.array([body.motion == "free" for body in model.bodies])
+    meets = free[:, None] | free[None, :]
+    np.fill_diagonal(meets, False)
+    friction = bool((model.friction[meets] > 0.0).any())
+    turned = any(
+        body.motion == "free" and (isinstance(body.shape, Box) or np.any(np.asarray(body.torque))) for body in model.bodies
+    )
+    return Needs(
+        rotation=friction or turned,
+        friction=friction,
+        restitution=bool((model.restitution[meets] > 0.0).any()),
+        broadphase=len(model.bodies) > ALL_PAIRS_LIMIT,
+    )

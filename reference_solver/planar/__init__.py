@@ -1,0 +1,5 @@
+"""Planar bodies: three degrees of freedom, contacts of one or two points."""
+
+from reference_solver.planar.world import World
+
+__all__ = ["World"]

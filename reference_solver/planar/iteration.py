@@ -1,0 +1,73 @@
+"""Sweeping until done: a fixed number of sweeps, or a residual stop with over-relaxation estimated on the way."""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import kernel
+from reference_solver.model import Array
+from reference_solver.planar.block import sweep_blocks
+from reference_solver.planar.residual import natural_map
+from reference_solver.planar.sequential_impulses import sweep_rows
+from reference_solver.planar.state import BLOCK, Bodies, Options, Rows
+from reference_solver.tally import RESIDUAL, SWEEPS, UNCONVERGED, WORST_SWEEPS
+
+#: Sweeps between two looks at the residual, once the first ones have not been enough.
+CHECK_INTERVAL = 4
+#: Sweeps over which a contraction rate is measured: long enough for the slowest mode to dominate.
+RATE_INTERVAL = 16
+#: Bound of the estimated factor; at 2 projected over-relaxation stops converging.
+LARGEST_RELAXATION = 1.99
+
+
+@kernel
+def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
+    """One sweep of the solver chosen."""
+    if options.solver == BLOCK:
+        sweep_blocks(bodies, rows, options, relaxation)
+    else:
+        sweep_rows(bodies, rows, options, relaxation)
+
+
+@kernel
+def better_relaxation(relaxation: float, rate: float) -> float:
+    """Factor that suits a contraction ``rate`` per sweep measured at ``relaxation`` (E13).
+
+    From Young's relation (rate + w - 1)^2 = rate w^2 mu^2 between the rate and mu, the spectral radius of the
+    Jacobi iteration, follows mu and with it the best factor. A residual that grew asks for caution instead.
+    """
+    if rate >= 1.0:
+        return 1.0 + 0.5 * (relaxation - 1.0)
+    if rate <= relaxation - 1.0:
+        return relaxation  # at or past the best factor the rate is w - 1 and tells no more
+    jacobi = (rate + relaxation - 1.0) / (relaxation * math.sqrt(rate))
+    best = 2.0 / (1.0 + math.sqrt(max(1.0 - jacobi * jacobi, 0.0)))
+    return min(max(best, relaxation), LARGEST_RELAXATION)
+
+
+@kernel
+def solve_velocities(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
+    """Sweep as `Options` asks and enter residual and sweeps in the tally."""
+    relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
+    sweeps, residual, before = 0, 0.0, 0.0
+    if options.residual < 0.0:
+        for _ in range(options.iterations):
+            sweep(bodies, rows, options, relaxation)
+        sweeps, residual = options.iterations, natural_map(bodies, rows, options)
+    else:
+        residual = before = natural_map(bodies, rows, options)
+        while residual > options.residual and sweeps < options.max_sweeps:
+            sweep(bodies, rows, options, relaxation)
+            sweeps += 1
+            if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
+                continue
+            residual = natural_map(bodies, rows, options)
+            if sweeps % RATE_INTERVAL == 0:
+                if options.relaxation <= 0.0 and before > 0.0 and residual > 0.0:
+                    relaxation = better_relaxation(relaxation, (residual / before) ** (1.0 / RATE_INTERVAL))
+                before = residual
+        if residual > options.residual:
+            tally[UNCONVERGED] += 1.0
+    tally[RESIDUAL] = max(tally[RESIDUAL], residual)
+    tally[SWEEPS] += sweeps
+    tally[WORST_SWEEPS] = max(tally[WORST_SWEEPS], sweeps)

@@ -1,0 +1,75 @@
+"""Detection: from poses to contact rows in canonical order, with the impulses remembered from the step before."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import kernel
+from reference_solver.planar.broadphase import find_candidates
+from reference_solver.planar.narrowphase import collide
+from reference_solver.planar.state import (
+    CANDIDATES,
+    CONTACTS,
+    FEATURES,
+    MANIFOLDS,
+    REMEMBERED,
+    Bodies,
+    Options,
+    Pairs,
+    Rows,
+)
+
+
+@kernel
+def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
+    """Fill the geometry of all rows; False if an array is too small (nothing but rows has changed then).
+
+    Candidates come in ascending order and a pair's points in ascending feature, so rows are sorted by
+    (body_a, body_b, feature): the same order in every run, whatever happened before.
+    """
+    if not find_candidates(bodies, pairs, rows, options):
+        return False
+    n = len(bodies.shape)
+    contacts, manifolds = 0, 0
+    for k in range(rows.count[CANDIDATES]):
+        if contacts + 2 > len(rows.gap):
+            return False
+        a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
+        found = collide(bodies, a, b, options.margin, rows, contacts)
+        if found > 0:
+            rows.manifold[manifolds] = contacts
+            manifolds += 1
+            contacts += found
+    rows.manifold[manifolds] = contacts
+    rows.count[CONTACTS], rows.count[MANIFOLDS] = contacts, manifolds
+    recall(bodies, rows, options)
+    return True
+
+
+@kernel
+def row_key(bodies: Bodies, rows: Rows, c: int) -> int:
+    """(a, b, feature) as one integer that sorts like the triple."""
+    return (rows.body_a[c] * len(bodies.shape) + rows.body_b[c]) * FEATURES + rows.feature[c]
+
+
+@kernel
+def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
+    """Give each row the impulse of the same feature one step before: a merge of two sorted key lists."""
+    old = 0
+    for c in range(rows.count[CONTACTS]):
+        rows.impulse[c, 0] = rows.impulse[c, 1] = 0.0
+        key = row_key(bodies, rows, c)
+        while old < rows.count[REMEMBERED] and rows.old_key[old] < key:
+            old += 1
+        if options.warm_starting and old < rows.count[REMEMBERED] and rows.old_key[old] == key:
+            rows.impulse[c, 0] = rows.old_impulse[old, 0]
+            rows.impulse[c, 1] = rows.old_impulse[old, 1]
+
+
+@kernel
+def remember(bodies: Bodies, rows: Rows) -> None:
+    """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
+    for c in range(rows.count[CONTACTS]):
+        kept = 0.0 if rows.bounce[c] else 1.0
+        rows.old_key[c] = row_key(bodies, rows, c)
+        rows.old_impulse[c, 0] = kept * rows.impulse[c, 0]
+        rows.old_impulse[c, 1] = kept * rows.impulse[c, 1]
+    rows.count[REMEMBERED] = rows.count[CONTACTS]

@@ -1,0 +1,99 @@
+"""The planar world: arrays of one model and the calls into compiled code (interface: ``simulation.py``)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_solver.model import Array, Model
+from reference_solver.needs import Needs
+from reference_solver.planar.state import (
+    CANDIDATES,
+    CONTACTS,
+    Buffer,
+    allocate_bodies,
+    allocate_pairs,
+    allocate_rows,
+    grown,
+    options,
+)
+from reference_solver.planar.step import copy_contacts, run_steps
+from reference_solver.records import Contacts, Frames
+from reference_solver.settings import Settings
+from reference_solver.tally import new_tally
+
+
+class World:
+    """One planar model being stepped; see the interface in ``simulation.py``."""
+
+    def __init__(self, model: Model, settings: Settings, needs: Needs) -> None:
+        n = len(model.bodies)
+        self._model = model
+        self._bodies = allocate_bodies(model, needs)
+        # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
+        self._pairs = allocate_pairs(model, 8 * n + 64)
+        self._rows = allocate_rows(8 * n + 64)
+        self._options = options(settings, needs)
+        self.tally = new_tally()
+
+    @property
+    def pose(self) -> Array:
+        """Current poses (n, 3)."""
+        return self._bodies.pose
+
+    @property
+    def twist(self) -> Array:
+        """Current twists (n, 3)."""
+        return self._bodies.twist
+
+    def run(self, steps: int, stride: int, contacts: bool) -> Frames:
+        """Make ``steps`` steps, sampling after every ``stride`` (0: never)."""
+        samples = steps // stride if stride else 0
+        # Two points per body are typical; at most a million rows (80 MB) before it is known that they are needed.
+        room = len(self._rows.gap) + min(2 * samples * len(self.pose), 1_000_000) if contacts else 0
+        buffer = self._buffer(samples, room)
+        done = 0
+        while True:
+            done = run_steps(
+                self._bodies, self._pairs, self._rows, self._options, self.tally, buffer, done, steps, stride
+            )
+            if done == steps:
+                break
+            if contacts and buffer.offset[done // stride] + len(self._rows.gap) > len(buffer.gap):
+                buffer = self._doubled(buffer)
+            else:
+                self._grow()
+        used = int(buffer.offset[-1])
+        return Frames(buffer.pose, buffer.twist, buffer.offset, _contacts(buffer, used))
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step."""
+        count = int(self._rows.count[CONTACTS])
+        buffer = self._buffer(0, count)
+        copy_contacts(self._bodies, self._rows, buffer, 0)
+        return _contacts(buffer, count)
+
+    def _buffer(self, samples: int, room: int) -> Buffer:
+        n = len(self._bodies.motion)
+        rows = Contacts.empty(room, 2)
+        columns = (rows.body_a, rows.body_b, rows.feature, rows.point, rows.normal, rows.impulse, rows.gap)
+        frames = np.zeros((samples, n, 3))
+        return Buffer(frames, frames.copy(), np.zeros(samples + 1, np.int64), *columns)
+
+    def _doubled(self, buffer: Buffer) -> Buffer:
+        """Twice the room for contacts, and what has been recorded so far."""
+        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.gap) + len(self._rows.gap)))
+        for old, new in zip(buffer, bigger, strict=True):
+            new[: len(old)] = old
+        return bigger
+
+    def _grow(self) -> None:
+        """Double whatever detection found too small; the step that stopped has not begun."""
+        if self._rows.count[CANDIDATES] >= len(self._pairs.candidate):
+            self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
+        else:
+            self._rows = grown(self._rows)
+
+
+def _contacts(buffer: Buffer, count: int) -> Contacts:
+    columns = (buffer.body_a, buffer.body_b, buffer.feature, buffer.point, buffer.normal, buffer.impulse, buffer.gap)
+    return Contacts(*(np.array(column[:count]) for column in columns))

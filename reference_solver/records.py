@@ -1,0 +1,85 @@
+"""What a simulation hands out: contacts of one step, and a recorded run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.model import Array
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """k contacts as arrays, sorted by (body_a, body_b, feature).
+
+    Parameters
+    ----------
+    body_a, body_b
+        (k,) body indices, body_a < body_b.
+    feature
+        (k,) which features of the two shapes touch; the same number in the next step is the same contact.
+    point
+        (k, d) contact point at detection, world axes [m].
+    normal
+        (k, d) unit normal from A to B.
+    impulse
+        (k, d) impulse of the step on B, world axes [N s].
+    gap
+        (k,) separation at detection [m], < 0 is overlap.
+    """
+
+    body_a: Indices
+    body_b: Indices
+    feature: Indices
+    point: Array
+    normal: Array
+    impulse: Array
+    gap: Array
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @classmethod
+    def empty(cls, capacity: int, dimension: int) -> Contacts:
+        """Return ``capacity`` contacts of zeros."""
+        a, b, feature = (np.zeros(capacity, np.int64) for _ in range(3))
+        point, normal, impulse = (np.zeros((capacity, dimension)) for _ in range(3))
+        return cls(a, b, feature, point, normal, impulse, np.zeros(capacity))
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Samples of one run, the start state excluded.
+
+    Parameters
+    ----------
+    pose, twist
+        (s, n, 3 | 7) and (s, n, 3 | 6).
+    offset
+        (s + 1,): the contacts of sample s are rows ``offset[s]:offset[s + 1]`` of `contacts`.
+    contacts
+        Contacts of the last step before each sample; none if they were not asked for.
+    """
+
+    pose: Array
+    twist: Array
+    offset: Indices
+    contacts: Contacts
+
+
+@dataclass(frozen=True)
+class Record:
+    """A recorded run, the start state included: ``t`` (s,) [s], then as in `Frames` with s samples.
+
+    The start state carries no contacts (``offset[1] == 0``).
+    """
+
+    t: Array
+    pose: Array
+    twist: Array
+    offset: Indices
+    contacts: Contacts
