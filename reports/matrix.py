@@ -62,14 +62,24 @@ def matrix_of(rows: Iterable[Mapping[str, Any]]) -> Matrix:
 
 
 def table_of(matrix: Matrix, versions: Mapping[str, str]) -> Table:
-    """Terminal table of a matrix; engines are columns, grouped by name."""
+    """Terminal table of a matrix: a line per engine, profile and dimension, a column per scene (fits 80 columns)."""
+    scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
+    dimensions = sorted({dimension for _, dimension in matrix.lines})
     table = Table(title="Verdicts: worst mark, rows that do not pass / rows judged", title_justify="left")
-    table.add_column("scene")
+    table.add_column("engine, profile", no_wrap=True)
+    for scene in scenes:
+        table.add_column(scene)
+    last = ""
     for engine, profile in matrix.columns:
-        table.add_column(f"{engine}\n{profile}\n{versions.get(engine, '')}", justify="left")
-    for line in matrix.lines:
-        cells = [_styled(matrix.fields.get((line, column))) for column in matrix.columns]
-        table.add_row(f"{line[0]} {line[1]}-D", *cells)
+        if last not in ("", engine):
+            table.add_section()
+        if engine != last:
+            table.add_row(Text(f"{engine} {versions.get(engine, '')}", style="bold"))
+        last = engine
+        for dimension in dimensions:
+            fields = [matrix.fields.get(((scene, dimension), (engine, profile))) for scene in scenes]
+            if any(fields):
+                table.add_row(f"  {profile} {dimension}-D", *(_styled(field) for field in fields))
     return table
 
 
