@@ -65,6 +65,10 @@ class Request:
         Names of the catalogue or paths.
     params
         Fixed parameters; any given replaces the suite's variation by this one.
+    ulps
+        Moves of the start, in units in the last place.
+    floors
+        Also run the representative cells moved by 1 and 2 units in the last place.
     """
 
     scenes: Sequence[str]
@@ -76,6 +80,7 @@ class Request:
     params: Mapping[str, float] | None = None
     suite: Suite = "quick"
     ulps: Sequence[int] = (0,)
+    floors: bool = False
 
 
 def slots(request: Request) -> list[Slot]:
@@ -115,8 +120,28 @@ def _engine_slots(
             for dt in _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
                 for iterations in _iterations(request, variation, engine, base):
-                    for ulp in request.ulps:
+                    for ulp in (*request.ulps, *_moves(request, argument, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)
+
+
+#: Parameters of the cell that stands for a scene: its noise floor is measured, its track is kept for replay.
+REPRESENTATIVE: dict[str, Mapping[str, float]] = {
+    "impact": {"e": 0.8, "v": 6.0},
+    "bounce": {"e": 0.8, "height": HEIGHTS[0]},
+    "stack": {"n": 10},
+    "incline": {"ratio": 1.1},
+}
+
+
+def is_representative(scene: str, params: Mapping[str, float]) -> bool:
+    """Whether a cell with these parameters (any subset of a suite's) stands for its scene."""
+    canonical = resolve(scene)
+    return canonical.complete(params) == canonical.complete(REPRESENTATIVE.get(scene, {}))
+
+
+def _moves(request: Request, scene: str, variation: Variation, dt: float, iterations: int | None) -> tuple[int, ...]:
+    wanted = request.floors and dt == QUICK_DT and iterations is None and is_representative(scene, variation.params)
+    return (1, 2) if wanted else ()
 
 
 def _variations(request: Request, scene: str) -> list[Variation]:

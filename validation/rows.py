@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import pandas as pd
@@ -55,6 +56,7 @@ class Row:
     initial_change: list[str] = field(default_factory=list)
     slot: dict[str, Any] = field(default_factory=dict)
     cells: list[str] = field(default_factory=list)
+    floor: float | None = None
 
     @property
     def alarming(self) -> bool:
@@ -67,10 +69,29 @@ class Row:
 
 
 def rows_of(run: str, observations: Iterable[Observation]) -> list[Row]:
-    """Judge all checks of all observations, and the studies that they feed."""
+    """Judge all checks of all observations, and the studies that they feed.
+
+    Cells whose start was moved by units in the last place are not judged: they give the row of the unmoved cell its
+    noise floor.
+    """
     observations = list(observations)
-    rows = [row for observation in observations for row in _cell_rows(run, observation)]
+    moved: dict[Slot, list[Observation]] = defaultdict(list)
+    for observation in observations:
+        if observation.slot.ulp:
+            moved[replace(observation.slot, ulp=0)].append(observation)
+    rows = []
+    for observation in observations:
+        if not observation.slot.ulp:
+            judged = _cell_rows(run, observation)
+            rows += [replace(row, floor=_floor(row, moved[observation.slot])) for row in judged]
     return rows + [_study_row(run, result) for study in STUDIES for result in study.results(observations)]
+
+
+def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
+    """Largest change of a row's value when its start moves by a few units in the last place."""
+    values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in moved]
+    changes = [abs(value - row.value) for value in values if value is not None and row.value is not None]
+    return max(changes, default=None)
 
 
 def _cell_rows(run: str, observation: Observation) -> list[Row]:

@@ -46,7 +46,8 @@ def request_from(options: dict[str, Any]) -> Request:
         iterations=list(options["iterations"]),
         params=dict(map(_parameter, options["param"])) or None,
         suite="full" if options["full"] else "quick",
-        ulps=tuple(options["ulp"]) or ((0, 1, 2) if options["full"] else (0,)),
+        ulps=tuple(options["ulp"]) or (0,),
+        floors=options["full"] and not options["ulp"],
     )
 
 

@@ -1,0 +1,98 @@
+"""Shows what changed between two runs: text, JSON, and Markdown fit for a pull-request comment."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from reports.exports import load_rows
+from reports.wording import number, reproduce
+from validation.comparison import Change, Kind
+from validation.store import StoreError
+
+
+def load_side(argument: str, out: Path) -> list[Mapping[str, Any]]:
+    """Rows of one side: a run id in ``out``, a results folder (``FOLDER`` or ``FOLDER:RUN``), or a .jsonl file.
+
+    Raises
+    ------
+    StoreError
+        If there is nothing of that name, or a file is not JSON Lines of rows.
+    """
+    path = Path(argument)
+    if path.suffix == ".jsonl":
+        return _load_lines(path)
+    folder, _, run = argument.partition(":")
+    if Path(folder).is_dir():
+        return [row.as_dict() for row in load_rows(folder, run or "latest")]
+    return [row.as_dict() for row in load_rows(out, argument)]
+
+
+def _load_lines(path: Path) -> list[Mapping[str, Any]]:
+    try:
+        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise StoreError(f"run: cannot read {path}: {error}") from None
+    if not all(isinstance(row, dict) and {"slot", "metric", "value"} <= set(row) for row in rows):
+        raise StoreError(f"run: {path} does not hold rows of this project")
+    return rows
+
+
+def headline(changes: Sequence[Change]) -> str:
+    """``2 verdicts flipped (1 regressed), 3 values changed``; or that nothing changed."""
+    counts = Counter(change.kind for change in changes)
+    worse = Counter(change.kind for change in changes if change.regressed)
+    parts = [f"{counts[kind]} {kind.value} ({worse[kind]} regressed)" for kind in Kind if counts[kind]]
+    return "; ".join(parts) or "nothing changed"
+
+
+def _where(change: Change) -> str:
+    return f"{change.engine}/{change.profile} {change.scene} {change.dimension}-D {change.params}".strip()
+
+
+def _size(change: Change) -> str:
+    if change.kind is Kind.SPEED:
+        return f"x{number(change.size, 3)}"
+    return f"{'+' if change.size > 0 else ''}{number(change.size, 3)} tol" if change.size else ""
+
+
+def as_text(changes: Sequence[Change]) -> str:
+    """One line per change, and the headline."""
+    lines = [headline(changes)]
+    for change in changes:
+        trend = "regressed" if change.regressed else "improved or neutral"
+        lines.append(
+            f"{change.kind.value} ({trend}): {_where(change)} {change.metric}: {change.before} -> {change.after} "
+            f"{_size(change)} [{change.note}] | {reproduce(change.slot)}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def as_markdown(changes: Sequence[Change], most: int = 50) -> str:
+    """Headline and a table of at most ``most`` changes."""
+    out = [f"**contact-crosscheck compare**: {headline(changes)}", ""]
+    if changes:
+        out += ["| change | | where | metric | before | after | size |", "|---|---|---|---|---|---|---|"]
+    for change in changes[:most]:
+        mark = "worse" if change.regressed else ""
+        cells = [
+            change.kind.value,
+            mark,
+            _where(change),
+            f"`{change.metric}`",
+            change.before,
+            change.after,
+            _size(change),
+        ]
+        out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    if len(changes) > most:
+        out.append(f"\n... and {len(changes) - most} more; `crosscheck compare --json` lists all")
+    return "\n".join(out) + "\n"
+
+
+def as_json(changes: Sequence[Change]) -> str:
+    """All changes."""
+    return json.dumps({"headline": headline(changes), "changes": [c.as_dict() for c in changes]}, indent=1)

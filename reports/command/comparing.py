@@ -1,0 +1,45 @@
+"""``compare``: what changed between two runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from reports import changes as rendering
+from reports.command.group import AS_JSON, OUT, main
+from validation.comparison import FAIL_ON, compare_rows, failing
+
+
+@main.command()
+@click.argument("before", metavar="A")
+@click.argument("after", metavar="B")
+@click.option("--only-regressed", is_flag=True, help="Show only what got worse.")
+@click.option("--only-changed", is_flag=True, help="Leave out rows that only one side has.")
+@click.option("--fail-on", type=click.Choice(list(FAIL_ON)), default="regressions", show_default=True)
+@click.option("--markdown", is_flag=True, help="Print Markdown, fit for a pull-request comment.")
+@AS_JSON
+@OUT
+def compare(
+    before: str,
+    after: str,
+    only_regressed: bool,
+    only_changed: bool,
+    fail_on: str,
+    markdown: bool,
+    as_json: bool,
+    out: Path,
+) -> None:
+    """Say what changed from run A to run B: verdict flips first, then errors, then speed.
+
+    A and B are run ids in OUT, results folders (FOLDER or FOLDER:RUN), or .jsonl files of rows.
+    """
+    changes = compare_rows(rendering.load_side(before, out), rendering.load_side(after, out))
+    if only_regressed:
+        changes = [change for change in changes if change.regressed]
+    if only_changed:
+        changes = [change for change in changes if not change.kind.value.startswith("only in")]
+    render = rendering.as_json if as_json else rendering.as_markdown if markdown else rendering.as_text
+    click.echo(render(changes), nl=False)
+    sys.exit(1 if failing(changes, fail_on) else 0)

@@ -1,0 +1,155 @@
+"""What changed between two runs.
+
+Deterministic values are equal to the last bit or they changed; a change counts only if it is larger than the noise
+floor of its cell, measured by moving the start by one and two units in the last place. Verdict flips come first, then
+errors, then speed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from typing import Any
+
+from validation.cells import slot_from_dict
+
+Plain = Mapping[str, Any]
+
+
+class Kind(Enum):
+    """What kind of change a row shows, most serious first."""
+
+    FLIP = "verdict flipped"
+    OUTCOME = "outcome changed"
+    ERROR = "value changed"
+    SPEED = "speed changed"
+    ADDED = "only in B"
+    REMOVED = "only in A"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One difference between two runs.
+
+    Parameters
+    ----------
+    regressed
+        True if B is worse: it fails where A passed, its error or time grew, or it has no answer any more.
+    size
+        Of a value: change of the error in units of the tolerance. Of a time: ratio B / A.
+    """
+
+    kind: Kind
+    regressed: bool
+    engine: str
+    profile: str
+    scene: str
+    dimension: int
+    params: str
+    metric: str
+    before: str
+    after: str
+    size: float
+    slot: Mapping[str, Any]
+    note: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready)."""
+        return {**asdict(self), "kind": self.kind.value, "size": self.size if math.isfinite(self.size) else None}
+
+
+def _identity(row: Plain) -> tuple[str, str]:
+    """Rows are the same question if slot and metric agree; the run, versions and hashes are the answer."""
+    return json.dumps(row["slot"], sort_keys=True), row["metric"]
+
+
+def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
+    """All changes of rows from ``before`` to ``after``, most serious first."""
+    a = {_identity(row): row for row in before}
+    b = {_identity(row): row for row in after}
+    changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
+    changes += [_make(Kind.REMOVED, True, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
+    changes += [
+        _make(Kind.ADDED, b[key]["physics"] == "fail", b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()
+    ]
+    return sorted(changes, key=_order)
+
+
+def _order(change: Change) -> tuple[Any, ...]:
+    kinds = list(Kind)
+    size = change.size if math.isfinite(change.size) else math.inf
+    return (kinds.index(change.kind), not change.regressed, -abs(size), change.engine, change.profile, change.scene,
+            change.dimension, change.params, change.metric)  # fmt: skip
+
+
+def _row_change(a: Plain, b: Plain) -> Change | None:
+    if a["outcome"] != b["outcome"]:
+        return _make(Kind.OUTCOME, b["outcome"] != "ok", b, _state(a), _state(b), 0.0, b["reason"])
+    if a["physics"] != b["physics"]:
+        return _make(Kind.FLIP, b["physics"] != "pass", b, _state(a), _state(b), _growth(a, b), _versions(a, b))
+    if a["value"] == b["value"]:
+        return None
+    if a["value"] is None or b["value"] is None:
+        return _make(Kind.ERROR, b["value"] is None, b, _state(a), _state(b), 0.0, b["reason"])
+    floor = max((row["floor"] for row in (a, b) if row.get("floor") is not None), default=0.0)
+    if abs(b["value"] - a["value"]) <= floor:
+        return None
+    growth = _growth(a, b)
+    note = f"floor {floor:.1g}" if floor else "no floor was measured: any changed bit counts"
+    return _make(Kind.ERROR, growth > 0.0, b, _state(a), _state(b), growth, f"{note}; {_versions(a, b)}")
+
+
+def _growth(a: Plain, b: Plain) -> float:
+    """Change of |error| in units of the tolerance; of the value where there is no truth."""
+    if a["error"] is None or b["error"] is None or not b["tolerance"]:
+        return 0.0
+    return (abs(b["error"]) - abs(a["error"])) / b["tolerance"]
+
+
+def _versions(a: Plain, b: Plain) -> str:
+    if a["engine_version"] != b["engine_version"]:
+        return f"{b['engine']} {a['engine_version']} -> {b['engine_version']}"
+    return f"same engine version {b['engine_version']}"
+
+
+def _state(row: Plain) -> str:
+    if row["outcome"] != "ok":
+        return str(row["outcome"])
+    value = "no value" if row["value"] is None else f"{row['value']:.10g} {row['unit']}"
+    return f"{value} ({row['physics'] or 'not judged'})"
+
+
+def _make(kind: Kind, regressed: bool, row: Plain, before: str, after: str, size: float, note: str = "") -> Change:
+    slot = slot_from_dict(row["slot"])
+    return Change(
+        kind,
+        regressed,
+        row["engine"],
+        row["profile"],
+        row["scene"],
+        row["dimension"],
+        slot.params_text(),
+        row["metric"],
+        before,
+        after,
+        size,
+        row["slot"],
+        note,
+    )
+
+
+#: What ``--fail-on`` may name, and the changes that it means.
+FAIL_ON = {
+    "never": lambda change: False,
+    "flips": lambda change: change.kind in (Kind.FLIP, Kind.OUTCOME) and change.regressed,
+    "regressions": lambda change: change.regressed,
+    "changes": lambda change: True,
+}
+
+
+def failing(changes: Sequence[Change], fail_on: str) -> bool:
+    """Whether ``changes`` hold one that ``fail_on`` (a key of `FAIL_ON`) names."""
+    return any(map(FAIL_ON[fail_on], changes))

@@ -1,0 +1,202 @@
+"""Deviation laws of Bullet: its contact law as a scalar recurrence, measured like the engine itself.
+
+`adapters.bullet_law` follows one ball over a fixed face from the scene and the step alone. The result is put into a
+trajectory and measured by the scene's own metrics, so that a prediction and a measurement differ by physics only.
+
+How far a prediction holds is computed with it: a gap that is known to round-off only is fed through the same
+recurrence. Speculative contacts turn an error of the gap d into one of d/dt in speed, which the next flight turns
+into one of 2 v d/(g dt) in the gap; after some impacts nothing is left of sixteen digits, and the law falls silent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, ContactLaw, Fall, fall
+from adapters.engine import Contacts
+from adapters.needs import needs
+from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import step_count
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.canonical import Measured
+from validation.deviation import Deviation
+from validation.scenes import CATALOGUE
+
+#: Gaps are differences of lengths of some ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
+GAP_ROUND_OFF = 1e-14
+#: Perturbations of the first gap, in units of its round-off; two of each sign, since jumps are one-sided.
+PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
+#: A spread among five runs may miss the true error by this factor.
+SPREAD_FACTOR = 10.0
+#: A metric that round-off blurs by more than this share of its scale is not predicted.
+BLURRED = 1e-6
+#: Round-off of up to a thousand additions, relative to the scale of a metric.
+SUM_ROUND_OFF = 1e-12
+#: Friction under a fast box scatters by this share of its value, as contacts switch between corners.
+FRICTION_SCATTER = 0.007
+
+
+def _law_of(profile: str, scene: Scene) -> ContactLaw:
+    if profile == "tuned":
+        return REST if needs(scene).regime == "rest" else IMPACT
+    return {"default": DEFAULT, "one": ONE}[profile]
+
+
+def _is_one_ball_over_a_floor(scene: Scene) -> bool:
+    """A half-space facing up and one free ball that can only move up and down."""
+    if len(scene.bodies) != 2:
+        return False
+    d = scene.dimension
+    face, body = scene.bodies
+    upright = isinstance(face.shape, HalfSpace) and face.shape.normal[: d - 1] == (0.0,) * (d - 1)
+    straight = not (any(body.twist[: d - 1]) or any(body.twist[d:]) or any(scene.gravity[: d - 1]))
+    loaded = any(body.force) or any(body.torque)
+    return upright and straight and not loaded and isinstance(body.shape, Disc | Sphere)
+
+
+def _as_trajectory(scene: Scene, dt: float, path: Fall) -> Trajectory:
+    """What the step loop would have recorded of this fall."""
+    d, steps = scene.dimension, len(path.gap)
+    face, body = scene.bodies
+    assert isinstance(face.shape, HalfSpace) and isinstance(body.shape, Disc | Sphere)
+    pose = np.tile([b.pose for b in scene.bodies], (steps, 1, 1))
+    twist = np.zeros((steps, 2, 3 if d == 2 else 6))
+    pose[:, 1, d - 1] = path.gap + body.shape.radius + face.shape.offset
+    twist[:, 1, d - 1] = path.velocity
+    up = np.tile(face.shape.normal, (steps, 1))
+    first, second = np.zeros(steps, np.int64), np.ones(steps, np.int64)
+    impulse = body.mass * path.impulse[:, None] * up
+    rows = Contacts(first, second, np.zeros_like(up), up, impulse, path.gap)
+    contacts = ContactRecord(np.arange(steps), np.arange(steps + 1), rows)
+    return Trajectory(np.arange(steps) * dt, pose, twist, contacts, dt, "completed")
+
+
+def _measured(scene: Scene, dt: float, law: ContactLaw, offset: float) -> dict[str, Measured]:
+    """All metrics of the scene for a start ``offset`` [m] higher."""
+    up, (face, body) = scene.dimension - 1, scene.bodies
+    assert isinstance(face.shape, HalfSpace) and isinstance(body.shape, Disc | Sphere)
+    gap = body.pose[up] - face.shape.offset - body.shape.radius + offset
+    e = scene.material(face.name, body.name).restitution
+    steps = step_count(scene.duration, dt)
+    path = fall(law, body.shape.radius, gap, body.twist[up], e, -scene.gravity[up], dt, steps)
+    return CATALOGUE[scene.name].measure(scene, _as_trajectory(scene, dt, path))
+
+
+def _scale(scene: Scene, metric: str) -> float:
+    """Size of a metric's values: speeds and impulses by the approach, heights by the drop, times in seconds."""
+    if metric.startswith("apex["):
+        return scene.params["height"]
+    speed = scene.params.get("v", 1.0)
+    return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
+
+
+# Keyed by the scene's hash as well: two scenes of equal bodies may carry different parameters.
+@lru_cache(maxsize=256)
+def _predictions(profile: str, key: str, cached: _Held, dt: float) -> dict[str, tuple[float, float]]:
+    """Value and band of every metric that can be predicted."""
+    scene = cached.scene
+    law = _law_of(profile, scene)
+    runs = [_measured(scene, dt, law, k * GAP_ROUND_OFF) for k in (0.0, *PERTURBATIONS)]
+    predictions = {}
+    for metric, (value, _) in runs[0].items():
+        others = [run[metric][0] for run in runs]
+        if value is None or any(other is None for other in others):
+            continue
+        spread = max(abs(other - value) for other in others if other is not None)
+        scale = _scale(scene, metric)
+        # A gap's round-off becomes a speed once: over dt, relative to 1 m/s, whatever the recurrence does later.
+        band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale + GAP_ROUND_OFF / dt
+        if spread <= BLURRED * scale:
+            predictions[metric] = (value, band)
+    return predictions
+
+
+class _Held:
+    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def __hash__(self) -> int:
+        return hash(self.scene.hash())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held) and self.scene == other.scene
+
+
+def _ball_law(profile: str, metric: str) -> Callable[[Scene, float], tuple[float, float] | None]:
+    def law(scene: Scene, dt: float) -> tuple[float, float] | None:
+        if not _is_one_ball_over_a_floor(scene):
+            return None
+        return _predictions(profile, scene.hash(), _Held(scene), dt).get(metric)
+
+    return law
+
+
+def sliding_with_drag(scene: Scene, dt: float) -> tuple[float, float] | None:
+    """Mean acceleration over the second half of a slide that the drag of the multibody path brakes."""
+    mu = scene.material("floor", "box").friction
+    pull, weight = scene.gravity[0], -scene.gravity[-1]
+    if pull <= mu * weight:
+        return None
+    steps = step_count(scene.duration, dt)
+    speed = np.zeros(steps + 1)
+    for k in range(steps):
+        speed[k + 1] = speed[k] + (pull - mu * weight) * dt - DEFAULT.drag(speed[k], dt)
+    middle = (steps + 1) // 2
+    mean = (speed[-1] - speed[middle]) / ((steps - middle) * dt)
+    return float(mean), FRICTION_SCATTER * mu * weight
+
+
+_BALL_METRICS = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
+}
+_BECAUSE = {
+    "default": "speculative contact takes gap/dt off a rebound, Baumgarte adds 8 % of an overlap over dt, restitution "
+    "includes gravity's own g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v brakes the flight",
+    "tuned": "a contact met within the slop loses slop/dt of its rebound; an overlap is left with the velocity of the "
+    "step in which it is found, and at rest settings 8 % of it per step become speed",
+    "one": "Baumgarte adds 1 % of the overlap that an impact is found with, over dt, to the rebound",
+}
+_SOURCE = {
+    "default": "btMultiBodyConstraintSolver.cpp:770-815, btMultiBody.cpp:843, btMultiBody.h:486 (bullet3 6c888f4)",
+    "tuned": "btSequentialImpulseConstraintSolver.cpp:902-970 (bullet3 6c888f4)",
+    "one": "btSequentialImpulseConstraintSolver.cpp:902-970 (bullet3 6c888f4)",
+}
+
+
+def _pattern(metric: str) -> str:
+    return metric.replace("[", "[[]")
+
+
+DEVIATIONS: tuple[Deviation, ...] = (
+    *(
+        Deviation(
+            "bullet",
+            (profile,),
+            scene,
+            _pattern(metric),
+            _ball_law(profile, metric),
+            _BECAUSE[profile],
+            _SOURCE[profile],
+            ("3.2.7",),
+        )
+        for profile in ("default", "tuned", "one")
+        for scene, metrics in _BALL_METRICS.items()
+        for metric in metrics
+    ),
+    Deviation(
+        "bullet",
+        ("default",),
+        "incline",
+        "acceleration",
+        sliding_with_drag,
+        "drag 0.04 (1 + v) v of the multibody path brakes the slide; friction under a fast box scatters by 0.7 %",
+        "btMultiBody.cpp:843 (bullet3 6c888f4); scatter measured in slides of 3 m/s",
+        ("3.2.7",),
+    ),
+)
