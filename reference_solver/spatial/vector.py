@@ -8,80 +8,88 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import kernel
+from reference_solver.model import Array
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 @kernel
-def add(a, b):
+def add(a: Vector, b: Vector) -> Vector:
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @kernel
-def sub(a, b):
+def sub(a: Vector, b: Vector) -> Vector:
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @kernel
-def scale(s, a):
+def scale(s: float, a: Vector) -> Vector:
     """s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @kernel
-def add_scaled(a, s, b):
+def add_scaled(a: Vector, s: float, b: Vector) -> Vector:
     """a + s b."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
 
 
 @kernel
-def dot(a, b):
+def dot(a: Vector, b: Vector) -> float:
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
-def cross(a, b):
+def cross(a: Vector, b: Vector) -> Vector:
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @kernel
-def length(a):
+def times(array: Array, i: int, a: Vector) -> Vector:
+    """Product of matrix i of an (n, 3, 3) array with the vector a."""
+    return (
+        array[i, 0, 0] * a[0] + array[i, 0, 1] * a[1] + array[i, 0, 2] * a[2],
+        array[i, 1, 0] * a[0] + array[i, 1, 1] * a[1] + array[i, 1, 2] * a[2],
+        array[i, 2, 0] * a[0] + array[i, 2, 1] * a[1] + array[i, 2, 2] * a[2],
+    )
+
+
+@kernel
+def times_transposed(array: Array, i: int, a: Vector) -> Vector:
+    """Product of the transpose of matrix i of an (n, 3, 3) array with the vector a."""
+    return (
+        array[i, 0, 0] * a[0] + array[i, 1, 0] * a[1] + array[i, 2, 0] * a[2],
+        array[i, 0, 1] * a[0] + array[i, 1, 1] * a[1] + array[i, 2, 1] * a[2],
+        array[i, 0, 2] * a[0] + array[i, 1, 2] * a[1] + array[i, 2, 2] * a[2],
+    )
+
+
+@kernel
+def length(a: Vector) -> float:
     """|a|."""
     return math.sqrt(dot(a, a))
 
 
 @kernel
-def row(array, i, start):
+def row(array: Array, i: int, start: int) -> Vector:
     """Three numbers of row i of a matrix, from column `start`."""
     return (array[i, start], array[i, start + 1], array[i, start + 2])
 
 
 @kernel
-def axis(axes, i, k):
+def axis(axes: Array, i: int, k: int) -> Vector:
     """Body axis k of body i in the world, from `axes` (n, 3, 3) whose columns are the body axes."""
     return (axes[i, 0, k], axes[i, 1, k], axes[i, 2, k])
 
 
 @kernel
-def turn(axes, i, a):
-    """Body vector `a` of body i in world components."""
-    return (
-        axes[i, 0, 0] * a[0] + axes[i, 0, 1] * a[1] + axes[i, 0, 2] * a[2],
-        axes[i, 1, 0] * a[0] + axes[i, 1, 1] * a[1] + axes[i, 1, 2] * a[2],
-        axes[i, 2, 0] * a[0] + axes[i, 2, 1] * a[1] + axes[i, 2, 2] * a[2],
-    )
-
-
-@kernel
-def turn_back(axes, i, a):
-    """World vector `a` in the body components of body i."""
-    return (dot(axis(axes, i, 0), a), dot(axis(axes, i, 1), a), dot(axis(axes, i, 2), a))
-
-
-@kernel
-def tangents(n):
+def tangents(n: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors that make a right-handed frame (t1, t2, n) with the unit vector n.
 
     The world axis least aligned with n is taken out of n, so that the divisor is at least sqrt(2/3).
@@ -99,7 +107,7 @@ def tangents(n):
 
 
 @kernel
-def axes_of_quaternion(q, axes, i):
+def axes_of_quaternion(q: Quaternion, axes: Array, i: int) -> None:
     """Write the rotation matrix (body to world) of the unit quaternion q = (w, x, y, z) into axes[i]."""
     w, x, y, z = q
     axes[i, 0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -114,7 +122,7 @@ def axes_of_quaternion(q, axes, i):
 
 
 @kernel
-def quaternion_product(p, q):
+def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
     """Hamilton product p q of quaternions (w, x, y, z)."""
     return (
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
@@ -125,17 +133,17 @@ def quaternion_product(p, q):
 
 
 @kernel
-def normalised(q):
+def normalised(q: Quaternion) -> Quaternion:
     """Quaternion q scaled to unit length."""
     s = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (s * q[0], s * q[1], s * q[2], s * q[3])
 
 
 @kernel
-def rotation_quaternion(v):
+def rotation_quaternion(v: Vector) -> Quaternion:
     """Unit quaternion of the turn by |v| radians about v (exponential map)."""
     angle = length(v)
-    if angle < 1e-4:  # sin(a/2)/a by its series: the next term is below 1e-20 here, and 0/0 is avoided
+    if angle < 1e-4:  # sin(a/2)/a by its series: the next term is below 3e-20 here, and 0/0 is avoided
         s = 0.5 - angle * angle / 48.0
     else:
         s = math.sin(0.5 * angle) / angle

@@ -1,0 +1,5 @@
+"""Spatial bodies: six degrees of freedom, contacts of one to four points."""
+
+from reference_solver.spatial.world import World
+
+__all__ = ["World"]

@@ -1,0 +1,61 @@
+"""Relative twist of two bodies at the centre of their manifold, and what a wrench there does to them.
+
+A manifold of any number of points sees its bodies through six numbers in its frame: relative velocity V and
+relative angular velocity W at the centre. A point at offset d has u = V + W x d. An impulse p at the point is the
+wrench (p, d x p) at the centre.
+"""
+
+from __future__ import annotations
+
+from reference_solver.compilation import kernel
+from reference_solver.model import Array
+from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.spatial.vector import Vector, add, add_scaled, cross, row, sub, times, times_transposed
+
+
+@kernel
+def relative_twist(twist: Array, manifolds: Manifolds, m: int, rotation: int) -> tuple[Vector, Vector]:
+    """(V, W) of manifold m, B relative to A, frame; ``twist`` may hold velocities or pseudo-velocities."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    v = sub(row(twist, b, 0), row(twist, a, 0))
+    if not rotation:  # frictionless spheres: a spin moves the contact point along the tangents only
+        return times(manifolds.frame, m, v), (0.0, 0.0, 0.0)
+    wa, wb = row(twist, a, 3), row(twist, b, 3)
+    v = sub(add(v, cross(wb, row(manifolds.lever_b, m, 0))), cross(wa, row(manifolds.lever_a, m, 0)))
+    return times(manifolds.frame, m, v), times(manifolds.frame, m, sub(wb, wa))
+
+
+@kernel
+def velocity_at(v: Vector, w: Vector, manifolds: Manifolds, m: int, p: int) -> Vector:
+    """u = V + W x d at point p, frame [m/s]."""
+    return add(v, cross(w, row(manifolds.offset[m], p, 0)))
+
+
+@kernel
+def apply_wrench(
+    bodies: Bodies, twist: Array, manifolds: Manifolds, m: int, rotation: int, force: Vector, moment: Vector
+) -> None:
+    """Add the impulse and moment (frame, about the manifold's centre) to B, and their opposites to A."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    impulse = times_transposed(manifolds.frame, m, force)
+    for d in range(3):
+        twist[a, d] -= bodies.inverse_mass[a] * impulse[d]
+        twist[b, d] += bodies.inverse_mass[b] * impulse[d]
+    if not rotation:
+        return
+    turning = times_transposed(manifolds.frame, m, moment)
+    spin_a = times(bodies.inverse_inertia, a, add(cross(row(manifolds.lever_a, m, 0), impulse), turning))
+    spin_b = times(bodies.inverse_inertia, b, add(cross(row(manifolds.lever_b, m, 0), impulse), turning))
+    for d in range(3):
+        twist[a, 3 + d] -= spin_a[d]
+        twist[b, 3 + d] += spin_b[d]
+
+
+@kernel
+def respond(v: Vector, w: Vector, manifolds: Manifolds, m: int, p: int, change: Vector) -> tuple[Vector, Vector]:
+    """(V, W) after an impulse `change` (frame) at point p: a product with `Manifolds.response`."""
+    r = manifolds.response[m, p]
+    for k in range(3):
+        v = add_scaled(v, change[k], (r[0, k], r[1, k], r[2, k]))
+        w = add_scaled(w, change[k], (r[3, k], r[4, k], r[5, k]))
+    return v, w

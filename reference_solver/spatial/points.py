@@ -1,0 +1,33 @@
+"""Where a contact point lies between two bodies, and how it is written down."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import kernel
+from reference_solver.spatial.state import FREE, Bodies, Manifolds
+from reference_solver.spatial.vector import Vector
+
+
+@kernel
+def share_of_gap(bodies: Bodies, f: int, s: int) -> float:
+    """Where the contact point lies across the gap: 0 on the first body's surface, 1 on the second's."""
+    if bodies.motion[s] != FREE:
+        return 0.0
+    if bodies.motion[f] != FREE:
+        return 1.0
+    return 0.5
+
+
+@kernel
+def write_point(
+    manifolds: Manifolds, m: int, p: int, f: int, s: int, feature: int, arm_f: Vector, arm_s: Vector, gap: float
+) -> None:
+    """Store point p of manifold m, given by the arms of the first and the second body."""
+    manifolds.feature[m, p] = feature
+    manifolds.gap[m, p] = gap
+    for d in range(3):
+        if f < s:
+            manifolds.arm_a[m, p, d] = arm_f[d]
+            manifolds.arm_b[m, p, d] = arm_s[d]
+        else:
+            manifolds.arm_a[m, p, d] = arm_s[d]
+            manifolds.arm_b[m, p, d] = arm_f[d]

@@ -1,0 +1,113 @@
+"""From geometry to rows: collision matrices, targets, and the scale of the residual."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import kernel
+from reference_solver.model import Array
+from reference_solver.planar.rows import SPEED_SHARE
+from reference_solver.planar.state import BAUMGARTE, Options
+from reference_solver.spatial.kinematics import apply_wrench, relative_twist, velocity_at
+from reference_solver.spatial.state import MANIFOLDS, Bodies, Manifolds, Pairs
+from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
+
+
+@kernel
+def prepare(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, options: Options) -> None:
+    """Fill all manifolds from the poses and velocities at the start of the step, before forces act."""
+    for m in range(manifolds.count[MANIFOLDS]):
+        a, b = manifolds.body_a[m], manifolds.body_b[m]
+        manifolds.friction[m] = pairs.friction[a, b] if options.friction else 0.0
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            set_response(bodies, manifolds, m, p, options)
+            u = velocity_at(v, w, manifolds, m, p)
+            manifolds.approach[m, p] = u[2]
+            push = options.dt * loads_at(bodies, manifolds, m, p)
+            set_target(manifolds, m, p, pairs.restitution[a, b], push, options)
+            moving = speed_at(bodies, a, row(manifolds.arm_a[m], p, 0))
+            moving += speed_at(bodies, b, row(manifolds.arm_b[m], p, 0))
+            manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
+            if u[2] > push:  # parts faster than any load can press it together
+                manifolds.impulse[m, p] = 0.0
+
+
+@kernel
+def set_response(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> None:
+    """Relative twist at the centre per unit impulse at point p, and the point's own collision matrix.
+
+    K = (1/m_A + 1/m_B) 1 - [r_A] I_A^-1 [r_A] - [r_B] I_B^-1 [r_B], here as the columns of J response.
+    """
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    r = manifolds.response[m, p]
+    inverse_mass = bodies.inverse_mass[a] + bodies.inverse_mass[b]
+    for k in range(3):
+        v = scale(inverse_mass, row(manifolds.frame[m], k, 0))
+        w = (0.0, 0.0, 0.0)
+        if options.rotation:
+            n = row(manifolds.frame[m], k, 0)
+            spin_a = times(bodies.inverse_inertia, a, cross(row(manifolds.arm_a[m], p, 0), n))
+            spin_b = times(bodies.inverse_inertia, b, cross(row(manifolds.arm_b[m], p, 0), n))
+            v = add(v, cross(spin_a, row(manifolds.lever_a, m, 0)))
+            v = add(v, cross(spin_b, row(manifolds.lever_b, m, 0)))
+            w = add(spin_a, spin_b)
+        for d in range(3):
+            r[d, k] = dot(row(manifolds.frame[m], d, 0), v)
+            r[3 + d, k] = dot(row(manifolds.frame[m], d, 0), w)
+    set_matrix(manifolds.matrix[m, p], r, row(manifolds.offset[m], p, 0))
+
+
+@kernel
+def set_matrix(matrix: Array, r: Array, offset: Vector) -> None:
+    """K of one point from its response: u = V + W x d per unit impulse. Only the upper triangle is kept."""
+    u1 = add((r[0, 0], r[1, 0], r[2, 0]), cross((r[3, 0], r[4, 0], r[5, 0]), offset))
+    u2 = add((r[0, 1], r[1, 1], r[2, 1]), cross((r[3, 1], r[4, 1], r[5, 1]), offset))
+    u3 = add((r[0, 2], r[1, 2], r[2, 2]), cross((r[3, 2], r[4, 2], r[5, 2]), offset))
+    matrix[0], matrix[1], matrix[2] = u1[0], u2[0], u3[0]
+    matrix[3], matrix[4], matrix[5] = u2[1], u3[1], u3[2]
+
+
+@kernel
+def set_target(manifolds: Manifolds, m: int, p: int, restitution: float, push: float, options: Options) -> None:
+    """Normal velocity b_n to reach (E7, E8, E15). ``push`` [m/s] is what the loads can do in one step."""
+    u, gap = manifolds.approach[m, p], manifolds.gap[m, p]
+    # A gap may be closed within the step, not more; an overlap asks for nothing.
+    target = -max(gap, 0.0) / options.dt
+    if options.correction == BAUMGARTE:
+        target = max(target, options.beta * (-gap - options.slop) / options.dt)
+    if options.restitution and u < 0.0:
+        target = max(-restitution * u, target) if restitution > 0.0 else target
+    manifolds.target[m, p] = target
+    # An impact is what loads cannot bring about in one step: a contact at rest keeps its warm start.
+    manifolds.bounce[m, p] = 1 if restitution > 0.0 and u < -push else 0
+
+
+@kernel
+def loads_at(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
+    """Acceleration that the loads of both bodies give their points, magnitudes added [m/s^2]."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    turn_a = cross(times(bodies.inverse_inertia, a, row(bodies.torque, a, 0)), row(manifolds.arm_a[m], p, 0))
+    turn_b = cross(times(bodies.inverse_inertia, b, row(bodies.torque, b, 0)), row(manifolds.arm_b[m], p, 0))
+    return length(add(row(bodies.acceleration, a, 0), turn_a)) + length(add(row(bodies.acceleration, b, 0), turn_b))
+
+
+@kernel
+def speed_at(bodies: Bodies, i: int, arm: Vector) -> float:
+    """Speed of a point of body i [m/s]."""
+    return length(add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), arm)))
+
+
+@kernel
+def warm_start(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
+    """Apply the remembered impulses, the friction part inside the disc (E9)."""
+    for m in range(manifolds.count[MANIFOLDS]):
+        force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for p in range(manifolds.points[m]):
+            bound = manifolds.friction[m] * manifolds.impulse[m, p, 2]
+            size = (manifolds.impulse[m, p, 0] ** 2 + manifolds.impulse[m, p, 1] ** 2) ** 0.5
+            if size > bound:
+                manifolds.impulse[m, p, 0] *= bound / size
+                manifolds.impulse[m, p, 1] *= bound / size
+            impulse = row(manifolds.impulse[m], p, 0)
+            force = add(force, impulse)
+            moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))
+        apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
