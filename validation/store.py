@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from validation.bench.timing import Timing, timing_from_dict
 from validation.cells import Observation, Slot, observation_from_dict
 from validation.identity import code_hash, commit, machine
 
@@ -22,6 +23,11 @@ CREATE TABLE IF NOT EXISTS runs (
 CREATE TABLE IF NOT EXISTS observations (
     run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, cell TEXT NOT NULL, engine TEXT NOT NULL,
     scene TEXT NOT NULL, outcome TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, slot));
+CREATE TABLE IF NOT EXISTS timings (
+    run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, sampled INTEGER NOT NULL, round INTEGER NOT NULL,
+    purpose TEXT NOT NULL, engine TEXT NOT NULL, scene TEXT NOT NULL, seconds REAL NOT NULL, body TEXT NOT NULL,
+    PRIMARY KEY (run, slot, purpose, sampled, round));
+CREATE TABLE IF NOT EXISTS protocols (run TEXT PRIMARY KEY REFERENCES runs(id), body TEXT NOT NULL);
 """
 
 
@@ -156,3 +162,28 @@ class Store:
         order = {key: position for position, key in enumerate(run.plan)}
         rows.sort(key=lambda row: order.get(row[0], len(order)))
         return [observation_from_dict(json.loads(body)) for _, body in rows]
+
+    def add_timings(self, run: Run, timings: Sequence[Timing]) -> None:
+        """Keep raw timings, in one transaction."""
+        rows = []
+        for timing in timings:
+            slot, body = timing.slot, json.dumps(timing.as_dict())
+            unit = (run.id, slot.key(), timing.sampled, timing.round, timing.purpose)
+            rows.append((*unit, slot.engine, slot.scene, timing.seconds, body))
+        self._db.execute("BEGIN")
+        self._db.executemany("INSERT OR REPLACE INTO timings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self._db.execute("COMMIT")
+
+    def timings(self, run: Run) -> list[Timing]:
+        """Raw timings of a run, in the order in which they were taken."""
+        rows = self._db.execute("SELECT body FROM timings WHERE run = ? ORDER BY rowid", (run.id,)).fetchall()
+        return [timing_from_dict(json.loads(body)) for (body,) in rows]
+
+    def set_protocol(self, run: Run, protocol: dict[str, Any]) -> None:
+        """Keep how a bench run was made: seed, limits, clock, what was left out and why."""
+        self._db.execute("INSERT OR REPLACE INTO protocols VALUES (?, ?)", (run.id, json.dumps(protocol)))
+
+    def protocol(self, run: Run) -> dict[str, Any] | None:
+        """Protocol of a bench run; None for a run that timed nothing."""
+        row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
+        return None if row is None else dict(json.loads(row[0]))

@@ -1,0 +1,23 @@
+"""Speed against error: what an answer of a given error costs on each engine.
+
+    sweep.py       which cells: every scene x engine x profile over steps and iterations
+    primary.py     the ONE declared error of each scene, and the state in which it is timed
+       |  accuracy first, in worker processes: observations of a run in the store
+       v
+    units.py       what is timed: the work points, an empty scene and a free body, piles of 1 to 1000 boxes
+    lane.py        the timing lane: one process, one thread, engines interleaved, rounds until it is certain
+       |  raw timings of the same run in the store
+       v
+    statistics.py  median, bootstrap interval, drift, lower envelope, exponent
+    reading.py     tables of a bench run: work points, time at equal error, scaling, overhead, ratios
+
+Protocol
+    * Accuracy is measured before anything is timed, and a cell whose physics is invalid is never timed.
+    * Timed is one call ``simulation.advance(n)`` of a simulation that was built, and brought into the state that
+      matters, outside the clock. Truths and closed forms are never timed.
+    * Each round times every open unit once, engines in a new random order (seed kept); a unit closes when the
+      bootstrap interval of its median is narrower than 5 %, or after 40 rounds.
+    * The clock is the CPU time of the process (what else runs on the machine is not charged); wall time stands
+      beside it.
+    * Every raw timing carries the error it bought and a hash of the state it ended in.
+"""

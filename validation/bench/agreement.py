@@ -1,0 +1,72 @@
+"""Ratios of times within a run, and whether two runs agree on them.
+
+A ratio taken within one round of the lane survives a machine that is busy or slows down: both sides felt it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+
+from validation.bench.reading import POINT, identity
+from validation.bench.statistics import spread
+from validation.bench.timing import Timing
+from validation.cells import Slot
+from validation.store import Run, Store
+
+
+def ratios(store: Store, run: Run) -> pd.DataFrame:
+    """Ratio of each unit's time to its opponent's in the same round: what survives a busy machine.
+
+    One row per unit, unsampled: `POINT`, ``purpose``, ``params``, ``opponent``, ``ratio`` (median over rounds),
+    ``ratio_low``, ``ratio_high`` (bootstrap interval), ``rounds``.
+    """
+    by_unit: dict[tuple[Any, ...], dict[int, Timing]] = defaultdict(dict)
+    for timing in store.timings(run):
+        if not timing.void and not timing.sampled:
+            by_unit[timing.purpose, timing.slot][timing.round] = timing
+    rows = []
+    for (purpose, slot), own in by_unit.items():
+        partner = by_unit.get((purpose, opponent_slot(next(iter(own.values())))))
+        rounds = sorted(set(own) & set(partner or {}))
+        if partner is None or len(rounds) < 2 or partner is own:
+            continue
+        logs = [math.log(_rate(own[k]) / _rate(partner[k])) for k in rounds]
+        found = spread(logs)
+        row = {"purpose": purpose, **identity(slot), "opponent": own[rounds[0]].opponent, "rounds": len(rounds)}
+        row |= {"ratio": math.exp(found.median), "ratio_low": math.exp(found.low), "ratio_high": math.exp(found.high)}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def opponent_slot(timing: Timing) -> Slot:
+    """Slot of the unit that a timing's ratio is taken against: same scene and step, the opponent's own iterations."""
+    engine, _, profile = timing.opponent.partition("/")
+    same = timing.slot.iterations if timing.purpose == "iterations" else None
+    return replace(timing.slot, engine=engine, profile=profile, iterations=same)
+
+
+def _rate(timing: Timing) -> float:
+    return timing.seconds / timing.steps
+
+
+def agreement(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
+    """Ratios of two bench runs side by side: ``agrees`` where their intervals overlap.
+
+    Rows: units that both have; columns ``ratio``, ``ratio_low``, ``ratio_high`` with the endings ``_1`` and ``_2``.
+    """
+    keys = ["purpose", *POINT, "params_text"]
+
+    def keyed(table: pd.DataFrame) -> pd.DataFrame:
+        out = table.copy()
+        out["params_text"] = [repr(sorted(params.items())) for params in out["params"]]
+        out["iterations"] = out["iterations"].astype(float).fillna(0.0)
+        return out[[*keys, "opponent", "ratio", "ratio_low", "ratio_high"]]
+
+    both = keyed(first).merge(keyed(second), on=[*keys, "opponent"], suffixes=("_1", "_2"))
+    both["agrees"] = (both["ratio_low_1"] <= both["ratio_high_2"]) & (both["ratio_low_2"] <= both["ratio_high_1"])
+    return both

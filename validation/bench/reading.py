@@ -1,0 +1,152 @@
+"""Tables of the timings of a bench run: what each unit cost, overhead of bindings, cost against size.
+
+``cost`` is CPU time per simulated second [s/s] everywhere (1 is real time), so that steps and scenes compare.
+Tables are pandas DataFrames, one row per thing named in each docstring; a number that does not exist is NaN and its
+reason stands in the same row. Work points and comparisons at equal error stand in `validation.bench.work`, ratios of
+two runs in `validation.bench.agreement`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from validation.bench.statistics import DRIFT, drift, power_law, spread
+from validation.bench.timing import Timing
+from validation.cells import Slot
+from validation.store import Run, Store
+
+#: What a series is: an engine with a profile on a scene.
+SERIES = ["scene", "dimension", "engine", "profile"]
+POINT = [*SERIES, "dt", "iterations"]
+
+
+def bench_runs(store: Store) -> list[Run]:
+    """Runs that timed something, oldest first."""
+    return [run for run in store.runs() if store.protocol(run) is not None]
+
+
+def timings_summary(store: Store, run: Run) -> pd.DataFrame:
+    """One row per timed unit and way of sampling.
+
+    Columns: ``purpose``, `POINT`, ``params`` (dict), ``slot`` (dict), ``engine_version``, ``bodies``, ``sampled``,
+    ``steps``, ``rounds``; ``minimum``, ``median``, ``low``, ``high`` [s of CPU per call]; ``width`` (of the interval,
+    relative), ``drift`` (second half of the rounds against the first, relative), ``drifts`` (beyond 5 % and outside
+    the interval), ``load`` (median of wall time over CPU time: above 1 the machine was busy); ``cost``,
+    ``cost_minimum``, ``cost_low``, ``cost_high`` [s/s], ``per_step`` [s]; ``error``, ``state_hash``, ``states``
+    (different end states seen: 1 for a deterministic engine), ``void``.
+    """
+    groups: dict[tuple[Any, ...], list[Timing]] = defaultdict(list)
+    for timing in store.timings(run):
+        groups[timing.purpose, timing.slot, timing.sampled].append(timing)
+    rows = [_summary(members) for members in groups.values()]
+    return pd.DataFrame(rows, columns=None if rows else [*POINT, "purpose", "sampled"])
+
+
+def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
+    first = timings[0]
+    seconds = [timing.seconds for timing in timings]
+    found, moved = spread(seconds), drift(seconds)
+    simulated = first.steps * first.slot.dt
+    outside = abs(moved) > max(DRIFT, found.width)
+    return {
+        "purpose": first.purpose,
+        **identity(first.slot),
+        "engine_version": first.engine_version,
+        "bodies": first.bodies,
+        "sampled": first.sampled,
+        "steps": first.steps,
+        "rounds": found.n,
+        **{name: getattr(found, name) for name in ("minimum", "median", "low", "high", "width")},
+        "drift": moved,
+        "drifts": outside,
+        "load": float(np.median([timing.wall_seconds / timing.seconds for timing in timings])),
+        "cost": found.median / simulated,
+        "cost_minimum": found.minimum / simulated,
+        "cost_low": found.low / simulated,
+        "cost_high": found.high / simulated,
+        "per_step": found.median / first.steps,
+        "error": math.nan if first.error is None else first.error,
+        "state_hash": first.state_hash,
+        "states": len({timing.state_hash for timing in timings}),
+        "void": next((timing.void for timing in timings if timing.void), ""),
+    }
+
+
+def identity(slot: Slot) -> dict[str, Any]:
+    """Columns that say which slot a row is about."""
+    return {
+        "scene": slot.scene,
+        "dimension": slot.dimension,
+        "engine": slot.engine,
+        "profile": slot.profile,
+        "dt": slot.dt,
+        "iterations": slot.iterations,
+        "params": dict(slot.params),
+        "slot": slot.as_dict(),
+    }
+
+
+def overhead(store: Store, run: Run) -> pd.DataFrame:
+    """What a binding costs before there is any physics: an empty scene, and one free body, per step.
+
+    One row per dimension, engine, profile, scene (``empty``, ``flight``) and way of sampling; columns as
+    `timings_summary`, of which ``per_step``, ``per_step_low``, ``per_step_high`` [s] matter here.
+    """
+    table = timings_summary(store, run)
+    table = table[table["purpose"] == "overhead"].copy()
+    if len(table):
+        table["per_step_low"] = table["low"] / table["steps"]
+        table["per_step_high"] = table["high"] / table["steps"]
+    return table.reset_index(drop=True)
+
+
+def scaling(store: Store, run: Run) -> pd.DataFrame:
+    """Cost of a step against the number of bodies (purpose ``bodies``) and of iterations (``iterations``).
+
+    Rows and columns of `timings_summary`, with ``x`` (bodies or iterations), ``per_step``, ``per_step_low``,
+    ``per_step_high`` [s]; ``error`` is the largest displacement of a body, in sides, at the end of the timed call.
+    """
+    table = timings_summary(store, run)
+    table = table[table["purpose"].isin(["bodies", "iterations"])].copy()
+    if len(table):
+        table["x"] = np.where(table["purpose"] == "bodies", table["bodies"], table["iterations"]).astype(float)
+        table["per_step_low"] = table["low"] / table["steps"]
+        table["per_step_high"] = table["high"] / table["steps"]
+    return table.reset_index(drop=True)
+
+
+#: Sizes below this many bodies, or iterations, show the binding's overhead rather than the algorithm.
+SMALLEST_FITTED = {"bodies": 10.0, "iterations": 3.0}
+
+
+def scaling_fits(table: pd.DataFrame) -> pd.DataFrame:
+    """Exponents p of per_step = a x^p by least squares in logarithms, over x >= `SMALLEST_FITTED`.
+
+    One row per purpose, scene, dimension, engine and profile: ``exponent``, ``standard_error``, ``factor`` [s],
+    ``points``, ``smallest``, ``largest`` (of x), ``reason`` where there are too few points.
+    """
+    rows = []
+    for names, group in grouped(table, ["purpose", *SERIES]):
+        used = group[(group["void"] == "") & (group["x"] >= SMALLEST_FITTED[names[0]])].sort_values("x")
+        fit = power_law(used["x"], used["per_step"])
+        row: dict[str, Any] = dict(zip(["purpose", *SERIES], names, strict=True))
+        row |= {"smallest": used["x"].min(), "largest": used["x"].max(), "points": len(used)}
+        row |= {
+            "exponent": fit.exponent if fit else math.nan,
+            "standard_error": fit.standard_error if fit else math.nan,
+            "factor": fit.factor if fit else math.nan,
+            "reason": "" if fit else f"{len(used)} sizes are too few for a fit",
+        }
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def grouped(table: pd.DataFrame, names: list[str]) -> list[tuple[Any, pd.DataFrame]]:
+    """Groups of a table in order of appearance; none of an empty one."""
+    return list(table.groupby(names, sort=False)) if len(table) else []

@@ -1,0 +1,193 @@
+"""Work points: the error of every run of an engine and what it cost; cost at equal error, error at equal cost.
+
+Observations give the error, timings the cost; both are read from the store, nothing here is measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from validation.bench.primary import PRIMARY
+from validation.bench.reading import POINT, SERIES, grouped, identity, timings_summary
+from validation.bench.statistics import lower_envelope
+from validation.cells import Observation, Outcome, Slot
+from validation.posed import resolve
+from validation.store import Run, Store
+
+#: Errors at which costs are compared.
+ERROR_LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+#: Costs at which errors are compared [s/s].
+COST_LEVELS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
+#: A row of `timings_summary`.
+Row = Mapping[Hashable, Any]
+
+
+def work_points(store: Store, run: Run) -> pd.DataFrame:
+    """One row per scene, dimension, engine, profile, step and iteration count: what was bought, and for how much.
+
+    Columns: `POINT` (``iterations`` None: the profile's own), ``params``, ``slot`` (the timed cell, as the command
+    reproduces it), ``engine_version``; ``error`` (primary, supremum over ``cells`` cells), ``error_name``, ``unit``,
+    ``worst`` (parameters of the worst cell), ``outcome``, ``reason`` (why there is no error or no cost);
+    ``cost``, ``cost_low``, ``cost_high``, ``cost_minimum`` [s/s], ``rounds``, ``width``, ``drifts``;
+    ``cost_corrected`` (without what an empty scene costs per step on the same engine and profile),
+    ``cost_sampled`` (with every step read; only where that was timed); ``state_hash`` of the timed call;
+    ``on_front`` (of its own series' lower envelope), ``best`` (of the envelope over all engines).
+    """
+    groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
+    for observation in store.observations(run):
+        slot = observation.slot
+        if slot.scene in PRIMARY:
+            groups[tuple(getattr(slot, name) for name in POINT)].append(observation)
+    summary = timings_summary(store, run)
+    work = summary[summary["purpose"] == "work"] if len(summary) else summary
+    costs = {(tuple(row[name] for name in POINT), row["sampled"]): row for row in work.to_dict("records")}
+    empty = _empty_per_step(summary)
+    rows = []
+    for key, members in groups.items():
+        row = accuracy(members)
+        row |= _cost_columns(costs.get((key, False)), costs.get((key, True)))
+        row["cost_corrected"] = row["cost"] - empty.get(key[1:4], math.nan) / row["dt"]
+        row["reason"] = row["reason"] or ("" if math.isfinite(row["cost"]) else "not timed")
+        rows.append(row)
+    return with_fronts(pd.DataFrame(rows))
+
+
+def accuracy(members: Sequence[Observation]) -> dict[str, Any]:
+    """Identity, primary error and outcome of one work point from the observations of its cells."""
+    first = min(members, key=lambda observation: _position(observation.slot))
+    primary = PRIMARY[first.slot.scene]
+    errors = [_error(observation) for observation in members]
+    bad = [o for o in members if o.outcome is not Outcome.OK]
+    missing = [reason for value, reason in errors if value is None]
+    values = [-1.0 if value is None else value for value, _ in errors]
+    worst = max(range(len(members)), key=values.__getitem__)
+    reason = f"{bad[0].outcome.value}: {bad[0].reason}" if bad else (missing[0] if missing else "")
+    return {
+        **identity(first.slot),
+        "engine_version": first.engine_version,
+        "error": math.nan if reason else values[worst],
+        "error_name": primary.name,
+        "unit": primary.unit,
+        "worst": dict(members[worst].slot.params),
+        "cells": len(members),
+        "outcome": (bad[0] if bad else first).outcome.value,
+        "reason": reason,
+    }
+
+
+def _position(slot: Slot) -> int:
+    """Place of a slot among the variations of its scene; the first is the one that is timed."""
+    canonical, given = resolve(slot.scene), dict(slot.params)
+    complete = canonical.complete(given)
+    for k, params in enumerate(PRIMARY[slot.scene].variations(slot.dt)):
+        if all(complete[name] == value for name, value in params.items()):
+            return k
+    return 10**6
+
+
+def _error(observation: Observation) -> tuple[float | None, str]:
+    if observation.outcome is not Outcome.OK:
+        return None, observation.reason
+    slot = observation.slot
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return PRIMARY[slot.scene].error(scene, slot.dt, observation.metrics)
+
+
+def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:
+    names = ("cost", "cost_low", "cost_high", "cost_minimum", "width")
+    usable = plain is not None and not plain["void"]
+    row: dict[str, Any] = {name: plain[name] if plain and usable else math.nan for name in names}
+    row["rounds"] = plain["rounds"] if plain else 0
+    row["drifts"] = bool(plain and plain["drifts"])
+    row["state_hash"] = plain["state_hash"] if plain else ""
+    row["cost_sampled"] = sampled["cost"] if sampled and not sampled["void"] else math.nan
+    return row
+
+
+def with_fronts(points: pd.DataFrame) -> pd.DataFrame:
+    """Mark the lower envelopes: of each series, and over all engines of a scene."""
+    points = points.copy()
+    for column, names in (("on_front", SERIES), ("best", SERIES[:2])):
+        points[column] = False
+        if len(points):
+            for _, group in points.groupby(names, sort=False):
+                points.loc[group.index, column] = lower_envelope(group["cost"], group["error"])
+    return points
+
+
+def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LEVELS) -> pd.DataFrame:
+    """Per series and error level: the cheapest point that was run with at most that error; never between points.
+
+    Columns: `SERIES`, ``level``; ``cost``, ``cost_low``, ``cost_high``, ``cost_corrected``, ``error``, ``dt``,
+    ``iterations``, ``slot``; ``rank`` (1 is the cheapest of its scene, dimension and level), ``times_cheapest``;
+    ``reason`` where no point reaches the level.
+    """
+    rows = []
+    for names, group in grouped(points, SERIES):
+        for level in levels:
+            reached = group[(group["error"] <= level) & group["cost"].notna()]
+            row = dict(zip(SERIES, names, strict=True)) | {"level": level}
+            rows.append(row | _chosen(reached, "cost", _why_not(group, level)))
+    return _ranked(pd.DataFrame(rows), "cost", "times_cheapest")
+
+
+def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEVELS) -> pd.DataFrame:
+    """Per series and cost level [s/s]: the most exact point that costs at most that much.
+
+    Columns as `time_at_equal_error`, with ``times_best`` (error over the best error of its scene and level).
+    """
+    rows = []
+    for names, group in grouped(points, SERIES):
+        for level in levels:
+            affordable = group[(group["cost"] <= level) & group["error"].notna()]
+            row = dict(zip(SERIES, names, strict=True)) | {"level": level}
+            cheapest = group.loc[group["error"].notna(), "cost"].min()
+            why = f"cheapest point costs {cheapest:.2g} s/s" if math.isfinite(cheapest) else _no_point(group)
+            rows.append(row | _chosen(affordable, "error", why))
+    return _ranked(pd.DataFrame(rows), "error", "times_best")
+
+
+def _chosen(candidates: pd.DataFrame, column: str, why_not: str) -> dict[str, Any]:
+    columns = ("cost", "cost_low", "cost_high", "cost_corrected", "error", "dt", "iterations", "slot")
+    if len(candidates) == 0:
+        return {**dict.fromkeys(columns[:6], math.nan), "iterations": None, "slot": None, "reason": why_not}
+    # Of points that are equal in what is asked for, the one that is better in the other thing.
+    best = candidates.sort_values([column, "cost" if column == "error" else "error"]).iloc[0]
+    return {**{name: best[name] for name in columns}, "reason": ""}
+
+
+def _why_not(group: pd.DataFrame, level: float) -> str:
+    errors = group.loc[group["cost"].notna(), "error"]
+    return f"smallest error in this sweep is {errors.min():.2g}" if errors.notna().any() else _no_point(group)
+
+
+def _no_point(group: pd.DataFrame) -> str:
+    reasons = [reason for reason in group["reason"] if reason]
+    return reasons[0] if reasons else "not timed"
+
+
+def _ranked(table: pd.DataFrame, column: str, factor: str) -> pd.DataFrame:
+    if len(table):
+        grouped = table.groupby(["scene", "dimension", "level"])[column]
+        table["rank"] = grouped.rank(method="min")
+        best = grouped.transform("min")
+        table[factor] = np.where(
+            best > 0.0, table[column] / best.where(best > 0.0), np.where(table[column] == 0, 1, np.inf)
+        )
+        table.loc[table[column].isna(), factor] = math.nan
+    return table
+
+
+def _empty_per_step(summary: pd.DataFrame) -> dict[tuple[Any, ...], float]:
+    """Cost of a step of an empty scene [s] by dimension, engine, profile."""
+    out = {}
+    for row in summary.to_dict("records"):
+        if row["purpose"] == "overhead" and row["scene"] == "empty" and not row["sampled"] and not row["void"]:
+            out[row["dimension"], row["engine"], row["profile"]] = row["per_step"]
+    return out
