@@ -179,11 +179,15 @@ def _rotation(q: np.ndarray) -> np.ndarray:
 
 
 def read_load(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """``m = F t / dv`` and ``I = T t / d omega`` over what was stated; +1 where pose and spin follow the torque."""
-    d, t = case.dimension, STEPS * case.dt
+    """``m = F t / dv`` and ``I = T t / d omega`` over what was stated; +1 where pose and spin follow the torque.
+
+    Gains are those of the second half, so that a state that is read late is not taken for a heavy body.
+    """
+    d, half = case.dimension, STEPS // 2
+    t = (STEPS - half) * case.dt
     mass, inertia, turn = [], [], []
     for i, body in enumerate(scene.bodies):
-        gain = trajectory.twist[-1, i] - trajectory.twist[0, i]
+        gain = trajectory.twist[-1, i] - trajectory.twist[half, i]
         torque = np.array(body.torque)
         about = float(np.linalg.norm(torque))
         spin, angle = float(gain[d:] @ torque) / about, float(_turned(case, trajectory, i) @ torque)

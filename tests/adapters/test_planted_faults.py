@@ -1,0 +1,89 @@
+"""Detection power: every planted fault is caught by a named receipt or check that the healthy toy passes."""
+
+import pytest
+
+from adapters.conformance import CHECKS
+from adapters.needs import Needs
+from adapters.receipts import receipts
+
+#: Fault -> what catches it: a receipt by its quantity, or a conformance check.
+CAUGHT_BY = {
+    "restitution ignored": "receipt restitution",
+    "friction applied twice": "receipt friction",
+    "gravity sign": "receipt gravity",
+    "half against full extents": "receipt size",
+    "state sampled one step late": "receipt sampling",
+    "world shared between builds": "check fresh",
+    "disc inertia given to a sphere": "receipt inertia",
+    "hidden damping of 4 %": "receipt linear_damping",
+    "angle sign": "receipt turn",
+    "mass ignored": "receipt mass",
+    "impulse of the wrong body": "check impulse",
+    "torque sign": "receipt turn",
+    "step of its own": "receipt step",
+    "spin damped": "receipt angular_damping",
+    "principal axes swapped": "receipt inertia",
+    "start not as the scene says": "check states",
+    "bodies in another order": "check states",
+    "normal points from the second body": "check contacts",
+    "bodies not in order of the scene": "check contacts",
+    "unknown settings ignored": "check refusals",
+    "setting without a reason": "check profiles",
+    "refusal of several lines": "check refusals",
+    "nothing read back": "check readback",
+}
+#: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
+EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81)
+DT = 1 / 60
+
+
+def broken(engine, name):
+    kind, what = name.split()
+    if kind == "check":
+        try:
+            return CHECKS[what](engine)
+        except Exception as error:  # as `check_adapter` does: what a faulty engine raises is a finding
+            return f"{type(error).__name__}: {error}"
+    return [slip for slip in receipts(engine, "default", EVERYTHING, DT) if slip.quantity == what and not slip.holds]
+
+
+@pytest.mark.parametrize("name", sorted(set(CAUGHT_BY.values())))
+def test_healthy_toy_passes(toy, name):
+    assert not broken(toy(), name)
+
+
+@pytest.mark.parametrize("fault, name", CAUGHT_BY.items())
+def test_planted_fault_is_caught(toy, fault, name):
+    assert broken(toy(fault), name)
+
+
+def test_every_fault_that_can_be_planted_is_in_the_table(faults):
+    assert set(faults) == set(CAUGHT_BY)
+
+
+#: Faults of one parameter, and all receipts they break: the others must not be drawn in.
+ALONE = {
+    "restitution ignored": {"restitution"},
+    "friction applied twice": {"friction"},
+    "state sampled one step late": {"sampling"},
+    "disc inertia given to a sphere": {"inertia"},
+    "angle sign": {"turn"},
+    "mass ignored": {"mass"},
+    "spin damped": {"inertia", "angular_damping"},
+    "impulse of the wrong body": set(),
+    "world shared between builds": set(),
+}
+
+
+@pytest.mark.parametrize("fault, quantities", ALONE.items())
+def test_a_fault_breaks_the_receipts_it_concerns_and_no_other(toy, fault, quantities):
+    slips = receipts(toy(fault), "default", EVERYTHING, DT)
+    assert {slip.quantity for slip in slips if not slip.holds} == quantities
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
+def test_healthy_toy_holds_every_receipt_in_both_dimensions(toy, dt):
+    engine = toy()
+    for dimension in (2, 3):
+        needs = Needs(dimension, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81)
+        assert [slip for slip in receipts(engine, "default", needs, dt) if not slip.holds] == []
