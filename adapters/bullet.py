@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.bullet_law import DEFAULT, ONE, loss_in_one_second, rebound_range
 from adapters.engine import (
     Array,
     Contacts,
@@ -32,6 +33,7 @@ from adapters.engine import (
     Simulation,
 )
 from adapters.needs import Needs
+from adapters.probes import REBOUND_LEAD, REBOUND_RADIUS, REBOUND_SPEED, REBOUND_TIME
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
@@ -273,8 +275,8 @@ class BulletSimulation(Simulation):
     def _build(self) -> None:
         """Make the world; bodies wait far away for one step, so that the stated inertia is in force on contact.
 
-        A body that changes its inertia keeps the inverse of the old one through its next step, and a reset of its
-        pose does not refresh it.
+        A body that changes its inertia or its orientation keeps the old inverse inertia in world axes through its
+        next step, and a reset of its pose does not refresh it: bodies wait in their final orientation.
         """
         p, scene, client = self._p, self._scene, self._client
         p.setPhysicsEngineParameter(fixedTimeStep=self._dt, **self._world, physicsClientId=client)
@@ -306,7 +308,7 @@ class BulletSimulation(Simulation):
 
     def _add(self, index: int, body: Body, heaviest: float, restitution: float, friction: float) -> None:
         p, client = self._p, self._client
-        sizes, position, _ = _placement(body, self._scene)
+        sizes, position, quaternion = _placement(body, self._scene)
         if isinstance(body.shape, Sphere):
             shape = p.createCollisionShape(p.GEOM_SPHERE, radius=sizes[0], physicsClientId=client)
         else:
@@ -314,7 +316,7 @@ class BulletSimulation(Simulation):
         mass = {"free": body.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[body.motion]
         waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
         identifier = p.createMultiBody(
-            mass, shape, -1, waiting, useMaximalCoordinates=self._maximal, physicsClientId=client
+            mass, shape, -1, waiting, quaternion, useMaximalCoordinates=self._maximal, physicsClientId=client
         )
         self._ids.append(identifier)
         self._mass.append(mass)
@@ -473,9 +475,9 @@ _QUIRKS = (
         "btConvexPlaneCollisionAlgorithm.cpp:92; bullet3 #1514",
     ),
     Quirk(
-        "a changed inertia is not in force in the next step, and rigid bodies lose their mass if it comes alone",
-        "bodies wait far away for one step without gravity, mass and inertia are set together, then they are placed",
-        "measured: a touching disc rolls at 5/7 instead of 2/3",
+        "a new inertia or orientation acts a step late, and an inertia without a mass wipes a rigid body's mass",
+        "bodies wait far away, already turned, for one step without gravity; mass and inertia are set together",
+        "measured: a touching disc rolls at 5/7 instead of 2/3, a turned body answers a torque by its unturned inertia",
     ),
     Quirk(
         "contactBreakingThreshold is a C global that survives disconnect",
@@ -558,5 +560,23 @@ class BulletEngine(Engine):
         return BulletSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Drag of the multibody path, and the rebounds that speculative contact or Baumgarte leave."""
-        return {}
+        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains from Baumgarte."""
+        if profile == "one":
+            return {"restitution": _gain_of_one(needs.restitution, dt)}
+        if profile != "default":
+            return {}
+        # 1e-12: round-off of up to a thousand steps.
+        loss = Declared(loss_in_one_second(DEFAULT, dt), 1e-12, "drag of a multibody, 0.04 (1 + v) v, for spin as well")
+        time = (REBOUND_LEAD + 4) * dt + REBOUND_TIME
+        ball = (REBOUND_RADIUS, REBOUND_SPEED, needs.restitution, dt, REBOUND_LEAD, time)
+        least, greatest = rebound_range(DEFAULT, *ball)
+        because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
+        rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
+        return {"linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+
+
+def _gain_of_one(e: float, dt: float) -> Declared:
+    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and one met within the slop loses slop/dt."""
+    lost = ONE.slop / (REBOUND_SPEED * dt)
+    because = "found 0 .. v dt deep, of which contactERP per step becomes speed; within the slop, slop/dt is lost"
+    return Declared(e + 0.5 * (ONE.erp - lost), 0.5 * (ONE.erp + lost), because)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ from numpy.typing import NDArray
 #: A contact is seen below this share of the smaller shape's bounding radius (contactBreakingThreshold), which for a
 #: sphere is that of its bounding cube, sqrt(3) r.
 BREAKING_THRESHOLD = 0.02
+#: Phases of a step that a range of rebounds is taken over.
+PHASES = 64
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -115,3 +119,31 @@ def fall(law: ContactLaw, radius: float, gap: float, velocity: float, e: float, 
         gaps.append(gap)
         velocities.append(velocity)
     return Fall(np.array(gaps), np.array(velocities), np.array(impulses))
+
+
+def loss_in_one_second(law: ContactLaw, dt: float) -> float:
+    """Share of 1 m/s (or 1 rad/s) that drag takes in a second of flight."""
+    steps, speed = min(max(8, round(1.0 / dt)), 1000), 1.0
+    for _ in range(steps):
+        speed -= law.drag(speed, dt)
+    return 1.0 - speed ** (1.0 / (steps * dt))
+
+
+@lru_cache(maxsize=256)
+def rebound_range(law: ContactLaw, radius: float, v: float, e: float, dt: float, lead: float, time: float) -> Range:
+    """Least and greatest v+/v, over the phases of a step, of a ball that starts ``lead`` steps above a face.
+
+    Parameters
+    ----------
+    time
+        How long after the start the speed is taken [s].
+
+    Returns
+    -------
+    (least, greatest), widened by what may lie between two of the phases that were tried: within a phase interval
+    the gap changes by ``v dt / PHASES``, hence ``gap/dt`` by ``v / PHASES``, in the braking step and in the one before.
+    """
+    steps = math.ceil(time / dt - 1e-9)
+    gaps = [(lead + (k + 0.5) / PHASES) * v * dt for k in range(PHASES)]
+    ratios = [float(fall(law, radius, gap, -v, e, 0.0, dt, steps).velocity[-1]) / v for gap in gaps]
+    return min(ratios) - 2.0 / PHASES, max(ratios) + 2.0 / PHASES

@@ -1,0 +1,144 @@
+"""Bullet's deviation laws, at points that were not used to write them, against the engine itself."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
+
+from adapters import needs, run
+from adapters.bullet import BulletEngine
+from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, fall
+from validation.deviation import Deviation
+from validation.deviations import covering
+from validation.deviations.bullet import DEVIATIONS
+from validation.scenes import CATALOGUE
+
+ENGINE = BulletEngine()
+VERSION = "3.2.7"
+
+
+def compare(name, params, profile, dt, dimension=2):
+    """Measured value, prediction (or None) and check of every judged metric."""
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(dimension, params)
+    settings = {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)}
+    measured = canonical.measure(scene, run(ENGINE, scene, dt, settings, canonical.sampling(scene)))
+    rows = {}
+    for check in canonical.checks(scene, dt):
+        said = [law.law(scene, dt) for law in covering("bullet", VERSION, profile, name, check.metric)]
+        said = [prediction for prediction in said if prediction is not None]
+        assert len(said) <= 1
+        rows[check.metric] = (measured[check.metric][0], said[0] if said else None, check)
+    return rows
+
+
+def assert_predicted(rows, least):
+    """Every prediction holds, and at least ``least`` metrics are predicted."""
+    predicted = {metric: row for metric, row in rows.items() if row[1] is not None}
+    for metric, (value, (centre, band), _) in predicted.items():
+        assert abs(value - centre) <= band, (metric, value, centre, band)
+    assert len(predicted) >= least
+
+
+# ---- impact ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned", "one"])
+@pytest.mark.parametrize(
+    ("e", "v", "dt"),
+    [(0.63, 0.37, 1 / 240), (0.91, 4.7, 1 / 240), (0.07, 23.0, 1 / 130), (0.5, 2.9, 1 / 777), (0.77, 88.0, 1 / 55)],
+)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_all_five_numbers_of_an_impact_are_predicted(profile, e, v, dt, dimension):
+    assert_predicted(compare("impact", {"e": e, "v": v, "delay": 0.061}, profile, dt, dimension), 5)
+
+
+def test_impact_law_has_power_it_excludes_the_textbook_and_a_hundredth_of_a_per_cent():
+    for profile in ("default", "one"):
+        _, (centre, band), check = compare("impact", {"e": 0.63, "v": 4.7}, profile, 1 / 240)["rebound_ratio"]
+        assert abs(check.truth - centre) > 1e3 * band and band < 1e-4 * check.truth
+
+
+def test_mass_and_radius_enter_the_law_as_they_enter_the_engine():
+    rows = compare("impact", {"e": 0.4, "v": 3.1, "mass": 7.0, "radius": 0.21}, "default", 1 / 240)
+    assert_predicted(rows, 5)
+    assert rows["impulse"][0] == pytest.approx(7.0 * rows["velocity_change"][0], rel=0.02)  # drag aside
+
+
+def test_impulse_misses_m_dv_by_the_drag_of_the_default_profile_only():
+    rows = compare("impact", {"e": 0.63, "v": 6.3}, "default", 1 / 240)
+    value, (centre, band), check = rows["momentum_defect"]
+    assert value > 1e3 * check.bound and abs(value - centre) <= band < 1e-6
+    assert compare("impact", {"e": 0.63, "v": 6.3}, "one", 1 / 240)["momentum_defect"][0] <= check.bound
+
+
+# ---- bounce ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("profile", "e", "least"), [("default", 0.77, 6), ("default", 1.0, 6), ("one", 0.77, 7), ("tuned", 0.77, 7)]
+)
+@pytest.mark.parametrize("height", [0.8231, 1.477, 2.23])
+def test_apexes_and_rest_time_are_predicted(profile, e, least, height):
+    assert_predicted(compare("bounce", {"e": e, "height": height}, profile, 1 / 240), least)
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned", "one"])
+@pytest.mark.parametrize(("height", "dt"), [(0.731, 1 / 240), (1.19, 1 / 120), (3.3, 1 / 60)])
+def test_plastic_drop_is_predicted_with_its_baumgarte_hop(profile, height, dt):
+    rows = compare("bounce", {"e": 0.0, "height": height}, profile, dt, 3)
+    assert_predicted(rows, len(rows))
+
+
+def test_tuned_plastic_drop_hops_by_what_rest_settings_make_of_the_overlap():
+    path = fall(REST, 0.5, 0.731, 0.0, 0.0, 9.81, 1 / 240, 200)
+    first = np.flatnonzero(path.impulse)[0]
+    overlap = -path.gap[first - 1]
+    assert overlap > 0.0 and path.velocity[first] == pytest.approx(0.08 * (overlap - 1e-5) * 240, rel=1e-12)
+
+
+def test_law_falls_silent_where_round_off_has_grown_through_the_impacts():
+    # Some fifty bounces, each of which multiplies an error of the gap by about 2 erp v/(g dt) = 4.
+    rows = compare("bounce", {"e": 0.95, "height": 0.77}, "one", 1 / 480)
+    assert rows["rest_time"][1] is None and rows["apex[1]"][1] is not None
+
+
+# ---- incline -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("ratio", "mu", "dt"), [(1.23, 0.5, 1 / 240), (1.6, 0.3, 1 / 180), (3.1, 0.4, 1 / 333)])
+def test_drag_of_the_default_profile_predicts_the_slide(ratio, mu, dt):
+    rows = compare("incline", {"ratio": ratio, "mu": mu}, "default", dt, 3)
+    assert_predicted(rows, 1)
+    _, (centre, band), check = rows["acceleration"]
+    assert abs(check.truth - centre) > band  # and the textbook is not within its band
+
+
+def test_sticking_box_has_no_law():
+    assert compare("incline", {"ratio": 0.9}, "default", 1 / 240)["creep"][1] is None
+
+
+# ---- the laws themselves -----------------------------------------------------------------------------------------
+
+
+def test_recurrence_reduces_to_the_closed_forms_of_the_fact_sheet():
+    v, e, dt = 3.0, 0.6, 1 / 240
+    assert DEFAULT.contact(0.004, -v, -v, e, dt)[0] == pytest.approx(e * v - (0.004 + 1e-5) / dt, rel=1e-15)
+    assert DEFAULT.contact(-0.004, -v, -v, e, dt)[0] == pytest.approx(e * v + 0.08 * (0.004 - 1e-5) / dt, rel=1e-15)
+    assert DEFAULT.contact(0.04, -v, -v, e, dt)[0] == -v  # too far to act: no impulse, never a pull
+    assert ONE.contact(-0.004, -v, -v, e, dt)[0] == pytest.approx(e * v + 0.01 * (0.004 - 1e-5) / dt, rel=1e-15)
+    after, push = IMPACT.contact(-0.004, -v, -v, e, dt)
+    assert after == pytest.approx(e * v, rel=1e-15) and push == pytest.approx(0.08 * (0.004 - 1e-6) / dt, rel=1e-12)
+
+
+def test_multibody_restitutes_gravity_and_rigid_body_does_not():
+    before, free = -3.0, -3.0 - 9.81 / 240
+    assert DEFAULT.contact(-1e-5, before, free, 1.0, 1 / 240)[0] == pytest.approx(-free, rel=1e-15)
+    assert REST.contact(-1e-5, before, free, 1.0, 1 / 240)[0] == pytest.approx(-before, rel=1e-15)
+
+
+def test_laws_say_nothing_about_scenes_they_do_not_describe():
+    stack = CATALOGUE["stack"].scene(2, {"n": 2})
+    assert all(law.law(stack, 1 / 240) is None for law in DEVIATIONS if law.scene != "incline")
+    assert not any(law.covers("bullet", "3.3.0", "default", "impact", "impulse") for law in DEVIATIONS)
+    assert all(isinstance(law, Deviation) and law.because and law.source for law in DEVIATIONS)
