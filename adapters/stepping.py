@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from adapters.trajectory import ContactRecord, Sampling, Trajectory
 EXPLOSION_FACTOR = 1e3
 
 
-class _Planar:
+class PlanarView:
     """Reads a lifted simulation as a planar one and remembers the largest departure from the plane."""
 
     def __init__(self, inner: Simulation) -> None:
@@ -33,16 +33,19 @@ class _Planar:
         self.outside = 0.0
 
     def pose(self) -> np.ndarray:
+        """Planar poses (n, 3)."""
         pose, outside = lower_pose(self.inner.pose())
         self.outside = max(self.outside, outside)
         return pose
 
     def twist(self) -> np.ndarray:
+        """Planar twists (n, 3)."""
         twist, outside = lower_twist(self.inner.twist())
         self.outside = max(self.outside, outside)
         return twist
 
     def contacts(self) -> Contacts:
+        """Planar contacts."""
         return lower_contacts(self.inner.contacts())
 
 
@@ -97,18 +100,25 @@ def run(
         simulation.close()
 
 
+def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[int]:
+    """Advance by ``steps`` steps, ``stride`` at a time; yields the number made so far after each."""
+    done = 0
+    while done < steps:
+        advance = min(stride, steps - done)
+        simulation.advance(advance)
+        done += advance
+        yield done
+
+
 def _record(
     simulation: Simulation, scene: Scene, lifted: bool, dt: float, sampling: Sampling, started: float
 ) -> Trajectory:
-    view = _Planar(simulation) if lifted else simulation
+    view = PlanarView(simulation) if lifted else simulation
     limit = EXPLOSION_FACTOR * _fastest(scene)
     poses, twists, steps_at = [view.pose()], [view.twist()], [0]
     collected: list[tuple[int, Contacts]] = []
-    finish, reason, done, steps = "completed", "", 0, step_count(scene.duration, dt)
-    while done < steps:
-        advance = min(sampling.stride, steps - done)
-        simulation.advance(advance)
-        done += advance
+    finish, reason = "completed", ""
+    for done in advances(simulation, step_count(scene.duration, dt), sampling.stride):
         poses.append(view.pose())
         twists.append(view.twist())
         steps_at.append(done)
@@ -129,7 +139,7 @@ def _record(
         initial_change=tuple(simulation.initial_change),
         readback=simulation.readback(),
         certificate=simulation.certificate(),
-        out_of_plane=view.outside if isinstance(view, _Planar) else 0.0,
+        out_of_plane=view.outside if isinstance(view, PlanarView) else 0.0,
         wall_time=time.perf_counter() - started,
     )
 
