@@ -38,10 +38,13 @@ def adapter_hash(engine: str) -> str:
     entry = {e.name: e for e in entry_points(group=GROUP)}[engine]
     spec = find_spec(entry.module)
     own = [Path(spec.origin)] if spec and spec.origin else []
-    engines = {e.module.rsplit(".", 1)[-1] + ".py" for e in entry_points(group=GROUP)}
-    shared = [p for p in _sources("adapters") if p.name not in engines]
+    modules = {e.module.rsplit(".", 1)[-1] for e in entry_points(group=GROUP)}
+    mine = entry.module.rsplit(".", 1)[-1]
+    # bullet.py and bullet_law.py belong to one engine; what belongs to none is shared.
+    owner = {path: next((m for m in modules if path.stem in (m, f"{m}_law")), None) for path in _sources("adapters")}
+    shared = [path for path, name in owner.items() if name is None or name == mine]
     solver = _sources("reference_solver") if entry.module == "adapters.reference" else []
-    return _hash_files([*shared, *own, *solver])
+    return _hash_files(sorted({*shared, *own, *solver}))
 
 
 @cache

@@ -21,8 +21,8 @@ def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None,
     return (None, UNAVAILABLE) if np.isnan(total).any() else (total, "")
 
 
-def apexes(t: Array, height: Array, velocity: Array) -> tuple[Array, Array]:
-    """Times and heights of the tops of all arcs.
+def apexes(t: Array, height: Array, velocity: Array, least: float = 0.0) -> tuple[Array, Array]:
+    """Times and heights of the tops of all arcs that start faster than ``least`` [m/s].
 
     An arc ends where the velocity turns from upwards to not upwards; its top is that of the parabola through the
     highest sample and its neighbours (exact for constant gravity, whatever the phase of the samples).
@@ -30,6 +30,9 @@ def apexes(t: Array, height: Array, velocity: Array) -> tuple[Array, Array]:
     turns = np.flatnonzero((velocity[:-1] > 0.0) & (velocity[1:] <= 0.0))
     times, tops = [], []
     for turn in turns:
+        falling = np.flatnonzero(velocity[: turn + 1] <= 0.0)
+        if velocity[falling[-1] + 1 if len(falling) else 0 : turn + 1].max() <= least:
+            continue  # chatter of a resting body, not an arc
         first, last = max(1, int(turn) - 1), min(len(height) - 1, int(turn) + 3)
         if last <= first:
             continue

@@ -131,3 +131,9 @@ def test_deepest_overlap_is_never_negative():
     t = np.array([0.0, 1.0])
     assert metrics.deepest_overlap(scene, planar(t, np.full(2, 3.0), np.zeros(2))) == 0.0
     assert metrics.deepest_overlap(scene, planar(t, np.full(2, 0.4), np.zeros(2))) == pytest.approx(0.1)
+
+
+def test_chatter_of_a_resting_ball_is_no_arc():
+    t = np.arange(200) / 240
+    chatter = 1e-13 * np.sin(40.0 * t)
+    assert len(metrics.apexes(t, chatter, chatter, 2 * G / 240)[0]) == 0

@@ -50,7 +50,9 @@ def timings_summary(store: Store, run: Run) -> pd.DataFrame:
 
 def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
     first = timings[0]
-    seconds = [timing.seconds for timing in timings]
+    void = next((timing.void for timing in timings if timing.void), "")
+    # What is void has no time: it could only mislead.
+    seconds = [math.nan] if void else [timing.seconds for timing in timings]
     found, moved = spread(seconds), drift(seconds)
     simulated = first.steps * first.slot.dt
     outside = abs(moved) > max(DRIFT, found.width)
@@ -65,7 +67,7 @@ def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
         **{name: getattr(found, name) for name in ("minimum", "median", "low", "high", "width")},
         "drift": moved,
         "drifts": outside,
-        "load": float(np.median([timing.wall_seconds / timing.seconds for timing in timings])),
+        "load": math.nan if void else float(np.median([t.wall_seconds / t.seconds for t in timings])),
         "cost": found.median / simulated,
         "cost_minimum": found.minimum / simulated,
         "cost_low": found.low / simulated,
@@ -74,7 +76,7 @@ def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
         "error": math.nan if first.error is None else first.error,
         "state_hash": first.state_hash,
         "states": len({timing.state_hash for timing in timings}),
-        "void": next((timing.void for timing in timings if timing.void), ""),
+        "void": void,
     }
 
 

@@ -63,7 +63,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     up, g, height = scene.dimension - 1, scene.params["g"], scene.params["height"]
     clearance = trajectory.pose[:, 1, up] - RADIUS
     velocity = trajectory.twist[:, 1, up]
-    times, heights = metrics.apexes(trajectory.t, clearance, velocity)
+    # Twice g dt: a rebound that small ends within the step that made it.
+    least = 2.0 * g * trajectory.dt
+    times, heights = metrics.apexes(trajectory.t, clearance, velocity, least)
     measured: dict[str, Measured] = {}
     for n in range(1, APEXES + 1):
         none = (0.0, f"there is no apex {n}: the ball does not rise again")
@@ -71,8 +73,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     growth = [b - a for a, b in zip([height, *heights[:APEXES]], heights[:APEXES], strict=False)]
     measured["apex_growth"] = (max([0.0, *(float(x) for x in growth)]) / height, "")
     measured["apex_interval_ratio"] = metrics.interval_ratio(times)
-    # Twice g dt: a rebound that small ends within the step that made it.
-    measured["rest_time"] = metrics.last_motion(trajectory.t, velocity, 2.0 * g * trajectory.dt)
+    measured["rest_time"] = metrics.last_motion(trajectory.t, velocity, least)
     return measured
 
 
