@@ -40,7 +40,8 @@ def needs(model: Model) -> Needs:
     np.fill_diagonal(meets, False)
     friction = bool((model.friction[meets] > 0.0).any())
     turned = any(
-        body.motion == "free" and (isinstance(body.shape, Box) or np.any(np.asarray(body.torque))) for body in model.bodies
+        body.motion == "free" and (isinstance(body.shape, Box) or np.any(np.asarray(body.torque)))
+        for body in model.bodies
     )
     return Needs(
         rotation=friction or turned,

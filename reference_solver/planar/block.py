@@ -7,8 +7,24 @@ in proportion to the normal impulses, which the cone of each point allows whenev
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.planar.columns import (
+    AN,
+    COUPLING,
+    FRICTION,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    NORMAL_MASS,
+    PN,
+    PT,
+    PUSH,
+    PUSH_TARGET,
+    TANGENT_MASS,
+    TARGET,
+    A,
+    B,
+)
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
 from reference_solver.planar.state import MANIFOLDS, Bodies, Options, Rows
 
@@ -24,25 +40,25 @@ POLISHED = 1e-15
 IMPULSE, VELOCITY = 0, 1
 
 
-@kernel
+@inner_kernel
 def prepare_blocks(bodies: Bodies, rows: Rows) -> None:
     """Matrix W of every two-point manifold (E12)."""
     for m in range(rows.count[MANIFOLDS]):
         first = rows.manifold[m]
         if rows.manifold[m + 1] - first != 2:
             continue
-        a, b = rows.body_a[first], rows.body_b[first]
-        mass = bodies.inverse_mass[a] + bodies.inverse_mass[b]
+        a, b = rows.index[first, A], rows.index[first, B]
+        mass = bodies.real[a, INVERSE_MASS] + bodies.real[b, INVERSE_MASS]
         for i in range(4):
             for j in range(4):
                 # Levers of A stand at 0 (normal) and 2 (tangent), those of B one behind.
                 ci, cj, ki, kj = first + i // 2, first + j // 2, 2 * (i % 2), 2 * (j % 2)
-                turning = bodies.inverse_inertia[a] * (rows.lever[ci, ki] * rows.lever[cj, kj])
-                turning += bodies.inverse_inertia[b] * (rows.lever[ci, ki + 1] * rows.lever[cj, kj + 1])
+                turning = bodies.real[a, INVERSE_INERTIA] * (rows.real[ci, AN + ki] * rows.real[cj, AN + kj])
+                turning += bodies.real[b, INVERSE_INERTIA] * (rows.real[ci, AN + ki + 1] * rows.real[cj, AN + kj + 1])
                 rows.block[m, i, j] = turning + (mass if ki == kj else 0.0)
 
 
-@kernel
+@inner_kernel
 def sweep_blocks(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
     """One sweep over all manifolds in canonical order."""
     for m in range(rows.count[MANIFOLDS]):
@@ -50,8 +66,8 @@ def sweep_blocks(bodies: Bodies, rows: Rows, options: Options, relaxation: float
         points = rows.manifold[m + 1] - first
         for i in range(points):
             c = first + i
-            rows.local[IMPULSE, 2 * i], rows.local[IMPULSE, 2 * i + 1] = rows.impulse[c, 0], rows.impulse[c, 1]
-            rows.local[VELOCITY, 2 * i] = normal_velocity(bodies.twist, rows, c) - rows.target[c]
+            rows.local[IMPULSE, 2 * i], rows.local[IMPULSE, 2 * i + 1] = rows.real[c, PN], rows.real[c, PT]
+            rows.local[VELOCITY, 2 * i] = normal_velocity(bodies.twist, rows, c) - rows.real[c, TARGET]
             rows.local[VELOCITY, 2 * i + 1] = tangent_velocity(bodies.twist, rows, c) if options.friction else 0.0
         if points == 1:
             solve_point(rows, first, options)
@@ -61,32 +77,32 @@ def sweep_blocks(bodies: Bodies, rows: Rows, options: Options, relaxation: float
             relax_point(bodies, rows, first + i, 2 * i, options, relaxation)
 
 
-@kernel
+@inner_kernel
 def relax_point(bodies: Bodies, rows: Rows, c: int, row: int, options: Options, relaxation: float) -> None:
     """Go from the old impulse through the block's solution by the factor, stay in the cone, apply the change."""
-    old = rows.impulse[c, 0]
+    old = rows.real[c, PN]
     new = max(old + relaxation * (rows.local[IMPULSE, row] - old), 0.0)
-    rows.impulse[c, 0] = new
+    rows.real[c, PN] = new
     apply_normal(bodies, bodies.twist, rows, c, new - old)
     if options.friction:
-        bound = rows.friction[c] * new
-        old = rows.impulse[c, 1]
+        bound = rows.real[c, FRICTION] * new
+        old = rows.real[c, PT]
         new = min(max(old + relaxation * (rows.local[IMPULSE, row + 1] - old), -bound), bound)
-        rows.impulse[c, 1] = new
+        rows.real[c, PT] = new
         apply_tangent(bodies, bodies.twist, rows, c, new - old)
 
 
-@kernel
+@inner_kernel
 def solve_point(rows: Rows, c: int, options: Options) -> None:
     """Exact solution of one contact point (E11): open, sticking, or sliding either way."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]
-    kn, kt, kx = 1.0 / rows.normal_mass[c], 1.0 / rows.tangent_mass[c], rows.coupling[c]
+    kn, kt, kx = 1.0 / rows.real[c, NORMAL_MASS], 1.0 / rows.real[c, TANGENT_MASS], rows.real[c, COUPLING]
     qn = u[0] - kn * p[0] - kx * p[1]
     qt = u[1] - kx * p[0] - kt * p[1]
-    p[0], p[1] = coulomb_point(qn, qt, kn, kt, kx, rows.friction[c] if options.friction else 0.0)
+    p[0], p[1] = coulomb_point(qn, qt, kn, kt, kx, rows.real[c, FRICTION] if options.friction else 0.0)
 
 
-@kernel
+@inner_kernel
 def coulomb_point(qn: float, qt: float, kn: float, kt: float, kx: float, mu: float) -> tuple[float, float]:
     """Normal and tangential impulse of one point, q the velocities (minus target) without them.
 
@@ -112,14 +128,14 @@ def coulomb_point(qn: float, qt: float, kn: float, kt: float, kx: float, mu: flo
     return -qn / kn, 0.0
 
 
-@kernel
+@inner_kernel
 def solve_pair(rows: Rows, m: int, options: Options) -> None:
     """Two points: try the modes with both pressed, else the normal rows alone; finish by alternation."""
     w, p, u = rows.block[m], rows.local[IMPULSE], rows.local[VELOCITY]
     first = rows.manifold[m]
     mu1, mu2 = 0.0, 0.0
     if options.friction:
-        mu1, mu2 = rows.friction[first], rows.friction[first + 1]
+        mu1, mu2 = rows.real[first, FRICTION], rows.real[first + 1, FRICTION]
         press_both(w, p, u, mu1, mu2)
     for _ in range(POLISHING_PASSES):
         n1, t1, n2, t2 = p[0], p[1], p[2], p[3]
@@ -133,7 +149,7 @@ def solve_pair(rows: Rows, m: int, options: Options) -> None:
             return
 
 
-@kernel
+@inner_kernel
 def change_impulse(w: Array, p: Array, u: Array, row: int, new: float) -> None:
     """Set one impulse of the block and update its four velocities."""
     step = new - p[row]
@@ -142,13 +158,13 @@ def change_impulse(w: Array, p: Array, u: Array, row: int, new: float) -> None:
         u[i] += w[i, row] * step
 
 
-@kernel
+@inner_kernel
 def slide_row(w: Array, p: Array, u: Array, row: int, bound: float) -> None:
     """Friction row of the block by itself (E11)."""
     change_impulse(w, p, u, row, min(max(p[row] - u[row] / w[row, row], -bound), bound))
 
 
-@kernel
+@inner_kernel
 def press_normals(w: Array, p: Array, u: Array) -> None:
     """Both normal rows with friction held: enumeration of the 2 x 2 complementarity problem (E12)."""
     k1, k2, k12 = w[0, 0], w[2, 2], w[0, 2]
@@ -168,7 +184,7 @@ def press_normals(w: Array, p: Array, u: Array) -> None:
     change_impulse(w, p, u, 2, n2)
 
 
-@kernel
+@inner_kernel
 def press_both(w: Array, p: Array, u: Array, mu1: float, mu2: float) -> None:
     """Both points pressed and sticking, or sliding the same way; nothing changes where no mode fits."""
     det = w[0, 0] * w[2, 2] - w[0, 2] * w[0, 2]
@@ -206,7 +222,7 @@ def press_both(w: Array, p: Array, u: Array, mu1: float, mu2: float) -> None:
             return
 
 
-@kernel
+@inner_kernel
 def set_block(w: Array, p: Array, u: Array, n1: float, t1: float, n2: float, t2: float) -> None:
     """Set all four impulses of the block and update its velocities."""
     change_impulse(w, p, u, 0, n1)
@@ -215,7 +231,7 @@ def set_block(w: Array, p: Array, u: Array, n1: float, t1: float, n2: float, t2:
     change_impulse(w, p, u, 3, t2)
 
 
-@kernel
+@inner_kernel
 def sweep_block_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows, two points of a manifold together (E12, E16)."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]
@@ -223,14 +239,14 @@ def sweep_block_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
         first = rows.manifold[m]
         points = rows.manifold[m + 1] - first
         for i in range(points):
-            p[2 * i], p[2 * i + 1] = rows.push[first + i], 0.0
-            u[2 * i] = normal_velocity(bodies.pseudo, rows, first + i) - rows.push_target[first + i]
+            p[2 * i], p[2 * i + 1] = rows.real[first + i, PUSH], 0.0
+            u[2 * i] = normal_velocity(bodies.pseudo, rows, first + i) - rows.real[first + i, PUSH_TARGET]
             u[2 * i + 1] = 0.0
         if points == 2:
             press_normals(rows.block[m], p, u)
         else:
-            p[0] = max(p[0] - u[0] * rows.normal_mass[first], 0.0)
+            p[0] = max(p[0] - u[0] * rows.real[first, NORMAL_MASS], 0.0)
         for i in range(points):
-            old = rows.push[first + i]
-            rows.push[first + i] = max(old + relaxation * (p[2 * i] - old), 0.0)
-            apply_normal(bodies, bodies.pseudo, rows, first + i, rows.push[first + i] - old)
+            old = rows.real[first + i, PUSH]
+            rows.real[first + i, PUSH] = max(old + relaxation * (p[2 * i] - old), 0.0)
+            apply_normal(bodies, bodies.pseudo, rows, first + i, rows.real[first + i, PUSH] - old)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.columns import COS, EXTENT, SIN, SIZE
 from reference_solver.planar.points import share_of_gap, write_point
 from reference_solver.planar.state import Bodies, Rows
 
@@ -16,25 +17,25 @@ from reference_solver.planar.state import Bodies, Rows
 AXIS_ADVANTAGE = 1e-6
 
 
-@kernel
+@inner_kernel
 def axis_separation(bodies: Bodies, a: int, b: int, dx: float, dy: float, axis: int) -> tuple[float, float]:
     """Separation of b from the face of a along a's own ``axis``, and the side (+-1) on which b lies."""
-    ca, sa = bodies.turn[a, 0], bodies.turn[a, 1]
-    cb, sb = bodies.turn[b, 0], bodies.turn[b, 1]
+    ca, sa = bodies.real[a, COS], bodies.real[a, SIN]
+    cb, sb = bodies.real[b, COS], bodies.real[b, SIN]
     ux, uy = ca, sa
     if axis == 1:
         ux, uy = -sa, ca
     offset = dx * ux + dy * uy
-    spread = bodies.size[b, 0] * abs(cb * ux + sb * uy) + bodies.size[b, 1] * abs(cb * uy - sb * ux)
-    return abs(offset) - bodies.size[a, axis] - spread, math.copysign(1.0, offset)
+    spread = bodies.real[b, SIZE] * abs(cb * ux + sb * uy) + bodies.real[b, SIZE + 1] * abs(cb * uy - sb * ux)
+    return abs(offset) - bodies.real[a, SIZE + axis] - spread, math.copysign(1.0, offset)
 
 
-@kernel
+@inner_kernel
 def box_box(bodies: Bodies, a: int, b: int, reach: float, rows: Rows, c: int) -> int:
     """Up to two points of boxes a < b."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
-    advantage = AXIS_ADVANTAGE * min(bodies.extent[a], bodies.extent[b])
+    advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
     best, reference, axis, side = -math.inf, a, 0, 1.0
     for candidate in range(4):
         k = candidate % 2
@@ -52,7 +53,7 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, rows: Rows, c: int) ->
     return clip_edge(bodies, b, a, -dx, -dy, axis, side, reach, rows, c)
 
 
-@kernel
+@inner_kernel
 def clip_edge(
     bodies: Bodies, r: int, i: int, dx: float, dy: float, axis: int, side: float, reach: float, rows: Rows, c: int
 ) -> int:
@@ -60,19 +61,19 @@ def clip_edge(
 
     (dx, dy) leads from r's centre to i's. Coordinates (p, q) below: along the reference normal and its tangent.
     """
-    cr, sr = bodies.turn[r, 0], bodies.turn[r, 1]
+    cr, sr = bodies.real[r, COS], bodies.real[r, SIN]
     nx, ny = side * cr, side * sr
     if axis == 1:
         nx, ny = -side * sr, side * cr
-    ci, si = bodies.turn[i, 0], bodies.turn[i, 1]
+    ci, si = bodies.real[i, COS], bodies.real[i, SIN]
     along_x, along_y = nx * ci + ny * si, ny * ci - nx * si  # reference normal in i's axes
     edge = 0 if abs(along_x) > abs(along_y) else 1  # axis of i whose face looks at r
     toward = -math.copysign(1.0, along_x if edge == 0 else along_y)
-    depth_p, depth_q = face_vector(ci, si, edge, toward * bodies.size[i, edge], nx, ny)
-    reach_p, reach_q = face_vector(ci, si, 1 - edge, bodies.size[i, 1 - edge], nx, ny)
+    depth_p, depth_q = face_vector(ci, si, edge, toward * bodies.real[i, SIZE + edge], nx, ny)
+    reach_p, reach_q = face_vector(ci, si, 1 - edge, bodies.real[i, SIZE + (1 - edge)], nx, ny)
     mid_p = nx * dx + ny * dy + depth_p
     mid_q = nx * dy - ny * dx + depth_q
-    half_width = bodies.size[r, 1 - axis]
+    half_width = bodies.real[r, SIZE + (1 - axis)]
     share = share_of_gap(bodies, r, i)
     found = 0
     for end in range(2):
@@ -84,7 +85,7 @@ def clip_edge(
             return 0
         s = min(1.0, high) if end == 1 else max(-1.0, low)
         p, q = mid_p + s * reach_p, mid_q + s * reach_q
-        gap = p - bodies.size[r, axis]
+        gap = p - bodies.real[r, SIZE + axis]
         if gap > reach:
             continue
         p -= (1.0 - share) * gap
@@ -96,7 +97,7 @@ def clip_edge(
     return found
 
 
-@kernel
+@inner_kernel
 def face_vector(co: float, si: float, axis: int, length: float, nx: float, ny: float) -> tuple[float, float]:
     """Vector of ``length`` along an own ``axis`` of a body turned by (co, si): parts along n and its tangent."""
     x, y = length * co, length * si

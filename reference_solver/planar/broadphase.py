@@ -4,46 +4,45 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.columns import COS, EXTENT, MOTION, SHAPE, SIN, SIZE
+from reference_solver.planar.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Indices, Options, Pairs, Rows
 
-from reference_solver.compilation import kernel
-from reference_solver.planar.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Options, Pairs, Rows
 
-
-@kernel
+@inner_kernel
 def bound_bodies(bodies: Bodies, pairs: Pairs, options: Options) -> None:
     """Axis-aligned bounds, widened by the detection margin; a half-space is unbounded."""
-    for i in range(len(bodies.shape)):
-        wide = bodies.size[i, 0]
+    for i in range(len(bodies.kind)):
+        wide = bodies.real[i, SIZE]
         high = wide
-        if bodies.shape[i] == HALF_SPACE:
+        if bodies.kind[i, SHAPE] == HALF_SPACE:
             wide = high = math.inf
-        elif bodies.shape[i] == BOX:
-            c, s = abs(bodies.turn[i, 0]), abs(bodies.turn[i, 1])
-            wide = c * bodies.size[i, 0] + s * bodies.size[i, 1]
-            high = s * bodies.size[i, 0] + c * bodies.size[i, 1]
+        elif bodies.kind[i, SHAPE] == BOX:
+            c, s = abs(bodies.real[i, COS]), abs(bodies.real[i, SIN])
+            wide = c * bodies.real[i, SIZE] + s * bodies.real[i, SIZE + 1]
+            high = s * bodies.real[i, SIZE] + c * bodies.real[i, SIZE + 1]
         # A pair's margin is the smaller of both extents, so that one body's own margin always covers it.
-        grow = options.margin * bodies.extent[i] + 1e-15 * (abs(bodies.pose[i, 0]) + abs(bodies.pose[i, 1]))
-        pairs.low[i, 0] = bodies.pose[i, 0] - wide - grow
-        pairs.high[i, 0] = bodies.pose[i, 0] + wide + grow
-        pairs.low[i, 1] = bodies.pose[i, 1] - high - grow
-        pairs.high[i, 1] = bodies.pose[i, 1] + high + grow
+        grow = options.margin * bodies.real[i, EXTENT] + 1e-15 * (abs(bodies.pose[i, 0]) + abs(bodies.pose[i, 1]))
+        pairs.bounds[i, 0] = bodies.pose[i, 0] - wide - grow
+        pairs.bounds[i, 1] = bodies.pose[i, 1] - high - grow
+        pairs.bounds[i, 2] = bodies.pose[i, 0] + wide + grow
+        pairs.bounds[i, 3] = bodies.pose[i, 1] + high + grow
 
 
-@kernel
+@inner_kernel
 def may_touch(bodies: Bodies, pairs: Pairs, i: int, j: int) -> bool:
     """Bounds overlap and at least one body can respond."""
-    if bodies.motion[i] != FREE and bodies.motion[j] != FREE:
+    if bodies.kind[i, MOTION] != FREE and bodies.kind[j, MOTION] != FREE:
         return False
-    if bodies.shape[i] == HALF_SPACE or bodies.shape[j] == HALF_SPACE:
+    if bodies.kind[i, SHAPE] == HALF_SPACE or bodies.kind[j, SHAPE] == HALF_SPACE:
         return True
     for axis in range(2):
-        if pairs.low[i, axis] > pairs.high[j, axis] or pairs.low[j, axis] > pairs.high[i, axis]:
+        if pairs.bounds[i, axis] > pairs.bounds[j, axis + 2] or pairs.bounds[j, axis] > pairs.bounds[i, axis + 2]:
             return False
     return True
 
 
-@kernel
+@inner_kernel
 def add_candidate(bodies: Bodies, pairs: Pairs, rows: Rows, i: int, j: int) -> bool:
     """Store the pair if it may touch; False if there is no room."""
     if not may_touch(bodies, pairs, i, j):
@@ -51,17 +50,17 @@ def add_candidate(bodies: Bodies, pairs: Pairs, rows: Rows, i: int, j: int) -> b
     count = rows.count[CANDIDATES]
     if count == len(pairs.candidate):
         return False
-    pairs.candidate[count] = min(i, j) * len(bodies.shape) + max(i, j)
+    pairs.candidate[count] = min(i, j) * len(bodies.kind) + max(i, j)
     rows.count[CANDIDATES] = count + 1
     return True
 
 
-@kernel
+@inner_kernel
 def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill `Pairs.candidate` in ascending order; False if there is no room."""
     bound_bodies(bodies, pairs, options)
     rows.count[CANDIDATES] = 0
-    n = len(bodies.shape)
+    n = len(bodies.kind)
     if options.broadphase:
         return sweep_candidates(bodies, pairs, rows)
     for i in range(n):
@@ -71,22 +70,57 @@ def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) 
     return True
 
 
-@kernel
+@inner_kernel
 def sweep_candidates(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
-    """Sort and sweep along x: only bodies whose x-intervals overlap are paired; then sort the keys.
+    """Sort and sweep along x: only bodies whose x-intervals overlap are paired; then sort the pairs.
 
     An unbounded body has its lower end at -inf, stays open to the end, and so meets every other one.
     """
-    order = np.argsort(pairs.low[:, 0])
-    n = len(order)
+    sort_by_lower_x(pairs)
+    n = len(pairs.order)
     for s in range(n):
-        i = order[s]
+        i = pairs.order[s]
         for r in range(s + 1, n):
-            j = order[r]
-            if pairs.low[j, 0] > pairs.high[i, 0]:
+            j = pairs.order[r]
+            if pairs.bounds[j, 0] > pairs.bounds[i, 2]:
                 break
             if not add_candidate(bodies, pairs, rows, i, j):
                 return False
-    count = rows.count[CANDIDATES]
-    pairs.candidate[:count] = np.sort(pairs.candidate[:count])
+    sort_candidates(pairs, rows.count[CANDIDATES])
     return True
+
+
+@inner_kernel
+def sort_by_lower_x(pairs: Pairs) -> None:
+    """Insertion sort from the order of the step before, which is nearly right: bodies move little per step."""
+    for s in range(1, len(pairs.order)):
+        body = pairs.order[s]
+        r = s
+        while r > 0 and pairs.bounds[pairs.order[r - 1], 0] > pairs.bounds[body, 0]:
+            pairs.order[r] = pairs.order[r - 1]
+            r -= 1
+        pairs.order[r] = body
+
+
+@inner_kernel
+def sort_candidates(pairs: Pairs, count: int) -> None:
+    """Heap sort of the candidate keys, in place: no memory is allocated inside kernels."""
+    key = pairs.candidate
+    for root in range(count // 2 - 1, -1, -1):
+        sift_down(key, root, count)
+    for end in range(count - 1, 0, -1):
+        key[0], key[end] = key[end], key[0]
+        sift_down(key, 0, end)
+
+
+@inner_kernel
+def sift_down(key: Indices, root: int, end: int) -> None:
+    """Restore the heap below ``root``."""
+    while 2 * root + 1 < end:
+        child = 2 * root + 1
+        if child + 1 < end and key[child + 1] > key[child]:
+            child += 1
+        if key[root] >= key[child]:
+            return
+        key[root], key[child] = key[child], key[root]
+        root = child

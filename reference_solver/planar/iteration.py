@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_blocks
 from reference_solver.planar.residual import natural_map
@@ -20,7 +20,7 @@ RATE_INTERVAL = 16
 LARGEST_RELAXATION = 1.99
 
 
-@kernel
+@inner_kernel
 def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
     """One sweep of the solver chosen."""
     if options.solver == BLOCK:
@@ -29,7 +29,7 @@ def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> No
         sweep_rows(bodies, rows, options, relaxation)
 
 
-@kernel
+@inner_kernel
 def better_relaxation(relaxation: float, rate: float) -> float:
     """Factor that suits a contraction ``rate`` per sweep measured at ``relaxation`` (E13).
 
@@ -45,7 +45,7 @@ def better_relaxation(relaxation: float, rate: float) -> float:
     return min(max(best, relaxation), LARGEST_RELAXATION)
 
 
-@kernel
+@inner_kernel
 def solve_velocities(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     """Sweep as `Options` asks and enter residual and sweeps in the tally."""
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0

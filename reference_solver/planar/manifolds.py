@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import find_candidates
+from reference_solver.planar.columns import FEATURE, IMPACT, PN, PT, A, B
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import (
     CANDIDATES,
@@ -18,7 +19,7 @@ from reference_solver.planar.state import (
 )
 
 
-@kernel
+@inner_kernel
 def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill the geometry of all rows; False if an array is too small (nothing but rows has changed then).
 
@@ -27,10 +28,10 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """
     if not find_candidates(bodies, pairs, rows, options):
         return False
-    n = len(bodies.shape)
+    n = len(bodies.kind)
     contacts, manifolds = 0, 0
     for k in range(rows.count[CANDIDATES]):
-        if contacts + 2 > len(rows.gap):
+        if contacts + 2 > len(rows.real):
             return False
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
         found = collide(bodies, a, b, options.margin, rows, contacts)
@@ -44,32 +45,32 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def row_key(bodies: Bodies, rows: Rows, c: int) -> int:
     """(a, b, feature) as one integer that sorts like the triple."""
-    return (rows.body_a[c] * len(bodies.shape) + rows.body_b[c]) * FEATURES + rows.feature[c]
+    return (rows.index[c, A] * len(bodies.kind) + rows.index[c, B]) * FEATURES + rows.index[c, FEATURE]
 
 
-@kernel
+@inner_kernel
 def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
     """Give each row the impulse of the same feature one step before: a merge of two sorted key lists."""
     old = 0
     for c in range(rows.count[CONTACTS]):
-        rows.impulse[c, 0] = rows.impulse[c, 1] = 0.0
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
         key = row_key(bodies, rows, c)
         while old < rows.count[REMEMBERED] and rows.old_key[old] < key:
             old += 1
         if options.warm_starting and old < rows.count[REMEMBERED] and rows.old_key[old] == key:
-            rows.impulse[c, 0] = rows.old_impulse[old, 0]
-            rows.impulse[c, 1] = rows.old_impulse[old, 1]
+            rows.real[c, PN] = rows.old_impulse[old, 0]
+            rows.real[c, PT] = rows.old_impulse[old, 1]
 
 
-@kernel
+@inner_kernel
 def remember(bodies: Bodies, rows: Rows) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
     for c in range(rows.count[CONTACTS]):
-        kept = 0.0 if rows.bounce[c] else 1.0
+        kept = 0.0 if rows.index[c, IMPACT] else 1.0
         rows.old_key[c] = row_key(bodies, rows, c)
-        rows.old_impulse[c, 0] = kept * rows.impulse[c, 0]
-        rows.old_impulse[c, 1] = kept * rows.impulse[c, 1]
+        rows.old_impulse[c, 0] = kept * rows.real[c, PN]
+        rows.old_impulse[c, 1] = kept * rows.real[c, PT]
     rows.count[REMEMBERED] = rows.count[CONTACTS]

@@ -11,64 +11,65 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.box_box import box_box
-from reference_solver.planar.state import BOX, DISC, FREE, HALF_SPACE, Bodies, Rows
+from reference_solver.planar.columns import COS, EXTENT, SHAPE, SIN, SIZE
 from reference_solver.planar.points import share_of_gap, write_point
+from reference_solver.planar.state import DISC, HALF_SPACE, Bodies, Rows
 
 
-@kernel
+@inner_kernel
 def collide(bodies: Bodies, a: int, b: int, margin: float, rows: Rows, c: int) -> int:
     """Write the contact points of bodies a < b at rows c, c + 1 and return how many."""
     first, second = a, b
-    if bodies.shape[a] > bodies.shape[b]:
+    if bodies.kind[a, SHAPE] > bodies.kind[b, SHAPE]:
         first, second = b, a
-    reach = margin * min(bodies.extent[a], bodies.extent[b])
-    if bodies.shape[first] == HALF_SPACE:
-        if bodies.shape[second] == DISC:
+    reach = margin * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+    if bodies.kind[first, SHAPE] == HALF_SPACE:
+        if bodies.kind[second, SHAPE] == DISC:
             return half_space_disc(bodies, first, second, reach, rows, c)
         return half_space_box(bodies, first, second, reach, rows, c)
-    if bodies.shape[first] == DISC:
-        if bodies.shape[second] == DISC:
+    if bodies.kind[first, SHAPE] == DISC:
+        if bodies.kind[second, SHAPE] == DISC:
             return disc_disc(bodies, first, second, reach, rows, c)
         return disc_box(bodies, first, second, reach, rows, c)
     return box_box(bodies, first, second, reach, rows, c)
 
 
-@kernel
+@inner_kernel
 def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and disc s: one point under the centre."""
-    co, si = bodies.turn[f, 0], bodies.turn[f, 1]
-    nx = co * bodies.size[f, 0] - si * bodies.size[f, 1]
-    ny = si * bodies.size[f, 0] + co * bodies.size[f, 1]
+    co, si = bodies.real[f, COS], bodies.real[f, SIN]
+    nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
+    ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
     dx = bodies.pose[s, 0] - bodies.pose[f, 0]
     dy = bodies.pose[s, 1] - bodies.pose[f, 1]
-    radius = bodies.size[s, 0]
-    gap = nx * dx + ny * dy - bodies.size[f, 2] - radius
+    radius = bodies.real[s, SIZE]
+    gap = nx * dx + ny * dy - bodies.real[f, SIZE + 2] - radius
     if gap > reach:
         return 0
     write_point(rows, c, f, s, 0, nx, ny, dx - radius * nx, dy - radius * ny, -radius * nx, -radius * ny, gap)
     return 1
 
 
-@kernel
+@inner_kernel
 def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and box s: the two corners of the face that looks most against the normal."""
-    co, si = bodies.turn[f, 0], bodies.turn[f, 1]
-    nx = co * bodies.size[f, 0] - si * bodies.size[f, 1]
-    ny = si * bodies.size[f, 0] + co * bodies.size[f, 1]
+    co, si = bodies.real[f, COS], bodies.real[f, SIN]
+    nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
+    ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
     dx = bodies.pose[s, 0] - bodies.pose[f, 0]
     dy = bodies.pose[s, 1] - bodies.pose[f, 1]
-    height = nx * dx + ny * dy - bodies.size[f, 2]
-    cs, ss = bodies.turn[s, 0], bodies.turn[s, 1]
+    height = nx * dx + ny * dy - bodies.real[f, SIZE + 2]
+    cs, ss = bodies.real[s, COS], bodies.real[s, SIN]
     along_x, along_y = nx * cs + ny * ss, ny * cs - nx * ss  # the normal in the box's axes
     found = 0
     for end in range(2):
         free_side = 1.0 if end == 1 else -1.0
         if abs(along_x) > abs(along_y):
-            qx, qy = -math.copysign(bodies.size[s, 0], along_x), free_side * bodies.size[s, 1]
+            qx, qy = -math.copysign(bodies.real[s, SIZE], along_x), free_side * bodies.real[s, SIZE + 1]
         else:
-            qx, qy = free_side * bodies.size[s, 0], -math.copysign(bodies.size[s, 1], along_y)
+            qx, qy = free_side * bodies.real[s, SIZE], -math.copysign(bodies.real[s, SIZE + 1], along_y)
         gap = height + along_x * qx + along_y * qy
         if gap <= reach:
             feature = (2 if qx > 0.0 else 0) + (1 if qy > 0.0 else 0)
@@ -78,32 +79,32 @@ def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: 
     return found
 
 
-@kernel
+@inner_kernel
 def disc_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Discs f and s: one point on the line of centres; concentric discs separate along x."""
     dx = bodies.pose[s, 0] - bodies.pose[f, 0]
     dy = bodies.pose[s, 1] - bodies.pose[f, 1]
     distance = math.sqrt(dx * dx + dy * dy)
-    gap = distance - bodies.size[f, 0] - bodies.size[s, 0]
+    gap = distance - bodies.real[f, SIZE] - bodies.real[s, SIZE]
     if gap > reach:
         return 0
     nx, ny = 1.0, 0.0
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
     share = share_of_gap(bodies, f, s)
-    near, far = bodies.size[f, 0] + share * gap, bodies.size[s, 0] + (1.0 - share) * gap
+    near, far = bodies.real[f, SIZE] + share * gap, bodies.real[s, SIZE] + (1.0 - share) * gap
     write_point(rows, c, f, s, 0, nx, ny, near * nx, near * ny, -far * nx, -far * ny, gap)
     return 1
 
 
-@kernel
+@inner_kernel
 def disc_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Disc f and box s: nearest point of the box, or its nearest face if the centre is inside."""
     dx = bodies.pose[f, 0] - bodies.pose[s, 0]
     dy = bodies.pose[f, 1] - bodies.pose[s, 1]
-    cs, ss = bodies.turn[s, 0], bodies.turn[s, 1]
+    cs, ss = bodies.real[s, COS], bodies.real[s, SIN]
     px, py = cs * dx + ss * dy, cs * dy - ss * dx  # disc's centre in the box's axes
-    hx, hy = bodies.size[s, 0], bodies.size[s, 1]
+    hx, hy = bodies.real[s, SIZE], bodies.real[s, SIZE + 1]
     qx, qy = min(max(px, -hx), hx), min(max(py, -hy), hy)
     ex, ey = px - qx, py - qy  # outward, from the box to the disc
     distance = math.sqrt(ex * ex + ey * ey)
@@ -113,11 +114,11 @@ def disc_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -
         distance, ex, ey = abs(px) - hx, math.copysign(1.0, px), 0.0
     else:
         distance, ex, ey = abs(py) - hy, 0.0, math.copysign(1.0, py)
-    gap = distance - bodies.size[f, 0]
+    gap = distance - bodies.real[f, SIZE]
     if gap > reach:
         return 0
     nx, ny = -(cs * ex - ss * ey), -(ss * ex + cs * ey)
-    near = bodies.size[f, 0] + share_of_gap(bodies, f, s) * gap
+    near = bodies.real[f, SIZE] + share_of_gap(bodies, f, s) * gap
     ax, ay = near * nx, near * ny
     write_point(rows, c, f, s, 0, nx, ny, ax, ay, ax + dx, ay + dy, gap)
     return 1

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.columns import ARM_A, ARM_B, FEATURE, GAP, MOTION, NX, NY, A, B
 from reference_solver.planar.state import FREE, Bodies, Rows
 
 
-@kernel
+@inner_kernel
 def share_of_gap(bodies: Bodies, f: int, s: int) -> float:
     """Where the contact point lies across the gap: 0 on the first body's surface, 1 on the second's."""
-    if bodies.motion[s] != FREE:
+    if bodies.kind[s, MOTION] != FREE:
         return 0.0
-    if bodies.motion[f] != FREE:
+    if bodies.kind[f, MOTION] != FREE:
         return 1.0
     return 0.5
 
 
-@kernel
+@inner_kernel
 def write_point(
     rows: Rows,
     c: int,
@@ -32,15 +33,15 @@ def write_point(
     gap: float,
 ) -> None:
     """Store one point given from first to second: normal (nx, ny), arms (fx, fy) of first, (sx, sy) of second."""
-    rows.feature[c] = feature
-    rows.gap[c] = gap
+    rows.index[c, FEATURE] = feature
+    rows.real[c, GAP] = gap
     if f < s:
-        rows.body_a[c], rows.body_b[c] = f, s
-        rows.normal[c, 0], rows.normal[c, 1] = nx, ny
-        rows.arm_a[c, 0], rows.arm_a[c, 1] = fx, fy
-        rows.arm_b[c, 0], rows.arm_b[c, 1] = sx, sy
+        rows.index[c, A], rows.index[c, B] = f, s
+        rows.real[c, NX], rows.real[c, NY] = nx, ny
+        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = fx, fy
+        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = sx, sy
     else:
-        rows.body_a[c], rows.body_b[c] = s, f
-        rows.normal[c, 0], rows.normal[c, 1] = -nx, -ny
-        rows.arm_a[c, 0], rows.arm_a[c, 1] = sx, sy
-        rows.arm_b[c, 0], rows.arm_b[c, 1] = fx, fy
+        rows.index[c, A], rows.index[c, B] = s, f
+        rows.real[c, NX], rows.real[c, NY] = -nx, -ny
+        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = sx, sy
+        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = fx, fy

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_block_pushes
+from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, A, B
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.sequential_impulses import sweep_pushes
 from reference_solver.planar.state import BLOCK, CONTACTS, SPLIT, Bodies, Options, Rows
@@ -19,32 +20,32 @@ PUSH_TOLERANCE = 1e-4
 PUSH_SWEEPS = 1000
 
 
-@kernel
+@inner_kernel
 def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
     """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest."""
     largest = 0.0
     for c in range(rows.count[CONTACTS]):
-        rows.push[c] = 0.0
-        extent = min(bodies.extent[rows.body_a[c]], bodies.extent[rows.body_b[c]])
+        rows.real[c, PUSH] = 0.0
+        extent = min(bodies.real[rows.index[c, A], EXTENT], bodies.real[rows.index[c, B], EXTENT])
         # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
-        after = rows.gap[c] + options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
+        after = rows.real[c, GAP] + options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
         excess = -after - max(options.slop, ROUND_OFF * extent)
         # Within what is allowed a contact may close, but not farther (negative target).
-        rows.push_target[c] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
-        largest = max(largest, rows.push_target[c])
+        rows.real[c, PUSH_TARGET] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
+        largest = max(largest, rows.real[c, PUSH_TARGET])
     return largest
 
 
-@kernel
+@inner_kernel
 def missing_push(bodies: Bodies, rows: Rows) -> float:
     """Largest shortfall of a pseudo-velocity [m/s]."""
     worst = 0.0
     for c in range(rows.count[CONTACTS]):
-        worst = max(worst, rows.push_target[c] - normal_velocity(bodies.pseudo, rows, c))
+        worst = max(worst, rows.real[c, PUSH_TARGET] - normal_velocity(bodies.pseudo, rows, c))
     return worst
 
 
-@kernel
+@inner_kernel
 def correct_positions(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> bool:
     """Solve for pseudo-velocities where anything overlaps too far; True if there are any."""
     if options.correction != SPLIT:

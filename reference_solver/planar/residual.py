@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, SPEED, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
 from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
 
@@ -11,21 +12,21 @@ from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
 IMPULSE_SHARE = 0.1
 
 
-@kernel
+@inner_kernel
 def natural_map(bodies: Bodies, rows: Rows, options: Options) -> float:
     """Largest scaled natural-map residual over all rows, dimensionless."""
     worst = 0.0
     for c in range(rows.count[CONTACTS]):
-        normal_impulse = rows.impulse[c, 0]
-        step = (normal_velocity(bodies.twist, rows, c) - rows.target[c]) * rows.normal_mass[c]
+        normal_impulse = rows.real[c, PN]
+        step = (normal_velocity(bodies.twist, rows, c) - rows.real[c, TARGET]) * rows.real[c, NORMAL_MASS]
         defect = abs(normal_impulse - max(normal_impulse - step, 0.0))
-        scale = max(rows.normal_mass[c] * rows.speed[c], IMPULSE_SHARE * normal_impulse)
+        scale = max(rows.real[c, NORMAL_MASS] * rows.real[c, SPEED], IMPULSE_SHARE * normal_impulse)
         if options.friction:
-            bound = rows.friction[c] * normal_impulse
-            tangent = rows.impulse[c, 1]
-            moved = tangent - tangent_velocity(bodies.twist, rows, c) * rows.tangent_mass[c]
+            bound = rows.real[c, FRICTION] * normal_impulse
+            tangent = rows.real[c, PT]
+            moved = tangent - tangent_velocity(bodies.twist, rows, c) * rows.real[c, TANGENT_MASS]
             slip_defect = abs(tangent - min(max(moved, -bound), bound))
-            slip_scale = max(rows.tangent_mass[c] * rows.speed[c], IMPULSE_SHARE * normal_impulse)
+            slip_scale = max(rows.real[c, TANGENT_MASS] * rows.real[c, SPEED], IMPULSE_SHARE * normal_impulse)
             if slip_defect > worst * slip_scale:
                 worst = slip_defect / slip_scale if slip_scale > 0.0 else 1.0
         if defect > worst * scale:

@@ -13,6 +13,21 @@ from numpy.typing import NDArray
 
 from reference_solver.model import Array, Body, Box, Disc, HalfSpace, Model, smallest_extent
 from reference_solver.needs import Needs
+from reference_solver.planar.columns import (
+    BODY_INTEGERS,
+    BODY_REALS,
+    COS,
+    EXTENT,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LOAD,
+    MOTION,
+    ROW_INTEGERS,
+    ROW_REALS,
+    SHAPE,
+    SIN,
+    SIZE,
+)
 from reference_solver.settings import Settings
 
 Indices = NDArray[np.int64]
@@ -35,15 +50,9 @@ class Bodies(NamedTuple):
 
     pose: Array  # (n, 3): x, y [m], angle [rad]
     twist: Array  # (n, 3): vx, vy [m/s], omega [rad/s]
-    turn: Array  # (n, 2): cos and sin of the angle
     pseudo: Array  # (n, 3): pseudo-velocity of position correction
-    acceleration: Array  # (n, 3): M^-1 f of gravity and constant loads
-    inverse_mass: Array  # (n,): 0 unless free
-    inverse_inertia: Array  # (n,): 0 unless free, and 0 throughout where rotation is left out
-    shape: Indices  # (n,)
-    size: Array  # (n, 3): disc (radius, ., .), box (half extents, .), half-space (normal, offset)
-    extent: Array  # (n,): smallest half width [m]
-    motion: Indices  # (n,)
+    real: Array  # (n, BODY_REALS)
+    kind: Indices  # (n, BODY_INTEGERS)
 
 
 class Pairs(NamedTuple):
@@ -51,38 +60,20 @@ class Pairs(NamedTuple):
 
     restitution: Array  # (n, n)
     friction: Array  # (n, n)
-    low: Array  # (n, 2): lower corner of the bounding box
-    high: Array  # (n, 2): upper corner
+    bounds: Array  # (n, 4): lower and upper corner of the bounding box
+    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
 
 
 class Rows(NamedTuple):
-    """Contact points of the current step, and what is remembered of the step before."""
+    """Contact points c of the current step, and what is remembered of the step before."""
 
     count: Indices  # (4,): see CONTACTS .. CANDIDATES
-    body_a: Indices  # (c,)
-    body_b: Indices
-    feature: Indices
-    normal: Array  # (c, 2), from A to B; the tangent is the normal turned by +90 degrees
-    arm_a: Array  # (c, 2): contact point minus centre of A [m]
-    arm_b: Array
-    point: Array  # (c, 2): in world axes at detection, for records only [m]
-    gap: Array  # (c,) [m], < 0 overlap
-    lever: Array  # (c, 4): r_A x n, r_B x n, r_A x t, r_B x t (E2)
-    normal_mass: Array  # (c,): 1 / k_n (E3)
-    tangent_mass: Array  # (c,): 1 / k_t
-    coupling: Array  # (c,): k_nt
-    friction: Array  # (c,): mu
-    approach: Array  # (c,): u_n before forces (E6)
-    target: Array  # (c,): b_n (E7)
-    bounce: Indices  # (c,): 1 where bodies meet or part faster than the loads of one step explain
-    speed: Array  # (c,): reference speed of the residual (E14) [m/s]
-    impulse: Array  # (c, 2): accumulated normal and tangential impulse [N s]
-    push: Array  # (c,): accumulated pseudo-impulse
-    push_target: Array  # (c,): pseudo-velocity to reach [m/s]
+    index: Indices  # (c, ROW_INTEGERS)
+    real: Array  # (c, ROW_REALS)
     manifold: Indices  # (m + 1,): first row of each manifold
     block: Array  # (m, 4, 4): W of a two-point manifold, rows n1, t1, n2, t2 (E12)
-    local: Array  # (3, 4): impulses, velocities and trial of the block being solved
+    local: Array  # (2, 4): impulses and velocities of the block being solved
     old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
     old_impulse: Array  # (c, 2)
 
@@ -108,43 +99,37 @@ class Options(NamedTuple):
 
 
 class Buffer(NamedTuple):
-    """Samples of a run; contact arrays of length 0 where contacts are not recorded."""
+    """Samples of a run; `index` and `real` of length 0 where contacts are not recorded."""
 
-    pose: Array
-    twist: Array
-    offset: Indices
-    body_a: Indices
-    body_b: Indices
-    feature: Indices
-    point: Array
-    normal: Array
-    impulse: Array
-    gap: Array
+    pose: Array  # (s, n, 3)
+    twist: Array  # (s, n, 3)
+    offset: Indices  # (s + 1,)
+    index: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     """Return the start state of ``model``."""
     n = len(model.bodies)
     free = np.array([body.motion == "free" for body in model.bodies])
-    pose = np.array([body.pose for body in model.bodies], dtype=np.float64)
     load = np.array([[*body.force, body.torque] for body in model.bodies], dtype=np.float64)  # type: ignore[misc]
     mass = np.array([body.mass if body.motion == "free" else np.inf for body in model.bodies])
     inertia = np.array([body.inertia if body.motion == "free" else np.inf for body in model.bodies])
-    acceleration = load / np.column_stack([mass, mass, inertia])
-    acceleration[free, :2] += model.gravity
-    return Bodies(
-        pose=pose,
-        twist=np.array([body.twist for body in model.bodies], dtype=np.float64),
-        turn=np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])]),
-        pseudo=np.zeros((n, 3)),
-        acceleration=acceleration,
-        inverse_mass=1.0 / mass,
-        inverse_inertia=1.0 / inertia if needs.rotation else np.zeros(n),
-        shape=np.array([_SHAPE_CODE[type(body.shape)] for body in model.bodies]),
-        size=np.array([_size(body) for body in model.bodies]),
-        extent=np.array([smallest_extent(body.shape) for body in model.bodies]),
-        motion=np.array([_MOTION_CODE[body.motion] for body in model.bodies]),
-    )
+    load /= np.column_stack([mass, mass, inertia])
+    load[free, :2] += model.gravity
+    pose = np.array([body.pose for body in model.bodies], dtype=np.float64)
+    real = np.zeros((n, BODY_REALS))
+    real[:, COS], real[:, SIN] = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    real[:, LOAD : LOAD + 3] = load
+    real[:, INVERSE_MASS] = 1.0 / mass
+    real[:, INVERSE_INERTIA] = 1.0 / inertia if needs.rotation else 0.0
+    real[:, SIZE : SIZE + 3] = [_size(body) for body in model.bodies]
+    real[:, EXTENT] = [smallest_extent(body.shape) for body in model.bodies]
+    kind = np.zeros((n, BODY_INTEGERS), np.int64)
+    kind[:, SHAPE] = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
+    kind[:, MOTION] = [_MOTION_CODE[body.motion] for body in model.bodies]
+    twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
+    return Bodies(pose, twist, np.zeros((n, 3)), real, kind)
 
 
 _SHAPE_CODE = {HalfSpace: HALF_SPACE, Disc: DISC, Box: BOX}
@@ -165,26 +150,26 @@ def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
     n = len(model.bodies)
     room = np.zeros(capacity, np.int64)
-    return Pairs(model.restitution.copy(), model.friction.copy(), np.zeros((n, 2)), np.zeros((n, 2)), room)
+    return Pairs(model.restitution.copy(), model.friction.copy(), np.zeros((n, 4)), np.arange(n), room)
 
 
 def allocate_rows(capacity: int) -> Rows:
     """Return room for ``capacity`` contact points."""
-    shapes: dict[str, tuple[int, ...]] = {"point": (2,), "normal": (2,), "arm_a": (2,), "arm_b": (2,), "lever": (4,)}
-    shapes |= {"impulse": (2,), "old_impulse": (2,), "block": (4, 4)}
-    integers = {"body_a", "body_b", "feature", "bounce", "old_key"}
-    fields: dict[str, NDArray[np.generic]] = {
-        name: np.zeros((capacity, *shapes.get(name, ())), np.int64 if name in integers else np.float64)
-        for name in Rows._fields
-    }
-    fields |= {"count": np.zeros(4, np.int64), "manifold": np.zeros(capacity + 1, np.int64)}
-    fields["local"] = np.zeros((3, 4))
-    return Rows(**fields)  # type: ignore[arg-type]
+    return Rows(
+        count=np.zeros(4, np.int64),
+        index=np.zeros((capacity, ROW_INTEGERS), np.int64),
+        real=np.zeros((capacity, ROW_REALS)),
+        manifold=np.zeros(capacity + 1, np.int64),
+        block=np.zeros((capacity, 4, 4)),
+        local=np.zeros((2, 4)),
+        old_key=np.zeros(capacity, np.int64),
+        old_impulse=np.zeros((capacity, 2)),
+    )
 
 
 def grown(rows: Rows) -> Rows:
     """Return twice the room, with what is remembered of the step before; the current step must be redone."""
-    bigger = allocate_rows(2 * len(rows.gap))
+    bigger = allocate_rows(2 * len(rows.real))
     bigger.count[:] = rows.count
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse

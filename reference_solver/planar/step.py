@@ -1,15 +1,16 @@
 """The step, and the loop over steps that a whole run is one call of.
 
-    detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
+detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
 """
 
 from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
+from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import correct_positions
@@ -17,28 +18,28 @@ from reference_solver.planar.rows import prepare, warm_start
 from reference_solver.planar.state import BLOCK, CONTACTS, FIXED, FREE, Bodies, Buffer, Options, Pairs, Rows
 
 
-@kernel
+@inner_kernel
 def accelerate(bodies: Bodies, options: Options) -> None:
     """v* = v + h M^-1 f (E5)."""
-    for i in range(len(bodies.motion)):
-        if bodies.motion[i] == FREE:
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
             for k in range(3):
-                bodies.twist[i, k] += options.dt * bodies.acceleration[i, k]
+                bodies.twist[i, k] += options.dt * bodies.real[i, LOAD + k]
 
 
-@kernel
+@inner_kernel
 def move(bodies: Bodies, twist: Array, dt: float) -> None:
     """x += h v for everything that is not fixed (E17)."""
-    for i in range(len(bodies.motion)):
-        if bodies.motion[i] != FIXED:
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] != FIXED:
             for k in range(3):
                 bodies.pose[i, k] += dt * twist[i, k]
             if twist[i, 2] != 0.0:
-                bodies.turn[i, 0] = math.cos(bodies.pose[i, 2])
-                bodies.turn[i, 1] = math.sin(bodies.pose[i, 2])
+                bodies.real[i, COS] = math.cos(bodies.pose[i, 2])
+                bodies.real[i, SIN] = math.sin(bodies.pose[i, 2])
 
 
-@kernel
+@inner_kernel
 def step(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, tally: Array) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
     if not detect(bodies, pairs, rows, options):
@@ -77,7 +78,7 @@ def run_steps(
     """
     for k in range(first, steps):
         sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and buffer.gap.size > 0 and buffer.offset[k // stride] + len(rows.gap) > buffer.gap.size:
+        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(rows.real) > len(buffer.real):
             return k
         if not step(bodies, pairs, rows, options, tally):
             return k
@@ -86,27 +87,32 @@ def run_steps(
     return steps
 
 
-@kernel
+@inner_kernel
 def sample(bodies: Bodies, rows: Rows, buffer: Buffer, s: int) -> None:
     """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    buffer.pose[s] = bodies.pose
-    buffer.twist[s] = bodies.twist
+    for i in range(len(bodies.kind)):
+        for k in range(3):
+            buffer.pose[s, i, k] = bodies.pose[i, k]
+            buffer.twist[s, i, k] = bodies.twist[i, k]
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
-    if buffer.gap.size > 0:
-        copy_contacts(bodies, rows, buffer, start)
+    if len(buffer.real) > 0:
+        copy_contacts(rows, buffer, start)
         buffer.offset[s + 1] = start + rows.count[CONTACTS]
 
 
 @kernel
-def copy_contacts(bodies: Bodies, rows: Rows, buffer: Buffer, start: int) -> None:
-    """Contacts of the last step from index ``start`` on; points relative to where A was at detection."""
+def copy_contacts(rows: Rows, buffer: Buffer, start: int) -> None:
+    """Contacts of the last step, from index ``start`` on."""
     for c in range(rows.count[CONTACTS]):
         k = start + c
-        nx, ny = rows.normal[c, 0], rows.normal[c, 1]
-        buffer.body_a[k], buffer.body_b[k], buffer.feature[k] = rows.body_a[c], rows.body_b[c], rows.feature[c]
-        buffer.point[k] = rows.point[c]
-        buffer.normal[k] = rows.normal[c]
-        buffer.impulse[k, 0] = rows.impulse[c, 0] * nx - rows.impulse[c, 1] * ny
-        buffer.impulse[k, 1] = rows.impulse[c, 0] * ny + rows.impulse[c, 1] * nx
-        buffer.gap[k] = rows.gap[c]
+        nx, ny, pn, pt = rows.real[c, NX], rows.real[c, NY], rows.real[c, PN], rows.real[c, PT]
+        buffer.index[k, 0], buffer.index[k, 1], buffer.index[k, 2] = (
+            rows.index[c, A],
+            rows.index[c, B],
+            rows.index[c, FEATURE],
+        )
+        buffer.real[k, 0], buffer.real[k, 1] = rows.real[c, POINT], rows.real[c, POINT + 1]
+        buffer.real[k, 2], buffer.real[k, 3] = nx, ny
+        buffer.real[k, 4], buffer.real[k, 5] = pn * nx - pt * ny, pn * ny + pt * nx
+        buffer.real[k, 6] = rows.real[c, GAP]

@@ -49,7 +49,7 @@ class World:
         """Make ``steps`` steps, sampling after every ``stride`` (0: never)."""
         samples = steps // stride if stride else 0
         # Two points per body are typical; at most a million rows (80 MB) before it is known that they are needed.
-        room = len(self._rows.gap) + min(2 * samples * len(self.pose), 1_000_000) if contacts else 0
+        room = len(self._rows.real) + min(2 * samples * len(self.pose), 1_000_000) if contacts else 0
         buffer = self._buffer(samples, room)
         done = 0
         while True:
@@ -58,7 +58,7 @@ class World:
             )
             if done == steps:
                 break
-            if contacts and buffer.offset[done // stride] + len(self._rows.gap) > len(buffer.gap):
+            if contacts and buffer.offset[done // stride] + len(self._rows.real) > len(buffer.real):
                 buffer = self._doubled(buffer)
             else:
                 self._grow()
@@ -69,19 +69,17 @@ class World:
         """Contacts of the last step."""
         count = int(self._rows.count[CONTACTS])
         buffer = self._buffer(0, count)
-        copy_contacts(self._bodies, self._rows, buffer, 0)
+        copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
 
     def _buffer(self, samples: int, room: int) -> Buffer:
-        n = len(self._bodies.motion)
-        rows = Contacts.empty(room, 2)
-        columns = (rows.body_a, rows.body_b, rows.feature, rows.point, rows.normal, rows.impulse, rows.gap)
-        frames = np.zeros((samples, n, 3))
-        return Buffer(frames, frames.copy(), np.zeros(samples + 1, np.int64), *columns)
+        frames = np.zeros((samples, len(self.pose), 3))
+        offset = np.zeros(samples + 1, np.int64)
+        return Buffer(frames, frames.copy(), offset, np.zeros((room, 3), np.int64), np.zeros((room, 7)))
 
     def _doubled(self, buffer: Buffer) -> Buffer:
         """Twice the room for contacts, and what has been recorded so far."""
-        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.gap) + len(self._rows.gap)))
+        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + len(self._rows.real)))
         for old, new in zip(buffer, bigger, strict=True):
             new[: len(old)] = old
         return bigger
@@ -95,5 +93,8 @@ class World:
 
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:
-    columns = (buffer.body_a, buffer.body_b, buffer.feature, buffer.point, buffer.normal, buffer.impulse, buffer.gap)
-    return Contacts(*(np.array(column[:count]) for column in columns))
+    index, real = buffer.index[:count], buffer.real[:count]
+    body_a, body_b, feature = (index[:, k].copy() for k in range(3))
+    return Contacts(
+        body_a, body_b, feature, real[:, 0:2].copy(), real[:, 2:4].copy(), real[:, 4:6].copy(), real[:, 6].copy()
+    )
