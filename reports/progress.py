@@ -23,8 +23,12 @@ def run_plan(
     timeout: float = TIMEOUT,
     keep: Path | None = None,
     fresh: bool = False,
+    finish: bool = True,
 ) -> Run:
-    """Run what the store does not have yet of this plan; the observations are in the store afterwards."""
+    """Run what the store does not have yet of this plan; the observations are in the store afterwards.
+
+    ``finish`` marks the run as complete; a bench does so itself, after its timings.
+    """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
@@ -50,5 +54,6 @@ def run_plan(
         except KeyboardInterrupt:
             console.print("interrupted: what finished is kept, the same command resumes")
             raise
-    store.finish(run)
+    if finish:
+        store.finish(run)
     return run

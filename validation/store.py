@@ -141,14 +141,18 @@ class Store:
         return [self.run(run_id) for (run_id,) in ids]
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run.
+        """Return one run; the latest is a bench only if there is nothing else.
 
         Raises
         ------
         StoreError
             If there is none of that name.
         """
-        where, args = ("id = ?", (run_id,)) if run_id != "latest" else ("1 ORDER BY date DESC, id DESC LIMIT 1", ())
+        where, args = (
+            ("id = ?", (run_id,))
+            if run_id != "latest"
+            else ("1 ORDER BY title LIKE 'bench %', date DESC, id DESC LIMIT 1", ())
+        )
         columns = "id, date, commit_hash, machine, title, plan, finished"
         row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
         if row is None:
@@ -173,6 +177,10 @@ class Store:
         self._db.execute("BEGIN")
         self._db.executemany("INSERT OR REPLACE INTO timings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
         self._db.execute("COMMIT")
+
+    def clear_timings(self, run: Run) -> None:
+        """Drop the timings of a run that was interrupted: rounds of two lanes do not mix."""
+        self._db.execute("DELETE FROM timings WHERE run = ?", (run.id,))
 
     def timings(self, run: Run) -> list[Timing]:
         """Raw timings of a run, in the order in which they were taken."""

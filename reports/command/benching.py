@@ -1,0 +1,148 @@
+"""``bench``: what an answer of a given error costs."""
+
+from __future__ import annotations
+
+import os
+import random
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from adapters.scene import SceneError
+from reports import speed
+from reports.command.group import AS_JSON, OUT, main
+from reports.command.selection import request_from, selection
+from reports.progress import run_plan
+from validation.bench import agreement, reading
+from validation.bench.lane import FULL, QUICK, Limits, run_lane
+from validation.bench.primary import PRIMARY
+from validation.bench.sweep import Sweep, accuracy_slots, timed_units
+from validation.bench.units import Unit
+from validation.store import Run, Store, StoreError
+from validation.workers import TIMEOUT
+
+#: Two bench runs on one machine must agree within their intervals on this share of their ratios.
+AGREEMENT = 0.9
+
+
+@main.command()
+@selection
+@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes for the errors; 0: one per core.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=click.FloatRange(1.0), help="Per cell [s].")
+@click.option("--seed", type=int, help="Of the random order; drawn and printed if not given.")
+@click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
+@click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
+@click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@AS_JSON
+@OUT
+def bench(out: Path, as_json: bool, **options: Any) -> None:
+    """Measure errors and times of SCENES over steps and iterations; time at equal error, scaling, overhead.
+
+    Errors come first, in worker processes; then everything is timed in a lane of its own. --quick takes under two
+    minutes on two cores, --full about an hour. With --against, exits with 1 if fewer than 90 % of the ratios agree.
+    """
+    console = Console(stderr=True)
+    if options["ulp"]:
+        raise SceneError("ulp: moves the start of a run; a bench has no use for it")
+    options["full"] = not options["quick"]
+    request = replace(request_from(options), ulps=(0,))
+    wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
+    cells = accuracy_slots(wanted)
+    if not cells:
+        raise SceneError("scenes: no cell fits this selection")
+    if options["dry_run"]:
+        click.echo(f"{len(cells)} cells")
+        return
+    store = Store(out)
+    earlier = _earlier(store, options["against"])
+    seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
+    title = f"bench {request.suite}: {' '.join(request.scenes)}"
+    run = run_plan(
+        store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False
+    )
+    limits = QUICK if request.suite == "quick" else FULL
+    _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
+    store.finish(run)
+    _show(store, run, out, as_json, console)
+    agrees = _compare(store, earlier, run, console) if earlier else True
+    store.close()
+    sys.exit(0 if agrees else 1)
+
+
+def _earlier(store: Store, name: str | None) -> Run | None:
+    """Run to compare with; raises before anything runs."""
+    if name is None:
+        return None
+    found = [run for run in reading.bench_runs(store) if name in ("latest", run.id)]
+    if not found:
+        raise StoreError(f"against: there is no bench run {name!r} in {store.path}")
+    return found[-1]
+
+
+def _time(store: Store, run: Run, units: Sequence[Unit], limits: Limits, seed: int, console: Console) -> None:
+    console.print(f"timing {len(units)} units, one at a time, in random order (seed {seed})", highlight=False)
+    started, load = time.monotonic(), os.getloadavg()
+    store.clear_timings(run)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("timing", total=None)
+        for timing in run_lane(units, limits, seed):
+            store.add_timings(run, [timing])
+            slot = timing.slot
+            progress.update(task, description=f"round {timing.round + 1}: {slot.scene} on {slot.engine}")
+    protocol = {
+        "seed": seed,
+        "limits": asdict(limits),
+        "clock": "CPU time of the process (all threads), cost of reading the clock taken off; wall time beside it",
+        "unit": "build outside the clock, warm, then one call advance(n); 'sampled': one step at a time, state read",
+        "primary": {
+            scene: {name: getattr(p, name) for name in ("name", "unit", "law", "because", "state")}
+            for scene, p in PRIMARY.items()
+        },
+        "lane_seconds": round(time.monotonic() - started, 1),
+        "load_before": load,
+        "load_after": os.getloadavg(),
+    }
+    store.set_protocol(run, protocol)
+
+
+def _show(store: Store, run: Run, out: Path, as_json: bool, console: Console) -> None:
+    tables, protocol = speed.tables_of(store, run), store.protocol(run) or {}
+    written = speed.write_all(out, protocol, tables, speed.raw_of(store, run))
+    if as_json:
+        click.echo(speed.as_json(protocol, tables))
+    for table in speed.level_tables(tables["work_points"]):
+        console.print(table)
+    console.print("*: cheapest; -: not reached in this sweep; 1/240 x30: step and iterations that did it", style="dim")
+    console.print(speed.overhead_table(tables["overhead"]))
+    console.print(speed.scaling_table(tables["scaling"], tables["scaling_fits"]))
+    console.print(speed.quality_line(tables["timings"]), highlight=False)
+    console.print(f"run {run.id}, seed {protocol.get('seed')}; written: {written[0].parent}", highlight=False)
+
+
+def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:
+    """Say how far two bench runs agree; True if far enough."""
+    both = agreement.agreement(agreement.ratios(store, earlier), agreement.ratios(store, run))
+    if len(both) == 0:
+        console.print(f"against {earlier.id}: the two runs have no unit in common")
+        return False
+    share = float(both["agrees"].mean())
+    for row in both[~both["agrees"]].to_dict("records"):
+        console.print(_disagreement(row), highlight=False)
+    console.print(f"against {earlier.id}: {share:.1%} of {len(both)} ratios agree within their intervals")
+    return share >= AGREEMENT
+
+
+def _disagreement(row: Mapping[Any, Any]) -> str:
+    what = f"{row['purpose']} {row['scene']} {row['dimension']}-D {row['engine']}/{row['profile']} dt {row['dt']:.3g}"
+    first, second = (
+        f"{row[f'ratio_{k}']:.3g} [{row[f'ratio_low_{k}']:.3g}, {row[f'ratio_high_{k}']:.3g}]" for k in (1, 2)
+    )
+    return f"  {what} {row['params_text']} x{row['iterations']:g}: {first}, now {second}"

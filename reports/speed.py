@@ -1,0 +1,162 @@
+"""Speed against error for the terminal and as files; everything comes from the tables of `validation.bench`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.table import Table
+from rich.text import Text
+
+from reports.wording import number
+from validation.bench import agreement, reading, work
+from validation.bench.primary import PRIMARY
+from validation.cells import format_dt
+from validation.store import Run, Store
+
+Tables = dict[str, pd.DataFrame]
+#: Levels that fit a terminal.
+SHOWN_LEVELS = (1e-1, 1e-2, 1e-3, 1e-5)
+
+
+def tables_of(store: Store, run: Run) -> Tables:
+    """All tables of a bench run by name."""
+    points, scaling = work.work_points(store, run), reading.scaling(store, run)
+    return {
+        "work_points": points,
+        "time_at_equal_error": work.time_at_equal_error(points),
+        "error_at_equal_time": work.error_at_equal_time(points),
+        "scaling": scaling,
+        "scaling_fits": reading.scaling_fits(scaling),
+        "overhead": reading.overhead(store, run),
+        "ratios": agreement.ratios(store, run),
+        "timings": reading.timings_summary(store, run),
+    }
+
+
+def plain(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows as JSON-ready data; what is not a number becomes null."""
+    return [{str(k): _plain(v) for k, v in row.items()} for row in table.to_dict("records")]
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def as_json(protocol: Mapping[str, Any], tables: Tables) -> str:
+    """One object: the protocol, and every table as a list of rows."""
+    data = {"protocol": dict(protocol)} | {name: plain(table) for name, table in tables.items()}
+    return json.dumps(data, indent=1, allow_nan=False, default=str)
+
+
+def write_all(folder: Path, protocol: Mapping[str, Any], tables: Tables, raw: pd.DataFrame) -> list[Path]:
+    """Write bench.json, one CSV per table, and the raw timings into ``folder/bench``."""
+    target = folder / "bench"
+    target.mkdir(parents=True, exist_ok=True)
+    (target / "bench.json").write_text(as_json(protocol, tables) + "\n", encoding="utf-8")
+    for name, table in {**tables, "raw_timings": raw}.items():
+        flat = table.drop(columns=["slot"], errors="ignore")
+        flat.to_csv(target / f"{name}.csv", index=False)
+    return sorted(target.iterdir())
+
+
+def raw_of(store: Store, run: Run) -> pd.DataFrame:
+    """Raw timings, one row each."""
+    return pd.json_normalize([timing.as_dict() for timing in store.timings(run)])
+
+
+def level_tables(points: pd.DataFrame) -> list[Table]:
+    """One table per scene and dimension: cost at equal error, the cheapest of each level marked."""
+    levels = work.time_at_equal_error(points, SHOWN_LEVELS)
+    out = []
+    for (scene, dimension), group in reading.grouped(levels, ["scene", "dimension"]):
+        primary = PRIMARY[scene]
+        title = f"{scene} {dimension}-D: CPU time per simulated second at {primary.name} [{primary.unit}] of at most"
+        table = Table(title=title, title_justify="left")
+        table.add_column("engine", no_wrap=True)
+        for level in SHOWN_LEVELS:
+            table.add_column(f"{level:.0e}".replace("e-0", "e-"), justify="right")
+        table.add_column("best error", justify="right")
+        for (engine, profile), rows in reading.grouped(group, ["engine", "profile"]):
+            own = points[(points["scene"] == scene) & (points["dimension"] == dimension)]
+            own = own[(own["engine"] == engine) & (own["profile"] == profile)]
+            cells = [_level_cell(row) for row in rows.to_dict("records")]
+            table.add_row(f"{engine}/{profile}", *cells, _smallest(own))
+        out.append(table)
+    return out
+
+
+def _level_cell(row: Mapping[Any, Any]) -> Text:
+    if not math.isfinite(row["cost"]):
+        return Text("-")
+    iterations = "" if row["iterations"] is None or pd.isna(row["iterations"]) else f" x{row['iterations']:.0f}"
+    text = f"{duration(row['cost'])} {format_dt(row['dt'])}{iterations}"
+    return Text(f"* {text}", style="bold") if row["rank"] == 1 else Text(text)
+
+
+def _smallest(points: pd.DataFrame) -> str:
+    errors = points["error"].dropna()
+    if len(errors) == 0:
+        return str(points["outcome"].iloc[0]) if len(points) else "-"
+    return number(float(errors.min()), 2)
+
+
+def duration(seconds: float) -> str:
+    """Time with a unit, three digits: ``412 us``, ``3.1 ms``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if abs(seconds) >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def overhead_table(overhead: pd.DataFrame) -> Table:
+    """Cost of a step of an empty scene and of one free body, plain and with the state read after each step."""
+    table = Table(title="Binding: cost per step before there is any contact", title_justify="left")
+    columns = [("empty", False), ("empty", True), ("flight", False), ("flight", True)]
+    table.add_column("engine", no_wrap=True)
+    for scene, sampled in columns:
+        table.add_column({"empty": "empty", "flight": "free body"}[scene] + (", sampled" if sampled else ""))
+    for (dimension, engine, profile), rows in reading.grouped(overhead, ["dimension", "engine", "profile"]):
+        found = {(row["scene"], row["sampled"]): row for row in rows.to_dict("records")}
+        shown = [duration(found[c]["per_step"]) if c in found and not found[c]["void"] else "-" for c in columns]
+        table.add_row(f"{engine}/{profile} {dimension}-D", *shown)
+    return table
+
+
+def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
+    """Cost per step at the largest size that ran, and the fitted exponent."""
+    table = Table(title="Cost of a step ~ x^p (x: bodies, or iterations)", title_justify="left")
+    for column in ("what", "engine", "largest x", "per step", "p", "left out"):
+        table.add_column(column)
+    names = ["purpose", *reading.SERIES]
+    groups = {key: group for key, group in reading.grouped(scaling, names)}
+    for fit in fits.to_dict("records"):
+        group = groups[tuple(fit[name] for name in names)]
+        ran, lost = group[group["void"] == ""].sort_values("x"), group[group["void"] != ""].sort_values("x")
+        table.add_row(
+            f"{fit['purpose']}, {fit['scene']} {fit['dimension']}-D",
+            f"{fit['engine']}/{fit['profile']}",
+            f"{ran['x'].iloc[-1]:g}" if len(ran) else "-",
+            duration(ran["per_step"].iloc[-1]) if len(ran) else "-",
+            f"{fit['exponent']:.2f} +- {fit['standard_error']:.2f}" if math.isfinite(fit["exponent"]) else "-",
+            f"x >= {lost['x'].iloc[0]:g}: {lost['void'].iloc[0]}" if len(lost) else "",
+        )
+    return table
+
+
+def quality_line(timings: pd.DataFrame) -> str:
+    """How far the timings can be trusted, in one line."""
+    used = timings[timings["void"] == ""]
+    if len(used) == 0:
+        return "nothing was timed"
+    narrow = (used["width"] < 0.05).mean()
+    return (
+        f"{len(used)} units timed, {int(used['rounds'].sum())} timings; interval of the median under 5 % for "
+        f"{narrow:.0%}, median {used['width'].median():.1%}; {int(used['drifts'].sum())} drift; "
+        f"wall / CPU time {used['load'].median():.2f} (median); {len(timings) - len(used)} void"
+    )

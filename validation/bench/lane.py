@@ -1,0 +1,236 @@
+"""The timing lane: one process that times one thing at a time, driven in rounds from outside.
+
+    parent --(unit)--> lane process: stopwatch --(lap)--> parent
+       each round: groups in random order; in a group, every open unit once, in random order
+       a unit closes when the interval of its median is narrow enough, or its rounds or its time are used up
+
+A process that dies or hangs voids the unit it was timing; a fresh one goes on with the rest. The process is renewed
+every few rounds in any case: where memory happens to lie differs between processes, and the interval must know.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from typing import Any
+
+from validation.bench.statistics import spread
+from validation.bench.stopwatch import Lap, serve
+from validation.bench.timing import Timing
+from validation.bench.units import Unit
+
+#: Libraries must not start threads of their own: a thread that helps one engine is time that is not counted alike.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When to stop.
+
+    Parameters
+    ----------
+    width
+        Of the median's bootstrap interval, relative: narrow enough.
+    fewest, most
+        Rounds: an interval of fewer than five values means nothing; after forty it hardly narrows.
+    unit_seconds
+        Time spent on one unit, building included, after which three rounds have to do.
+    size_seconds
+        A pile whose round takes longer ends its series: larger ones are left out, with the reason.
+    lane_seconds
+        Time for the whole lane; what is open then keeps the rounds it has.
+    patience
+        Seconds without an answer after which the lane's process counts as hanging.
+    renew
+        Rounds after which the process is replaced.
+    """
+
+    width: float = 0.05
+    fewest: int = 5
+    most: int = 40
+    unit_seconds: float = 20.0
+    size_seconds: float = 20.0
+    lane_seconds: float = 3600.0
+    patience: float = 600.0
+    renew: int = 5
+
+
+QUICK = Limits(unit_seconds=0.5, size_seconds=0.4, lane_seconds=45.0, patience=30.0)
+FULL = Limits()
+
+
+@dataclass
+class _Entry:
+    unit: Unit
+    seconds: list[float] = field(default_factory=list)
+    spent: float = 0.0
+    closed: bool = False
+    void: str = ""
+
+    def add(self, found: Lap, limits: Limits) -> None:
+        self.spent += found.whole_seconds
+        self.seconds.append(found.seconds)
+        self.void = found.void
+        n = len(self.seconds)
+        narrow = n >= limits.fewest and spread(self.seconds).width < limits.width
+        self.closed = bool(found.void) or narrow or n >= limits.most or (n >= 3 and self.spent > limits.unit_seconds)
+
+
+class Lane:
+    """The lane's process, replaced whenever it dies.
+
+    Parameters
+    ----------
+    patience
+        Seconds to wait for an answer.
+    """
+
+    def __init__(self, patience: float) -> None:
+        self.patience = patience
+        self.count = -1
+        self._process: Any = None
+        self._connection: Connection | None = None
+
+    def start(self) -> None:
+        """Replace the process by a fresh one."""
+        self.stop()
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        with _one_thread():
+            self._process = context.Process(target=_child, args=(theirs, os.getpid()), daemon=True)
+            self._process.start()
+        theirs.close()
+        self.count += 1
+
+    def time(self, unit: Unit) -> Lap:
+        """Lap of ``unit``; void if the process died or hung over it."""
+        assert self._connection is not None
+        reason = f"no answer after {self.patience:g} s"
+        try:
+            self._connection.send(unit)
+            if self._connection.poll(self.patience):
+                answer: Lap = self._connection.recv()
+                return answer
+        except (EOFError, OSError):
+            self._process.join(5.0)
+            reason = f"the process ended with exit code {self._process.exitcode}"
+        self.start()
+        return Lap("", 0.0, 0.0, self.patience, "", None, void=reason)
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._connection.close()  # type: ignore[union-attr]
+            self._process = None
+
+
+def _child(connection: Connection, parent: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG <linux/prctl.h>: die with the parent
+    if os.getppid() != parent:
+        os._exit(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    serve(connection)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    saved = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in saved.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def run_lane(units: Sequence[Unit], limits: Limits, seed: int) -> Iterator[Timing]:
+    """Time all units in rounds and yield every raw timing as it is taken.
+
+    The first unit of a group is the opponent of its group: it stays open as long as any other.
+    """
+    shuffle = random.Random(seed).shuffle
+    groups: dict[tuple[Any, ...], list[_Entry]] = {}
+    for unit in units:
+        groups.setdefault(unit.group, []).append(_Entry(unit))
+    ends, lane = time.monotonic() + limits.lane_seconds, Lane(limits.patience)
+    try:
+        for round_ in range(limits.most):
+            if round_ % limits.renew == 0:
+                lane.start()
+            todo = [members for members in groups.values() if not all(entry.closed for entry in members)]
+            shuffle(todo)
+            if round_ == 0:  # small piles first, so that a series ends before it gets too expensive
+                todo.sort(key=lambda members: members[0].unit.bodies)
+            if not todo:
+                return
+            for members in todo:
+                # Every unit gets three rounds, whatever they take: without them there is no interval at all.
+                if round_ >= 3 and time.monotonic() > ends:
+                    return
+                yield from _round(members, lane, limits, round_, shuffle)
+                if round_ == 0:
+                    yield from _end_series(members, groups, limits)
+    finally:
+        lane.stop()
+
+
+def _round(members: list[_Entry], lane: Lane, limits: Limits, round_: int, shuffle: Any) -> Iterator[Timing]:
+    opponent = members[0]
+    taking = [entry for entry in members if not entry.closed]
+    if opponent not in taking and not opponent.void:
+        taking.append(opponent)
+    shuffle(taking)
+    for order, entry in enumerate(taking):
+        found = lane.time(entry.unit)
+        entry.add(found, limits)
+        yield _timing(entry.unit, opponent.unit, round_, order, lane.count, found)
+
+
+def _timing(unit: Unit, opponent: Unit, round_: int, order: int, process: int, found: Lap) -> Timing:
+    return Timing(
+        unit.purpose,
+        unit.slot,
+        unit.cell,
+        found.engine_version,
+        unit.bodies,
+        f"{opponent.slot.engine}/{opponent.slot.profile}",
+        round_,
+        order,
+        process,
+        unit.sampled,
+        unit.steps,
+        found.seconds,
+        found.wall_seconds,
+        found.state_hash,
+        found.error,
+        found.void,
+        kernel=found.kernel,
+    )
+
+
+def _end_series(members: list[_Entry], groups: dict[Any, list[_Entry]], limits: Limits) -> Iterator[Timing]:
+    """Leave out what is larger than a pile that already takes too long."""
+    slow = {e.unit.series: e for e in members if e.unit.purpose == "bodies" and e.spent > limits.size_seconds}
+    for others in groups.values():
+        for entry in others:
+            small = slow.get(entry.unit.series)
+            if small and not entry.closed and entry.unit.bodies > small.unit.bodies:
+                reason = f"left out: a round of {small.unit.bodies} bodies took {small.spent:.2g} s"
+                entry.closed, entry.void = True, reason
+                lost = Lap("", 0.0, 0.0, 0.0, "", None, void=reason)
+                yield _timing(entry.unit, others[0].unit, 0, 0, 0, lost)

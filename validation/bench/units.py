@@ -1,0 +1,193 @@
+r"""What is timed, and the bench's own scenes: an empty one, one free body, and piles of any size.
+
+empty      only the floor: what a step costs before there is any physics
+flight     one free body that meets nothing
+stack      n boxes, one on the other (the catalogue's)
+pyramid            +---+
+                +---+ +---+          rows of r, r-1, ... 1 boxes, each on the two below it;
+             +---+ +---+ +---+       like the column it is in equilibrium, nothing may move
+           =====================
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, Engine
+from adapters.needs import needs
+from adapters.registry import find, load
+from adapters.scene import Body, Pair, Scene
+from adapters.stepping import posed_for, step_count
+from validation.bench.primary import PRIMARY
+from validation.bench.timing import Purpose
+from validation.canonical import GRAVITY
+from validation.cells import Slot
+from validation.posed import resolve
+from validation.scenes.parts import ball, cube, floor, upward
+
+SIDE = 1.0
+#: Boxes of a row stand this far apart, centre to centre [sides]: they must not touch sideways.
+SPACING = 1.1
+#: A pile is timed after this much time in contact, for as long again [s]: 24 steps of 1/240 s.
+SETTLING = 0.1
+#: A body that has moved by half a side no longer stands where it stood: the pile has collapsed, or was pushed apart.
+COLLAPSED = 0.5
+PILE_DT = 1.0 / 240.0
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One thing to time.
+
+    Parameters
+    ----------
+    warm_up, steps
+        Steps before the timed call and within it.
+    error
+        Primary error that was measured before; None for the bench's own scenes, whose error is measured on the
+        timed simulation itself.
+    """
+
+    purpose: Purpose
+    slot: Slot
+    cell: str
+    bodies: int
+    warm_up: int
+    steps: int
+    error: float | None = None
+    sampled: bool = False
+
+    @property
+    def group(self) -> tuple[Any, ...]:
+        """Units of one group are timed next to each other: same scene, size, step, and kind of question."""
+        slot = self.slot
+        iterations = slot.iterations if self.purpose == "iterations" else None
+        return self.purpose, slot.scene, slot.dimension, slot.params, slot.dt, iterations, self.sampled
+
+    @property
+    def series(self) -> tuple[Any, ...]:
+        """Units that differ in size only."""
+        slot = self.slot
+        return self.purpose, slot.scene, slot.dimension, slot.engine, slot.profile, slot.iterations
+
+
+def work_unit(slot: Slot, cell: str, error: float | None, sampled: bool = False) -> Unit:
+    """Unit that times a work point in the state its scene declares (`validation.bench.primary`)."""
+    primary, scene = PRIMARY[slot.scene], scene_of(slot)
+    warm_up = step_count(primary.warm_up, slot.dt) if primary.warm_up else 0
+    steps = step_count(primary.window or scene.duration, slot.dt)
+    return Unit("work", slot, cell, _free(scene), warm_up, steps, error, sampled)
+
+
+def overhead_units(engines: Sequence[tuple[str, str]], dimensions: Sequence[int]) -> Iterator[Unit]:
+    """Empty scene and one free body for every ``(engine, profile)``, plain and sampled; a second of steps each."""
+    for dimension in dimensions:
+        for name in ("empty", "flight"):
+            for engine, profile in engines:
+                slot = Slot(name, (), dimension, engine, profile, PILE_DT)
+                steps = step_count(1.0, PILE_DT)
+                for sampled in (False, True):
+                    if runs(slot):
+                        yield Unit("overhead", slot, "", _free(scene_of(slot)), 1, steps, None, sampled)
+
+
+def size_units(
+    engines: Sequence[tuple[str, str]], dimensions: Sequence[int], columns: Sequence[int], rows: Sequence[int]
+) -> Iterator[Unit]:
+    """Columns of n boxes and pyramids of r rows, at the profile's own iterations."""
+    sizes = [("stack", "n", n) for n in columns] + [("pyramid", "rows", r) for r in rows]
+    for dimension in dimensions:
+        for scene, parameter, size in sizes:
+            for engine, profile in engines:
+                slot = Slot(scene, ((parameter, float(size)),), dimension, engine, profile, PILE_DT)
+                if runs(slot):
+                    yield _pile_unit("bodies", slot)
+
+
+def iteration_units(
+    engines: Sequence[tuple[str, str]], dimensions: Sequence[int], counts: Sequence[int], rows: int
+) -> Iterator[Unit]:
+    """One pyramid at several iteration counts, where a profile has one."""
+    for dimension in dimensions:
+        for count in counts:
+            for engine, profile in engines:
+                slot = Slot("pyramid", (("rows", float(rows)),), dimension, engine, profile, PILE_DT, count)
+                if runs(slot):
+                    yield _pile_unit("iterations", slot)
+
+
+def _pile_unit(purpose: Purpose, slot: Slot) -> Unit:
+    size = slot.params[0][1]
+    bodies = int(size if slot.scene == "stack" else size * (size + 1) / 2)
+    steps = step_count(SETTLING, slot.dt)
+    return Unit(purpose, slot, "", bodies, steps, steps)
+
+
+def runs(slot: Slot) -> bool:
+    """Whether the engine is there, has the dimension, and an iteration count if one is asked for."""
+    engine = find(slot.engine).engine
+    if engine is None or not engine.facts.dimensions & ({2, 3} if slot.dimension == 2 else {3}):
+        return False
+    if slot.iterations is None:
+        return True
+    return any(s.name == "iterations" for s in engine.settings(slot.profile, needs(scene_of(slot)), slot.dt))
+
+
+@lru_cache(maxsize=64)
+def scene_of(slot: Slot) -> Scene:
+    """Scene of a slot: one of the bench's own, else the catalogue's."""
+    params = dict(slot.params)
+    if slot.scene == "empty":
+        return _scene(slot, (floor(slot.dimension),), {})
+    if slot.scene == "flight":
+        return _scene(slot, (ball("ball", slot.dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), {})
+    if slot.scene == "pyramid":
+        return _scene(slot, (floor(slot.dimension), *_pyramid(slot.dimension, int(params["rows"]))), params)
+    return resolve(slot.scene).scene(slot.dimension, params)
+
+
+def _scene(slot: Slot, bodies: tuple[Body, ...], params: Mapping[str, float]) -> Scene:
+    pairs = (Pair(restitution=0.0, friction=0.5),)
+    return Scene(slot.scene, 1, slot.dimension, bodies, pairs, upward(slot.dimension, -GRAVITY), 1.0, params)
+
+
+def _pyramid(dimension: int, rows: int) -> Iterator[Body]:
+    for level in range(rows):
+        for k in range(rows - level):
+            box = cube(f"box{level}.{k}", dimension, 1.0, SIDE, (level + 0.5) * SIDE)
+            x = SPACING * SIDE * (k - 0.5 * (rows - level - 1))
+            yield replace(box, pose=(x, *box.pose[1:]))
+
+
+def _free(scene: Scene) -> int:
+    return sum(body.motion == "free" for body in scene.bodies)
+
+
+def prepared(slot: Slot) -> tuple[Engine, Scene, dict[str, Any], bool]:
+    """Engine, scene as the engine gets it, setting values, and whether that scene was lifted."""
+    engine, scene = load(slot.engine), scene_of(slot)
+    settings = engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
+    posed = posed_for(engine, scene)
+    return engine, posed, {setting.name: setting.value for setting in settings}, posed.dimension != scene.dimension
+
+
+def own_error(scene: Scene, time: float, pose: Array) -> float | None:
+    """Error of one of the bench's own scenes at ``time`` [s] from the poses reached; None where nothing can err.
+
+    Piles: largest displacement of a body, in sides. Flight: distance from the exact fall [m].
+    """
+    free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
+    if not free:
+        return None
+    d = scene.dimension
+    start = np.array([scene.bodies[i].pose[:d] for i in free])
+    if scene.name == "flight":
+        start = start + 0.5 * time**2 * np.array(scene.gravity)
+    moved = np.linalg.norm(pose[free, :d] - start, axis=1)
+    return float(moved.max()) if np.isfinite(moved).all() else math.inf
