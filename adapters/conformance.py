@@ -30,8 +30,11 @@ from adapters.trajectory import Sampling
 DT = 1.0 / 240.0
 #: Steps of what receipts are measured at [s]: slowest and fastest of the usual range.
 RECEIPT_STEPS = (1.0 / 60.0, 1.0 / 240.0)
-#: Relative error of a sum of impulses: some hundred additions, and one root and product of a pair's coefficients.
+#: What a start state or a normal may be off: round-off, and the root and product of a quaternion's components.
 ROUND_OFF = 1e-9
+#: What impulses may miss of a momentum of order 1 [N s]: a solver that stops at a tolerance reports the forces of its
+#: last iterate. The root of a tolerance of 1e-8 on its cost is 1e-4 (MuJoCo as shipped: 2e-5 in a step), times ten.
+BOOKKEEPING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -128,8 +131,8 @@ def facts(engine: Engine) -> str:
 
 def profiles(engine: Engine) -> str:
     """Every profile gives the same settings each time, each with a name and a reason."""
-    if "default" not in engine.profiles:
-        return "there is no profile `default`: as shipped"
+    if not engine.profiles:
+        return "there is no profile"
     for profile, asked in product(engine.profiles, _needs(engine)):
         settings = engine.settings(profile, asked, DT)
         names = [setting.name for setting in settings]
@@ -147,7 +150,7 @@ def profiles(engine: Engine) -> str:
 def refusals(engine: Engine) -> str:
     """Unknown profiles, unknown settings and bad steps raise EngineError; a refusal is one line."""
     scene, posed = _resting(), _posed(engine, _resting())
-    values = _values(engine, "default", scene)
+    values = _values(engine, next(iter(engine.profiles)), scene)
     attempts: dict[str, Callable[[], Any]] = {
         "an unknown profile": lambda: engine.settings("no such profile", needs(scene), DT),
         "an unknown setting": lambda: engine.build(posed, DT, {**values, "no_such_setting": 1.0}),
@@ -204,8 +207,7 @@ def fresh(engine: Engine) -> str:
         together = _interleaved(engine, profile, list(scenes))
         for scene, a, b in zip(scenes, alone, together, strict=True):
             if not np.array_equal(a, b):
-                apart = float(np.abs(a - b).max())
-                return f"{profile}: {scene.name} comes out {apart:.2g} apart when another world is stepped in between"
+                return f"{profile}: {scene.name} comes out otherwise when another world is stepped in between"
     return ""
 
 
@@ -275,7 +277,7 @@ def impulse(engine: Engine) -> str:
             if np.abs(gained[1]).max() < 0.1:
                 return f"{profile}: the balls passed through each other"
             # Drag of a profile acts on the momentum too, and not through contacts: 0.2 s at 2 m/s and 8 %/s is 0.03.
-            slack = ROUND_OFF + 0.05 * float("linear_damping" in engine.declares(profile, needs(scene), DT))
+            slack = BOOKKEEPING + 0.05 * float("linear_damping" in engine.declares(profile, needs(scene), DT))
             for name, gain, told in (("b", gained[1], total), ("a", gained[0], -total)):
                 if np.abs(gain - told).max() > slack:
                     return f"{profile}: body {name} gained {gain} N s, its contacts tell of {told} N s"
@@ -313,10 +315,11 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
 
 
 def _needs(engine: Engine) -> Iterator[Needs]:
-    """Needs of an impact with and without friction, of rest and of sliding, in every dimension."""
+    """Needs of elastic and plastic impacts, with and without friction, of rest and sliding, in every dimension."""
     base = replace(needs(_striking()), top_speed=6.0, gravity=9.81, restitution=0.8, regime="impact")
     resting = replace(base, friction=0.5, rotation=True, restitution=0.0, regime="rest")
-    kinds = (base, replace(base, restitution=0.5, friction=0.5, slide=True), resting, replace(resting, slide=True))
+    plastic, rough = replace(base, restitution=0.0), replace(base, restitution=0.5, friction=0.5, slide=True)
+    kinds = (base, plastic, rough, resting, replace(resting, slide=True))
     for dimension in (2, 3) if 3 in engine.facts.dimensions else (2,):
         for kind in kinds:
             yield replace(kind, dimension=dimension)
