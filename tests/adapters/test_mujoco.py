@@ -1,0 +1,514 @@
+"""The MuJoCo adapter, driven through the one step loop on small scenes with known answers."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from adapters.engine import EngineError
+from adapters.mujoco import MujocoEngine, contact_law
+from adapters.needs import needs
+from adapters.receipts import receipts
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling, Trajectory
+
+ENGINE = MujocoEngine()
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+FLAT = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+CUBE = (1.0 / 6.0,) * 3
+BALL = (0.1,) * 3
+PROFILES = ("default", "tuned")
+DT = 1.0 / 240.0
+G = 9.81
+#: A thousand roundings of 2.2e-16, and a factor of five for their order.
+ROUND_OFF = 1e-12
+
+
+def at(x: float, y: float, z: float) -> tuple[float, ...]:
+    return (x, y, z, 1.0, 0.0, 0.0, 0.0)
+
+
+def ball(name: str, z: float, vz: float = 0.0, mass: float = 1.0, x: float = 0.0, **changes: Any) -> Body:
+    body = Body(name, Sphere(0.5), mass, tuple(mass * i for i in BALL), at(x, 0.0, z), (0.0, 0.0, vz, 0.0, 0.0, 0.0))
+    return replace(body, **changes)
+
+
+def cube(name: str, z: float, x: float = 0.0, **changes: Any) -> Body:
+    return replace(Body(name, Box((0.5, 0.5, 0.5)), 1.0, CUBE, at(x, 0.0, z)), **changes)
+
+
+def make(
+    *bodies: Body,
+    e: float = 0.0,
+    mu: float = 0.0,
+    g: tuple[float, ...] | None = None,
+    T: float = 0.5,
+    pairs: tuple[Pair, ...] = (),
+) -> Scene:
+    dimension = 2 if len(bodies[-1].pose) == 3 else 3
+    pairs = (Pair(restitution=e, friction=mu), *pairs)
+    return Scene("test", 1, dimension, bodies, pairs, g or (0.0,) * dimension, T)
+
+
+def settings(scene: Scene, profile: str, dt: float = DT, **changes: Any) -> dict[str, Any]:
+    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)} | changes
+
+
+def drive(scene: Scene, profile: str = "default", dt: float = DT, **changes: Any) -> Trajectory:
+    return run(ENGINE, scene, dt, settings(scene, profile, dt, **changes), Sampling(1, 0.0))
+
+
+def impact(e: float, v: float, phase: float, dt: float = DT, mu: float = 0.0, mass: float = 0.5) -> Scene:
+    """Ball that overlaps the floor ``phase`` steps after crossing its surface; ends 0.2 s after."""
+    return make(FLOOR, ball("ball", 0.5 + (3.0 - phase) * v * dt, -v, mass), e=e, mu=mu, T=3 * dt + 0.2)
+
+
+# ---- identity and profiles ------------------------------------------------------------------------------------
+
+
+def test_importing_the_adapter_imports_no_engine() -> None:
+    code = "import sys, adapters, adapters.mujoco; assert 'mujoco' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_version_is_the_engines_and_not_the_one_known_to_be_bad() -> None:
+    import mujoco
+
+    assert ENGINE.version() == mujoco.__version__
+    assert ENGINE.version() not in ENGINE.facts.known_bad_versions
+    assert "4.0.0" in ENGINE.facts.known_bad_versions
+
+
+def test_default_is_what_a_fresh_spec_holds() -> None:
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    geom, option = spec.worldbody.add_geom(), spec.option
+    chosen = settings(make(FLOOR, ball("ball", 1.0), mu=0.5), "default")
+    for name in ("impratio", "iterations", "tolerance", "noslip_iterations"):
+        assert chosen[name] == getattr(option, name)
+    assert chosen["solref"] == tuple(geom.solref) and chosen["solimp"] == tuple(geom.solimp)
+    assert (chosen["margin"], chosen["smooth_condim"]) == (geom.margin, geom.condim)
+    assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER and chosen["integrator"] == "Euler"
+    assert option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and chosen["cone"] == "pyramidal"
+
+
+def test_tuned_follows_the_needs_and_every_setting_has_a_reason() -> None:
+    down = (0.0, 0.0, -G)
+    free = settings(make(ball("ball", 1.0)), "tuned")
+    smooth = settings(make(FLOOR, ball("ball", 1.0), e=0.5, g=down), "tuned")
+    rough = settings(make(FLOOR, ball("ball", 1.0), e=0.5, mu=0.5), "tuned")
+    plastic = settings(make(FLOOR, ball("ball", 1.0)), "tuned")
+    resting = settings(make(FLOOR, cube("box", 0.5), mu=0.5, g=down), "tuned")
+    sliding = settings(make(FLOOR, cube("box", 0.5), mu=0.5, g=(1.0, 0.0, -G)), "tuned")
+    assert free["integrator"] == "RK4"
+    assert (smooth["kappa_elastic"], smooth["smooth_condim"], smooth["solreffriction"]) == (0.0, 1, None)
+    assert rough["solreffriction"] == "stick" and rough["cone"] == "elliptic"
+    assert plastic["kappa_plastic"] == 0.0 and plastic["margin"] == 0.0
+    assert resting["kappa_plastic"] == 0.1 and resting["solreffriction"] is None
+    assert sliding["solreffriction"] == (0.05, 1.0)
+    for scene in (make(ball("ball", 1.0)), make(FLOOR, cube("box", 0.5), mu=0.5, g=(1.0, 0.0, -G))):
+        for profile in PROFILES:
+            assert all(s.because and s.source for s in ENGINE.settings(profile, needs(scene), DT))
+
+
+def test_iterations_can_be_replaced_and_reach_the_model() -> None:
+    scene = make(FLOOR, cube("box", 0.5), g=(0.0, 0.0, -G), T=DT)
+    chosen = {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT, 7)}
+    assert run(ENGINE, scene, DT, chosen).readback["iterations"] == 7
+
+
+SCENES = {
+    "impact": make(FLOOR, ball("ball", 1.0), e=0.8),
+    "rough impact": make(FLOOR, ball("ball", 1.0), e=0.5, mu=0.5),
+    "plastic": make(FLOOR, ball("ball", 1.0)),
+    "rest": make(FLOOR, cube("box", 0.5), mu=0.5, g=(0.0, 0.0, -G)),
+    "slide": make(FLOOR, cube("box", 0.5), mu=0.3, g=(1.0, 0.0, -G)),
+    "free": make(ball("ball", 1.0)),
+    "planar": make(FLAT, Body("ball", Disc(0.5), 1.0, 0.125, (0.0, 1.0, 0.0)), e=0.5),
+}
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+def test_receipts_measure_what_is_declared(scene: Scene, profile: str, dt: float) -> None:
+    slips = receipts(ENGINE, profile, needs(scene), dt)
+    assert slips and not [slip for slip in slips if not slip.holds]
+
+
+def test_default_declares_a_rebound_that_does_not_depend_on_e() -> None:
+    declared = [ENGINE.declares("default", needs(make(FLOOR, ball("b", 1.0), e=e)), DT) for e in (0.0, 0.5, 1.0)]
+    assert declared[0] == declared[1] == declared[2] and "restitution" in declared[0]
+    assert "restitution" not in ENGINE.declares("tuned", needs(make(FLOOR, ball("b", 1.0), e=0.5)), DT)
+
+
+# ---- rebounds -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
+@pytest.mark.parametrize("e", [0.0, 0.2, 0.5, 0.8, 0.95, 1.0])
+def test_tuned_rebound_is_e_to_round_off(e: float, dt: float) -> None:
+    for v in (0.1, 6.0, 50.0):
+        for phase in (0.05, 0.5, 0.93):
+            trajectory = drive(impact(e, v, phase, dt), "tuned", dt)
+            assert abs(trajectory.twist[-1, 1, 2] / v - e) <= ROUND_OFF
+
+
+def test_tuned_rebound_of_two_bodies_is_e_whatever_the_mass_ratio() -> None:
+    for ratio in (0.1, 1.0, 1000.0):
+        scene = make(ball("a", 0.0, 2.0, 1.0), ball("b", 1.02, -1.0, ratio), e=0.5)
+        v = drive(scene, "tuned").twist[-1, :, 2]
+        # R adds 1e-4 of an inertia that is estimated from the two bodies; without a load it has nothing to yield to.
+        assert abs((v[1] - v[0]) / 3.0 - 0.5) <= ROUND_OFF * ratio
+        assert abs(v[0] + ratio * v[1] - (2.0 - ratio)) <= ROUND_OFF * (2.0 + ratio)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.5, 1.0, 2.0])
+def test_default_rebound_is_the_documented_scalar_law(mu: float) -> None:
+    for dt, v, phase in ((1 / 240, 2.0, 0.31), (1 / 500, 0.7, 0.77), (1 / 60, 0.1, 0.52), (1 / 2000, 6.0, 0.11)):
+        scene = impact(0.8, v, phase, dt, mu)
+        law = contact_law(settings(scene, "default", dt), 0.8, mu, dt)
+        measured = drive(scene, "default", dt).twist[-1, 1, 2] / v
+        # (3 - phase) v dt is rounded at a radius of 0.5: eps/(v dt) of a phase, and the law's slope is of order 1.
+        assert abs(measured - law.rebound_ratio(v, phase)) <= 1e-15 / (v * dt) + ROUND_OFF
+
+
+def test_default_rebound_figures_of_the_fact_sheet() -> None:
+    def ratios(dt: float) -> list[float]:
+        scenes = [impact(0.8, 1.0, (k + 0.5) / 16, dt) for k in range(16)]
+        return [float(drive(scene, "default", dt).twist[-1, 1, 2]) for scene in scenes]
+
+    assert np.mean(ratios(1 / 500)) == pytest.approx(0.125, abs=0.01)
+    assert np.mean(ratios(1 / 2000)) == pytest.approx(0.13, abs=0.005)
+    at_240 = ratios(DT)
+    assert min(at_240) == pytest.approx(0.09, abs=0.01) and max(at_240) == pytest.approx(0.145, abs=0.01)
+
+
+def test_tuned_sticking_oblique_impact_keeps_e_and_stops_the_slip() -> None:
+    spin = {"twist": (0.3, 0.0, -2.0, 0.0, 0.0, 0.0)}
+    scene = make(FLOOR, ball("ball", 0.5 + 0.0104, **spin), e=0.5, mu=0.5, T=0.05)
+    v = drive(scene, "tuned").twist[-1, 1]
+    assert v[2] == pytest.approx(1.0, abs=1e-3)  # d = 0.9999: couplings yield by 1e-4 of what drives them
+    assert v[0] - 0.5 * v[4] == pytest.approx(0.0, abs=1e-2)  # lever arm r - depth/2, depth up to v dt = 8 mm
+
+
+# ---- impulses -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("floor_first", [True, False])
+@pytest.mark.parametrize("profile", PROFILES)
+def test_impulses_add_up_to_the_change_of_momentum_of_the_higher_body(profile: str, floor_first: bool) -> None:
+    scene = impact(0.8, 6.0, 0.4, mu=0.5)
+    scene = scene if floor_first else replace(scene, bodies=scene.bodies[::-1])
+    trajectory = drive(scene, profile)
+    moving = 1 if floor_first else 0
+    change = 0.5 * (trajectory.twist[-1, moving] - trajectory.twist[0, moving])[:3]
+    assert trajectory.contacts is not None
+    impulse = trajectory.contacts.impulse_between(0, 1).sum(axis=0)
+    sign = 1.0 if floor_first else -1.0  # impulses act on the body with the higher index
+    assert impulse == pytest.approx(sign * change, abs=1e-9 * 6.0)
+    assert trajectory.contacts.rows.normal[:, 2] == pytest.approx(sign, abs=1e-12)
+    assert (trajectory.contacts.rows.a < trajectory.contacts.rows.b).all()
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_resting_box_is_carried_by_its_weight_times_dt(profile: str) -> None:
+    trajectory = drive(make(FLOOR, cube("box", 0.5), mu=0.5, g=(0.0, 0.0, -G), T=1.0), profile)
+    assert trajectory.contacts is not None
+    last = trajectory.contacts.impulse_between(0, 1)[-1]
+    assert last == pytest.approx([0.0, 0.0, G * DT], abs=1e-9 * G * DT)
+
+
+def test_gap_is_that_of_the_steps_start() -> None:
+    trajectory = drive(impact(0.5, 2.0, 0.4), "default")
+    assert trajectory.contacts is not None
+    rows, samples = trajectory.contacts.rows, trajectory.contacts
+    for k, sample in enumerate(samples.step):
+        for row in range(samples.offset[k], samples.offset[k + 1]):
+            assert rows.gap[row] == pytest.approx(trajectory.pose[sample - 1, 1, 2] - 0.5, abs=1e-14)
+
+
+def test_rk4_has_no_impulse_of_a_step() -> None:
+    trajectory = drive(impact(0.5, 2.0, 0.4), "default", integrator="RK4")
+    assert trajectory.contacts is not None and len(trajectory.contacts.rows.a)
+    assert np.isnan(trajectory.contacts.rows.impulse).all()
+
+
+# ---- motion, signs, loads -------------------------------------------------------------------------------------
+
+
+def test_planar_torque_above_zero_turns_counter_clockwise() -> None:
+    body = Body("box", Box((0.5, 0.3)), 2.0, 0.7, (0.0, 0.0, 0.1), torque=(1.4,))
+    trajectory = drive(make(body, T=0.25))
+    assert trajectory.twist[-1, 0, 2] == pytest.approx(1.4 / 0.7 * 0.25, rel=1e-12)
+    assert trajectory.pose[-1, 0, 2] > 0.1 and trajectory.out_of_plane <= 1e-15
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_box_landing_on_a_corner_turns_towards_its_face(profile: str) -> None:
+    for tilt in (0.3, -0.3):
+        height = 0.5 * (math.cos(tilt) + abs(math.sin(tilt))) + 0.002
+        box = Body("box", Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, height, tilt), (0.0, -1.0, 0.0))
+        trajectory = drive(make(FLAT, box, T=0.1), profile)
+        assert trajectory.twist[-1, 1, 2] * tilt < 0.0
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_inertia_is_as_stated_about_each_axis_of_a_turned_body(axis: int) -> None:
+    moments, turn = (1.0, 1.2, 1.5), (0.5, 0.1, 0.7, 0.5)
+    w, x, y, z = turn
+    axes = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    torque = tuple(float(2.0 * c) for c in axes[:, axis])
+    body = Body(
+        "box", Box((0.3, 0.4, 0.5)), 3.0, moments, (5.0, 1.0, 2.0, *turn), force=(3.0, 6.0, -9.0), torque=torque
+    )
+    trajectory = drive(make(body, T=0.05))
+    assert trajectory.twist[-1, 0, 3:] == pytest.approx(np.array(torque) / moments[axis] * 0.05, abs=ROUND_OFF)
+    assert trajectory.twist[-1, 0, :3] == pytest.approx(np.array([1.0, 2.0, -3.0]) * 0.05, rel=ROUND_OFF)
+
+
+def test_spin_is_read_and_set_in_world_axes() -> None:
+    turned = (0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    body = Body("box", Box((0.5, 0.5, 0.5)), 1.0, CUBE, turned, (0.0, 0.0, 0.0, 0.0, 0.0, 2.0))
+    trajectory = drive(make(body, T=0.1))
+    assert trajectory.twist[:, 0, 3:] == pytest.approx(np.tile([0.0, 0.0, 2.0], (25, 1)), abs=1e-12)
+
+
+def test_velocity_is_that_of_the_centre_of_mass_wherever_the_body_is() -> None:
+    twist = (0.3, -0.2, 0.1, 0.0, 3.0, 0.0)
+    bodies = [ball(f"b{k}", 1.0, x=10.0 * k, twist=twist) for k in range(3)]
+    trajectory = drive(make(*bodies, e=0.5, T=0.5))
+    assert trajectory.twist == pytest.approx(np.broadcast_to(twist, trajectory.twist.shape), abs=ROUND_OFF)
+    moved = trajectory.pose[-1, :, :3] - trajectory.pose[0, :, :3]
+    assert moved == pytest.approx(np.tile(0.5 * np.array(twist[:3]), (3, 1)), abs=ROUND_OFF)
+
+
+def test_gravity_acts_along_its_vector() -> None:
+    gravity = (1.0, -2.0, 3.0)
+    trajectory = drive(make(ball("ball", 0.0), g=gravity, T=0.5))
+    assert trajectory.twist[-1, 0, :3] == pytest.approx(0.5 * np.array(gravity), rel=ROUND_OFF)
+
+
+def test_velocity_first_stepping_falls_half_a_step_too_far_and_rk4_does_not() -> None:
+    scene = make(ball("ball", 0.0), g=(0.0, 0.0, -G), T=0.5)
+    fall = 0.5 * G * 0.25
+    assert -drive(scene, "default").pose[-1, 0, 2] == pytest.approx(fall + 0.5 * G * 0.5 * DT, rel=ROUND_OFF)
+    assert -drive(scene, "tuned").pose[-1, 0, 2] == pytest.approx(fall, rel=ROUND_OFF)
+
+
+def test_tuned_conserves_the_energy_of_a_tumbling_body() -> None:
+    body = Body("t", Box((0.3, 0.4, 0.5)), 1.0, (1.0, 2.0, 2.5), at(0, 0, 0), (0.0, 0.0, 0.0, 1e-3, 5.0, 0.0))
+    trajectory = drive(make(body, T=5.0), "tuned", 1 / 500)
+    turn = trajectory.pose[:, 0, 3:]
+    w, v = turn[:, :1], -turn[:, 1:]
+    omega = trajectory.twist[:, 0, 3:]
+    spin = omega + 2.0 * np.cross(v, np.cross(v, omega) + w * omega)  # into body axes
+    energy = 0.5 * spin**2 @ np.array([1.0, 2.0, 2.5])
+    assert np.abs(spin[:, 0]).max() > 1.0  # it did flip
+    assert np.ptp(energy) / energy[0] <= 1e-9  # fact sheet: 7e-12 at this step over 20 s
+
+
+# ---- shapes, pairs, motions -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "normal", [(0.6, 0.0, 0.8), (0.0, -0.6, 0.8), (0.48, 0.36, -0.8), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)]
+)
+def test_half_space_lies_where_its_normal_and_offset_say(normal: tuple[float, ...]) -> None:
+    n = np.array(normal)
+    start, velocity = (0.3 + 0.5 + 0.01) * n + np.cross(n, [0.2, 0.5, 0.1]), -2.0 * n
+    wall = Body("wall", HalfSpace(normal, 0.3), motion="fixed")
+    body = ball(
+        "ball", 0.0, pose=(*map(float, start), 1.0, 0.0, 0.0, 0.0), twist=(*map(float, velocity), 0.0, 0.0, 0.0)
+    )
+    trajectory = drive(make(wall, body, e=0.5, T=0.1), "tuned")
+    assert trajectory.twist[-1, 1, :3] == pytest.approx(1.0 * n, abs=ROUND_OFF)
+    assert trajectory.contacts is not None
+    assert trajectory.contacts.rows.normal[0] == pytest.approx(n, abs=1e-12)
+
+
+def test_fixed_boxes_are_obstacles_and_stay_where_they_are() -> None:
+    post = cube("post", 0.5, motion="fixed")
+    trajectory = drive(make(post, ball("ball", 1.51, -1.0), e=1.0, T=0.1), "tuned")
+    assert trajectory.twist[-1, 1, 2] == pytest.approx(1.0, abs=ROUND_OFF)
+    assert (trajectory.pose[:, 0] == trajectory.pose[0, 0]).all() and not trajectory.twist[:, 0].any()
+
+
+def test_overlapping_fixed_and_prescribed_bodies_do_not_meet() -> None:
+    belt = cube("belt", 0.4, motion="prescribed", twist=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    trajectory = drive(make(FLOOR, belt, ball("far", 5.0, x=20.0), mu=0.5, g=(0.0, 0.0, -G), T=0.5), "tuned")
+    assert trajectory.contacts is not None and len(trajectory.contacts.rows.a) == 0
+
+
+def test_prescribed_body_keeps_its_twist_whatever_hits_it() -> None:
+    twist = (0.0, 0.0, 1.0, 0.0, 0.0, 0.5)
+    bat = cube("bat", 0.0, motion="prescribed", twist=twist)
+    trajectory = drive(make(bat, ball("ball", 1.01, -2.0, 0.5), e=0.8, g=(0.0, 0.0, -1e-3), T=0.1), "tuned")
+    assert trajectory.twist[:, 0] == pytest.approx(np.tile(twist, (25, 1)), abs=1e-11)
+    assert trajectory.pose[-1, 0, 2] == pytest.approx(0.1, abs=1e-11)
+    # v+ = V + e (V - v-), up to the gravity of 0.1 s
+    assert trajectory.twist[-1, 1, 2] == pytest.approx(1.0 + 0.8 * 3.0, abs=2e-4)
+
+
+def test_belt_drags_a_box_with_friction_up_to_its_own_speed() -> None:
+    belt = Body(
+        "belt", Box((9.0, 1.0, 0.5)), motion="prescribed", inertia=CUBE, pose=at(0, 0, -0.5), twist=(0.5,) + (0.0,) * 5
+    )
+    trajectory = drive(make(belt, cube("box", 0.5), mu=0.5, g=(0.0, 0.0, -G), T=1.0), "tuned")
+    assert trajectory.twist[-1, 1, 0] == pytest.approx(0.5, abs=1e-4)
+    assert trajectory.twist[:, 0, 0] == pytest.approx(np.full(241, 0.5), abs=1e-10)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_pair_has_its_own_friction(profile: str) -> None:
+    slide = {"twist": (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)}
+    boxes = [cube(name, 0.5, x=0.0, pose=at(0.0, 5.0 * k, 0.5), **slide) for k, name in enumerate("abc")]
+    pairs = (Pair("floor", "b", 0.0, 0.2), Pair("floor", "c", 0.0, 0.0))
+    trajectory = drive(make(FLOOR, *boxes, mu=0.5, g=(0.0, 0.0, -G), T=0.3, pairs=pairs), profile)
+    change = trajectory.twist[-1, 1:] - trajectory.twist[0, 1:]
+    mu = -change[:, 0] / (change[:, 2] + G * 0.3)
+    # stock friction is at least 1e-5; solved to 1e-8 of the mean inertia as shipped
+    assert mu == pytest.approx([0.5, 0.2, 0.0], abs=2e-5)
+
+
+def test_every_pair_has_its_own_restitution_when_tuned() -> None:
+    balls = [ball(f"b{k}", 0.51, -1.0, x=3.0 * k) for k in range(3)]
+    pairs = (Pair("floor", "b1", 0.3), Pair("floor", "b2", 0.0))
+    trajectory = drive(make(FLOOR, *balls, e=0.9, T=0.1, pairs=pairs), "tuned")
+    assert trajectory.twist[-1, 1:, 2] == pytest.approx([0.9, 0.3, 0.0], abs=ROUND_OFF)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_pairs_and_geoms_are_the_same_model(profile: str) -> None:
+    boxes = [cube("a", 0.5), cube("b", 1.5, x=0.1), ball("far", 9.0, x=30.0)]
+    scene = make(FLOOR, *boxes, mu=0.4, g=(0.0, 0.0, -G), T=0.5)
+    chosen = settings(scene, profile, solreffriction=None)
+    other = replace(scene, pairs=(*scene.pairs, Pair("far", "floor", 0.0, 0.3)))
+    by_geoms, by_pairs = run(ENGINE, scene, DT, chosen), run(ENGINE, other, DT, chosen)
+    assert "all geoms" in by_geoms.readback["materials"] and "pair0-1" in by_pairs.readback["materials"]
+    assert by_geoms.state_hash() == by_pairs.state_hash()
+
+
+def test_readback_equals_what_was_asked() -> None:
+    body = Body("box", Box((0.3, 0.4, 0.5)), 3.0, (1.0, 1.2, 1.5), at(0, 0, 1))
+    scene = make(FLOOR, body, e=0.5, mu=0.25, g=(0.1, 0.2, -G), T=DT)
+    held = drive(scene, "tuned").readback
+    assert held["dt"] == DT and held["gravity"] == [0.1, 0.2, -G]
+    assert (held["box.mass"], held["box.inertia"], held["box.size"]) == (3.0, [1.0, 1.2, 1.5], [0.3, 0.4, 0.5])
+    pair = held["materials"]["pair0-1"]
+    assert (pair["friction"], pair["condim"]) == (0.25, 3)
+    assert pair["solref"] == pytest.approx([0.0, -1.5 / DT]) and pair["solreffriction"] == pytest.approx([0.0, -1 / DT])
+    assert (held["integrator"], held["cone"], held["solver"]) == ("mjINT_EULER", "mjCONE_ELLIPTIC", "mjSOL_NEWTON")
+
+
+# ---- rest and slide -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.9, 0.99, 0.999])
+def test_tuned_sticks_up_to_the_edge_of_the_cone(ratio: float) -> None:
+    theta = math.atan(0.5 * ratio)
+    scene = make(FLOOR, cube("box", 0.5), mu=0.5, g=(G * math.sin(theta), 0.0, -G * math.cos(theta)), T=1.0)
+    trajectory = drive(scene, "tuned")
+    creep = (trajectory.pose[-1, 1, 0] - trajectory.pose[120, 1, 0]) / 0.5
+    assert 0.0 <= creep <= 2e-7
+
+
+def test_tuned_stack_carries_its_weight_and_does_not_sink() -> None:
+    boxes = [cube(f"box{k}", k + 0.5) for k in range(10)]
+    trajectory = drive(make(FLOOR, *boxes, mu=0.5, g=(0.0, 0.0, -G), T=1.0), "tuned")
+    assert trajectory.contacts is not None
+    for k in range(10):
+        load = trajectory.contacts.impulse_between(k, k + 1)[-1, 2]
+        assert load == pytest.approx((10 - k) * G * DT, rel=1e-9)
+    # (1-d)/kappa g dt^2 = 1e-3 x1 of depth for each weight above an interface, over all of them
+    assert abs(trajectory.pose[-1, 10, 2] - 9.5) <= 55 * 1e-3 * G * DT**2
+    assert trajectory.certificate["residual"] <= 1e-9
+
+
+# ---- robustness -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_two_builds_give_the_same_bits(profile: str) -> None:
+    scene = make(FLOOR, *[cube(f"box{k}", k + 0.51, x=0.07 * k) for k in range(4)], mu=0.5, g=(0.0, 0.0, -G), T=1.0)
+    assert drive(scene, profile).state_hash() == drive(scene, profile).state_hash()
+
+
+def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, capfd) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = make(ball("ball", 1.0, 1.0, 1e-9, force=(1e300, 0.0, 0.0)), T=0.1)
+    trajectory = drive(scene, "default")
+    assert trajectory.finish == "diverged" and len(trajectory.t) < 25
+    assert capfd.readouterr() == ("", "") and os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"cone": "round"}, "cone"),
+        ({"integrator": "discrete"}, "integrator"),
+        ({"iterations": 0}, "iterations"),
+        ({"iterations": 3.0}, "iterations"),
+        ({"tolerance": math.nan}, "tolerance"),
+        ({"impratio": 0.0}, "impratio"),
+        ({"margin": -1.0}, "margin"),
+        ({"solref": (0.02,)}, "solref"),
+        ({"solimp": (0.9, 0.95, 0.001, 0.5, math.inf)}, "solimp"),
+        ({"solreffriction": (0.02, 1.0)}, "solreffriction"),
+        ({"kappa_elastic": 0.1}, "kappa_elastic"),
+        ({"surprise": 1}, "surprise"),
+        ({"solref": "reflect"}, "kappa_elastic"),
+    ],
+)
+def test_bad_settings_are_refused_in_one_line(change: dict[str, Any], field: str) -> None:
+    scene = make(FLOOR, ball("ball", 1.0))
+    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+        ENGINE.build(scene, DT, settings(scene, "default") | change)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_setting_is_refused() -> None:
+    scene = make(FLOOR, ball("ball", 1.0))
+    chosen = settings(scene, "default")
+    del chosen["cone"]
+    with pytest.raises(EngineError, match=r"^cone: is missing"):
+        ENGINE.build(scene, DT, chosen)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, math.nan, math.inf])
+def test_bad_steps_are_refused(dt: float) -> None:
+    scene = make(FLOOR, ball("ball", 1.0))
+    with pytest.raises(EngineError, match=r"^dt: "):
+        ENGINE.build(scene, dt, settings(scene, "default"))
+
+
+def test_moments_that_no_body_has_are_refused() -> None:
+    scene = make(FLOOR, ball("ball", 1.0, inertia=(1.0, 1.0, 3.0)))
+    refusal = ENGINE.refuses(scene, "default")
+    assert refusal is not None and refusal.startswith("ball.inertia: ")
+    with pytest.raises(EngineError, match=r"^ball\.inertia: "):
+        drive(scene)
+
+
+def test_what_mujoco_itself_refuses_becomes_one_line() -> None:
+    scene = make(FLOOR, ball("ball", 1.0, 0.0, 1e-30))
+    with pytest.raises(EngineError, match="MuJoCo does not compile it") as caught:
+        drive(scene)
+    assert "\n" not in str(caught.value)
