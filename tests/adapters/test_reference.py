@@ -1,0 +1,228 @@
+"""The adapter of our own solver: both dimensions, both profiles, certificate and readback."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.reference import REASONS, ReferenceEngine
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling, Trajectory
+
+ENGINE = ReferenceEngine()
+PROFILES = ("classical", "reference")
+DT = 1.0 / 240.0
+EPS = np.finfo(float).eps
+
+
+def floor(dimension: int) -> Body:
+    return Body("floor", HalfSpace((0.0,) * (dimension - 1) + (1.0,), 0.0), motion="fixed")
+
+
+def body(name: str, dimension: int, position: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0),
+         box: bool = False, **changes: Any) -> Body:  # fmt: skip
+    """Disc, sphere, square or cube of 1 m and 1 kg; positions and velocities in the vertical plane."""
+    (x, z), (vx, vz) = position, velocity
+    if dimension == 2:
+        made = Body(name, Box((0.5, 0.5)) if box else Disc(0.5), 1.0, 0.125, (x, z, 0.0), (vx, vz, 0.0))
+    else:
+        shape = Box((0.5, 0.5, 0.5)) if box else Sphere(0.5)
+        pose = (x, 0.0, z, 1.0, 0.0, 0.0, 0.0)
+        made = Body(name, shape, 1.0, (0.1, 0.1, 0.1), pose, (vx, 0.0, vz, 0.0, 0.0, 0.0))
+    return replace(made, **changes)
+
+
+def make(*bodies: Body, e: float = 0.0, mu: float = 0.0, g: float = 0.0, T: float = 0.1,
+         pairs: tuple[Pair, ...] = ()) -> Scene:  # fmt: skip
+    dimension = 2 if len(bodies[-1].pose) == 3 else 3
+    gravity = (0.0,) * (dimension - 1) + (-g,)
+    return Scene("test", 1, dimension, bodies, (Pair(restitution=e, friction=mu), *pairs), gravity, T)
+
+
+def drive(scene: Scene, profile: str, dt: float = DT, iterations: int | None = None) -> Trajectory:
+    chosen = ENGINE.settings(profile, needs(scene), dt, iterations)
+    return run(ENGINE, scene, dt, {s.name: s.value for s in chosen}, Sampling(1, 0.0))
+
+
+both = pytest.mark.parametrize("dimension", [2, 3])
+profiles = pytest.mark.parametrize("profile", PROFILES)
+
+
+@both
+@profiles
+@pytest.mark.parametrize(("e", "v"), [(0.0, 6.0), (0.2, 0.1), (0.8, 6.0), (1.0, 50.0)])
+def test_a_single_contact_rebounds_with_exactly_minus_e_v(dimension: int, profile: str, e: float, v: float) -> None:
+    ball = body("ball", dimension, (0.0, 0.5 + 3.4 * v * DT), (0.0, -v))
+    trajectory = drive(make(floor(dimension), ball, e=e, T=8 * DT), profile)
+    up = dimension - 1
+    assert abs(trajectory.twist[-1, 1, up] - e * v) <= 4.0 * EPS * v
+    assert trajectory.contacts is not None
+    impulse = trajectory.contacts.impulse_between(0, 1).sum(axis=0)
+    assert abs(impulse[up] - (1.0 + e) * v) <= 8.0 * EPS * v
+    assert np.all(trajectory.contacts.rows.normal[:, up] == 1.0)
+
+
+@both
+@profiles
+def test_each_pair_has_its_own_restitution(dimension: int, profile: str) -> None:
+    balls = [body(f"b{i}", dimension, (3.0 * i, 0.51), (0.0, -3.0)) for i in range(3)]
+    pairs = tuple(Pair(f"b{i}", "floor", e) for i, e in enumerate((0.0, 0.3, 1.0)))
+    trajectory = drive(make(*balls, floor(dimension), body("far", dimension, (-9.0, 9.0)), pairs=pairs), profile)
+    assert np.allclose(trajectory.twist[-1, :3, dimension - 1], [0.0, 0.9, 3.0], rtol=0.0, atol=1e-14)
+
+
+@both
+@profiles
+@pytest.mark.parametrize("swapped", [False, True])
+def test_impulses_act_on_the_higher_index(dimension: int, profile: str, swapped: bool) -> None:
+    left = body("left", dimension, (-0.52, 0.0), (3.0, 0.0), mass=2.0)
+    right = body("right", dimension, (0.52, 0.0), (-1.0, 0.0))
+    bodies = (right, left) if swapped else (left, right)
+    trajectory = drive(make(*bodies, e=0.5), profile)
+    assert trajectory.contacts is not None
+    impulse = trajectory.contacts.impulse_between(0, 1).sum(axis=0)
+    gained = bodies[1].mass * (trajectory.twist[-1, 1, :dimension] - np.array(bodies[1].twist[:dimension]))
+    assert np.allclose(impulse, gained, rtol=0.0, atol=1e-14)
+    assert impulse[0] == pytest.approx(-4.0 if swapped else 4.0, abs=1e-14)  # 2/3 kg x 1.5 x 4 m/s
+    assert np.allclose(trajectory.contacts.rows.normal[:, 0], -1.0 if swapped else 1.0)
+
+
+@both
+@profiles
+def test_free_fall_is_ahead_of_the_parabola_by_g_t_dt_over_two(dimension: int, profile: str) -> None:
+    trajectory = drive(make(body("ball", dimension, (0.0, 0.0)), g=9.81, T=1.0), profile)
+    t, up = trajectory.t, dimension - 1
+    offset = ENGINE.facts.scheme.position_offset
+    exact = -0.5 * 9.81 * t * t - offset * 0.5 * 9.81 * t * DT
+    assert np.abs(trajectory.pose[:, 0, up] - exact).max() < 3e-13
+
+
+@profiles
+def test_forces_and_torques_act_with_the_stated_mass_and_inertia(profile: str) -> None:
+    flat = body("b", 2, (0.0, 0.0), box=True, mass=4.0, inertia=0.7, force=(2.0, -6.0), torque=(1.4,))
+    assert np.allclose(drive(make(flat, T=1.0), profile).twist[-1, 0], [0.5, -1.5, 2.0], rtol=0.0, atol=1e-12)
+    moments = (0.7, 0.7, 0.7)  # equal moments: no gyroscopic term
+    loads = {"force": (2.0, 4.0, -6.0), "torque": (1.4, 0.0, -0.7)}
+    solid = body("b", 3, (0.0, 0.0), box=True, mass=4.0, inertia=moments, **loads)
+    expected = [0.5, 1.0, -1.5, 2.0, 0.0, -1.0]
+    assert np.allclose(drive(make(solid, T=1.0), profile).twist[-1, 0], expected, rtol=0.0, atol=1e-12)
+
+
+@both
+@profiles
+def test_a_resting_box_carries_its_weight(dimension: int, profile: str) -> None:
+    box = body("box", dimension, (0.0, 0.5), box=True)
+    trajectory = drive(make(floor(dimension), box, mu=0.5, g=9.81, T=0.5), profile)
+    assert trajectory.contacts is not None
+    load = trajectory.contacts.impulse_between(0, 1)[-1]
+    # The residual stop leaves 1e-13 of a step's speed, 10 sweeps with warm starting 1e-6 after a hundred steps.
+    assert load[dimension - 1] == pytest.approx(9.81 * DT, rel=1e-12 if profile == "reference" else 1e-6)
+    assert len(trajectory.contacts.rows.a[trajectory.contacts.offset[-2] :]) == (2 if dimension == 2 else 4)
+
+
+@both
+@profiles
+def test_a_sliding_box_is_braked_by_mu_g(dimension: int, profile: str) -> None:
+    box = body("box", dimension, (0.0, 0.5), (3.0, 0.0), box=True)
+    trajectory = drive(make(floor(dimension), box, mu=0.3, g=9.81, T=0.5), profile)
+    rate = (trajectory.twist[-1, 1, 0] - trajectory.twist[60, 1, 0]) / (trajectory.t[-1] - trajectory.t[60])
+    assert rate == pytest.approx(-0.3 * 9.81, rel=1e-9)
+
+
+@both
+@profiles
+def test_a_prescribed_body_keeps_its_motion_and_pushes(dimension: int, profile: str) -> None:
+    wall = body("wall", dimension, (-1.02, 0.0), (1.0, 0.0), box=True, motion="prescribed")
+    trajectory = drive(make(wall, body("ball", dimension, (0.0, 0.0)), e=0.5), profile)
+    assert np.all(trajectory.twist[:, 0, 0] == 1.0)
+    assert trajectory.twist[-1, 1, 0] == pytest.approx(1.5, abs=1e-14)
+
+
+@both
+def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) -> None:
+    boxes = [body(f"b{i}", dimension, (0.0, 0.5 + i), box=True) for i in range(2)]
+    scene = make(floor(dimension), *boxes, mu=0.5, g=9.81, T=0.1)
+    solved, starved = drive(scene, "reference").certificate, drive(scene, "classical", iterations=1).certificate
+    assert solved["converged"] is True and solved["residual"] <= 1e-13
+    assert starved["residual"] > 1e-6 and starved["worst_sweeps"] == 1 and starved["sweeps"] == 24
+    assert json.loads(json.dumps(solved)) == solved
+
+
+@both
+@profiles
+def test_what_the_solver_holds_is_what_was_asked(dimension: int, profile: str) -> None:
+    inertia: Any = 0.11 if dimension == 2 else (0.11, 0.12, 0.13)
+    ball = body("ball", dimension, (0.0, 0.6), mass=2.0, inertia=inertia)
+    held = drive(make(floor(dimension), ball, e=0.5, mu=0.3, g=9.0), profile).readback
+    assert held["dt"] == DT and held["gravity"][-1] == -9.0
+    assert held["bodies"] == {"ball": {"mass": 2.0, "inertia": 0.11 if dimension == 2 else [0.11, 0.12, 0.13]}}
+    assert held["pairs"] == {"floor-ball": {"restitution": 0.5, "friction": 0.3}}
+    assert (held["residual"] is None) == (profile == "classical")
+    assert isinstance(held["left_out"], list)
+    assert json.loads(json.dumps(held)) == held
+
+
+def test_every_setting_of_the_solver_has_its_reason() -> None:
+    from reference_solver import Settings
+
+    names = {field.name for field in fields(Settings)} - {"dt"}
+    assert set(REASONS) == names
+    scene = make(floor(2), body("ball", 2, (0.0, 1.0)))
+    classical, reference = (ENGINE.settings(profile, needs(scene), DT) for profile in PROFILES)
+    assert {s.name for s in classical} == names and {s.name for s in reference} == names - {"iterations"}
+    assert all(s.because and s.source for s in (*classical, *reference))
+    assert {s.name: s.value for s in classical}["iterations"] == 10
+
+
+def test_an_iteration_count_reaches_classical_and_is_refused_by_reference() -> None:
+    scene = make(floor(2), body("ball", 2, (0.0, 1.0)))
+    assert drive(scene, "classical", iterations=7).readback["iterations"] == 7
+    with pytest.raises(EngineError, match=r"^iterations: reference/reference does not stop at an iteration count"):
+        drive(scene, "reference", iterations=7)
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [({"iterations": 0}, "iterations"), ({"slop": -1.0}, "slop"), ({"speed": 1.0}, "speed"), ({"beta": 2.0}, "beta")],
+)
+def test_a_bad_setting_is_refused_in_one_line(settings: dict[str, Any], field: str) -> None:
+    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+        ENGINE.build(make(floor(2), body("ball", 2, (0.0, 1.0))), DT, settings)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, math.nan])
+def test_a_bad_step_is_refused(dt: float) -> None:
+    with pytest.raises(EngineError, match=r"^dt: "):
+        ENGINE.build(make(floor(2), body("ball", 2, (0.0, 1.0))), dt, {})
+
+
+@both
+@profiles
+def test_two_builds_give_the_same_bits(dimension: int, profile: str) -> None:
+    boxes = [body(f"b{i}", dimension, (0.01 * i, 0.5 + i), box=True) for i in range(2)]
+    scene = make(floor(dimension), *boxes, mu=0.5, g=9.81, T=0.1)
+    first, second = drive(scene, profile), drive(scene, profile)
+    assert first.state_hash() == second.state_hash()
+    assert first.contacts is not None and second.contacts is not None
+    assert first.contacts.rows.impulse.tobytes() == second.contacts.rows.impulse.tobytes()
+
+
+def test_the_version_names_the_package_and_the_solvers_sources() -> None:
+    package, _, sources = ENGINE.version().partition("+")
+    assert package and len(sources) == 8 and int(sources, 16) >= 0
+    assert ENGINE.version() == ENGINE.version()
+
+
+def test_nothing_that_is_a_scene_is_refused() -> None:
+    for dimension in (2, 3):
+        scene = make(floor(dimension), body("ball", dimension, (0.0, 1.0)), e=1.0, mu=2.0)
+        assert all(ENGINE.refuses(scene, profile) is None for profile in PROFILES)
