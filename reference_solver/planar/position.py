@@ -7,12 +7,11 @@ from reference_solver.model import Array
 from reference_solver.planar.block import sweep_block_pushes
 from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, A, B
 from reference_solver.planar.kinematics import normal_velocity
+from reference_solver.planar.rows import ROUND_OFF
 from reference_solver.planar.sequential_impulses import sweep_pushes
 from reference_solver.planar.state import BLOCK, CONTACTS, SPLIT, Bodies, Options, Rows
 from reference_solver.tally import PROJECTED
 
-#: Overlap below this fraction of the smaller half width is round-off and is not corrected.
-ROUND_OFF = 1e-12
 #: With a residual stop, sweeps end when no row misses its correction by more than this share of the largest.
 #: Positions feed back into the next step's correction, so that four digits per step are plenty.
 PUSH_TOLERANCE = 1e-4

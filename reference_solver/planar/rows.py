@@ -14,6 +14,7 @@ from reference_solver.planar.columns import (
     BN,
     BT,
     COUPLING,
+    EXTENT,
     FRICTION,
     GAP,
     IMPACT,
@@ -39,6 +40,12 @@ from reference_solver.planar.state import BAUMGARTE, CONTACTS, Bodies, Options, 
 #: 1e-13 it allows 5e-15 of them, about 20 units in the last place.
 SPEED_SHARE = 0.05
 
+#: Gaps and overlaps below this fraction of the smaller half width are round-off, not geometry; they are neither
+#: closed nor corrected.
+ROUND_OFF = 1e-12
+#: The same for coordinates far from the origin: some ten units in their last place.
+COORDINATE_NOISE = 2e-15
+
 
 @inner_kernel
 def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
@@ -50,7 +57,7 @@ def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
             rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, POINT + k]
         rows.real[c, FRICTION] = pairs.friction[a, b]
         rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
-        set_target(pairs, rows, c, options)
+        set_target(bodies, pairs, rows, c, options)
         set_speed(bodies, rows, c, options)
 
 
@@ -72,15 +79,21 @@ def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
 
 
 @inner_kernel
-def set_target(pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
-    """Normal velocity b_n to reach (E7, E8, E15)."""
+def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
+    """Normal velocity b_n to reach (E7, E8, E15).
+
+    A gap may be closed within the step, not more; an overlap asks for nothing. A gap within round-off counts as
+    touching: divided by dt it would be noise that the solver had to answer in every step.
+    """
+    a, b = rows.index[c, A], rows.index[c, B]
     u, gap = rows.real[c, APPROACH], rows.real[c, GAP]
-    # A gap may be closed within the step, not more; an overlap asks for nothing.
-    target = -max(gap, 0.0) / options.dt
+    place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
+    noise = ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
+    target = -gap / options.dt if gap > noise else 0.0
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
     if options.restitution and u < 0.0:
-        rebound = -pairs.restitution[rows.index[c, A], rows.index[c, B]] * u
+        rebound = -pairs.restitution[a, b] * u
         if rebound > 0.0:
             target = max(rebound, target)
     rows.real[c, TARGET] = target
