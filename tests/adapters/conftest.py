@@ -123,9 +123,10 @@ class ToySimulation(Simulation):
                 torque = np.array(body.torque) * (-1 if self.fault == "torque sign" else 1)
                 twist[i, :3] += dt * (gravity + self.inverse_mass[i] * np.array(body.force))
                 twist[i, 3:] += dt * self.inverse_inertia[i] @ torque
+        friction_times = 2 if self.fault == "friction applied twice" else 1
         for _ in range(self.iterations):
-            for row in rows:
-                row.solve(twist, 2 if self.fault == "friction applied twice" else 1)
+            if max((row.solve(twist, friction_times) for row in rows), default=0.0) < 1e-15:
+                break  # nothing moves any more
         self.world.contacts = [(row.a, row.b, row.point, row.axes[0], row.total(), row.gap) for row in rows]
         if self.fault == "hidden damping of 4 %":
             twist[:, :3] *= 1 - 0.04 * dt
@@ -208,10 +209,10 @@ class Row:
         side = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.5 else np.array([0.0, 1.0, 0.0])
         first = side - (side @ normal) * normal
         first /= np.linalg.norm(first)
-        self.axes = np.array([normal, first, np.cross(normal, first)])
+        self.axes = np.array([normal, first, cross(normal, first)])
         arms = [point - world.world.pose[k, :3] for k in (a, b)]
         #: Rows of the Jacobian (3, 2, 6) and velocity per unit impulse.
-        self.jacobian = np.array([[[*(-n), *(-np.cross(arms[0], n))], [*n, *np.cross(arms[1], n)]] for n in self.axes])
+        self.jacobian = np.array([[[*(-n), *(-cross(arms[0], n))], [*n, *cross(arms[1], n)]] for n in self.axes])
         self.response = np.zeros_like(self.jacobian)
         for side_of, k in enumerate((a, b)):
             self.response[:, side_of, :3] = world.inverse_mass[k] * self.jacobian[:, side_of, :3]
@@ -224,6 +225,7 @@ class Row:
         self.applied = np.zeros(3)
 
     def solve(self, twist, friction_times):
+        largest = 0.0
         for axis in (0, 1, 2):
             speed = float((self.jacobian[axis] * twist[[self.a, self.b]]).sum())
             wanted = self.impulse[axis] - self.mass[axis] * (speed + (self.bounce if axis == 0 else 0.0))
@@ -232,10 +234,19 @@ class Row:
             change = (new - self.impulse[axis]) * (1 if axis == 0 else friction_times)
             self.impulse[axis] = new
             self.applied[axis] += change
-            twist[[self.a, self.b]] += change * self.response[axis]
+            if change:
+                twist[[self.a, self.b]] += change * self.response[axis]
+            largest = max(largest, abs(change))
+        return largest
 
     def total(self):
         return self.applied @ self.axes
+
+
+def cross(a, b):
+    """What np.cross gives, without its overhead."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def rotation(q):
@@ -253,7 +264,7 @@ def rotation(q):
 def turned(q, angle):
     """Quaternion ``q`` turned by a small rotation vector in world axes: q + (0, angle) q / 2, normalised."""
     w, u = q[0], q[1:]
-    new = q + 0.5 * np.concatenate([[-(angle @ u)], w * angle + np.cross(angle, u)])
+    new = q + 0.5 * np.concatenate([[-(angle @ u)], w * angle + cross(angle, u)])
     return new / np.linalg.norm(new)
 
 
