@@ -60,12 +60,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Probe:
-    """A scene, the quantities it shows, when it applies, and how they are read from its trajectory."""
+    """A scene, the quantities it shows, and how they are read from its trajectory.
+
+    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet.
+    """
 
     quantities: tuple[str, ...]
     make: Callable[[Case], Scene]
     read: Callable[[Case, Scene, Trajectory], Samples]
     only_ends: bool = False
+    touches: bool = True
 
     def sampling(self, case: Case, scene: Scene) -> Sampling:
         """Every step, or the ends alone."""
@@ -338,10 +342,10 @@ def read_corner(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 PROBES = {
-    "fall": Probe(("gravity", "step", "sampling"), fall, read_fall),
-    "load": Probe(("mass", "inertia", "turn"), load, read_load),
+    "fall": Probe(("gravity", "step", "sampling"), fall, read_fall, touches=False),
+    "load": Probe(("mass", "inertia", "turn"), load, read_load, touches=False),
     "landing": Probe(("size",), landing, read_landing),
-    "flight": Probe(("linear_damping", "angular_damping"), flight, read_flight, only_ends=True),
+    "flight": Probe(("linear_damping", "angular_damping"), flight, read_flight, only_ends=True, touches=False),
     "rebound": Probe(("restitution",), rebound, read_rebound, only_ends=True),
     "slide": Probe(("friction",), slide, read_slide, only_ends=True),
     "corner": Probe(("turn",), corner, read_corner, only_ends=True),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -71,7 +71,7 @@ def receipts(
 ) -> tuple[Receipt, ...]:
     """Measure what ``profile`` realises for a scene with ``needs``.
 
-    Measurements are kept per engine, profile, settings, step, dimension and pair values.
+    Each probe is kept per engine, profile, settings, step and dimension, and if it touches, per pair values.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def receipts(
             raise EngineError(f"declares: {engine.name}/{profile} declares {quantity!r}, no probe measures it")
     samples, silent = _measured(engine, profile, values, case, names)
     wanted = [q for q in QUANTITIES if any(q in PROBES[name].quantities for name in names)]
-    return tuple(_receipt(q, needs, case, declared, dict(samples).get(q, ()), dict(silent).get(q)) for q in wanted)
+    return tuple(_receipt(q, needs, case, declared, samples.get(q, ()), silent.get(q)) for q in wanted)
 
 
 def _applies(probe: str, needs: Needs) -> bool:
@@ -107,34 +107,35 @@ def _frozen(value: Any) -> Any:
     return value
 
 
-Silent = tuple[tuple[str, tuple[str, bool]], ...]
-
-
-@lru_cache(maxsize=1024)
 def _measured(
     engine: Engine, profile: str, values: tuple[tuple[str, Any], ...], case: Case, names: tuple[str, ...]
-) -> tuple[tuple[tuple[str, tuple[float, ...]], ...], Silent]:
+) -> tuple[Samples, dict[str, tuple[str, bool]]]:
     """Samples by quantity, and for quantities without: the reason and whether the engine refused."""
-    samples: dict[str, tuple[float, ...]] = {}
+    samples: Samples = {}
     silent: dict[str, tuple[str, bool]] = {}
     for name in names:
-        found = _probe(engine, profile, dict(values), case, name)
+        # Bodies that meet nothing do not depend on what a pair does: measured once for all pairs.
+        own = case if PROBES[name].touches else replace(case, restitution=0.0, friction=0.0)
+        found = _probe(engine, profile, values, own, name)
         if isinstance(found, dict):
             for quantity, numbers in found.items():
                 samples[quantity] = samples.get(quantity, ()) + tuple(float(x) for x in numbers)
         else:
             silent.update((quantity, found) for quantity in PROBES[name].quantities)
-    return tuple(samples.items()), tuple(silent.items())
+    return samples, silent
 
 
-def _probe(engine: Engine, profile: str, values: dict[str, Any], case: Case, name: str) -> Samples | tuple[str, bool]:
+@lru_cache(maxsize=4096)
+def _probe(
+    engine: Engine, profile: str, values: tuple[tuple[str, Any], ...], case: Case, name: str
+) -> Samples | tuple[str, bool]:
     """Run one probe: its samples, or why there are none and whether the engine refused."""
     probe = PROBES[name]
     scene = probe.make(case)
     refusal = engine.refuses(posed_for(engine, scene), profile)
     if refusal:
         return f"probe {name} refused: {refusal}", True
-    trajectory = run(engine, scene, case.dt, values, probe.sampling(case, scene))
+    trajectory = run(engine, scene, case.dt, dict(values), probe.sampling(case, scene))
     if trajectory.finish == "diverged":
         return f"probe {name} diverged: {trajectory.reason}", False
     return probe.read(case, scene, trajectory)
