@@ -1,11 +1,27 @@
-"""Velocities at contact points, and what an impulse does to two bodies."""
+"""Velocities at contact points, what loads do to them, and what an impulse does to two bodies."""
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.columns import AN, AT, BN, BT, INVERSE_INERTIA, INVERSE_MASS, NX, NY, A, B
-from reference_solver.planar.state import Bodies, Rows
+from reference_solver.planar.columns import (
+    AN,
+    ARM_A,
+    ARM_B,
+    AT,
+    BN,
+    BT,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LOAD,
+    NX,
+    NY,
+    A,
+    B,
+)
+from reference_solver.planar.state import Bodies, Options, Rows
 
 
 @inner_kernel
@@ -48,3 +64,38 @@ def apply_tangent(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) ->
     twist[b, 0] += bodies.real[b, INVERSE_MASS] * px
     twist[b, 1] += bodies.real[b, INVERSE_MASS] * py
     twist[b, 2] += bodies.real[b, INVERSE_INERTIA] * (rows.real[c, BT] * p)
+
+
+@inner_kernel
+def acceleration_at(bodies: Bodies, i: int, x: float, y: float) -> float:
+    """Magnitude of what loads alone do to a point of body i at arm (x, y) [m/s^2]."""
+    ax = bodies.real[i, LOAD] - bodies.real[i, LOAD + 2] * y
+    ay = bodies.real[i, LOAD + 1] + bodies.real[i, LOAD + 2] * x
+    return math.sqrt(ax * ax + ay * ay)
+
+
+@inner_kernel
+def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
+    """Speed of a point of body i at arm (x, y) [m/s]."""
+    vx = bodies.twist[i, 0] - bodies.twist[i, 2] * y
+    vy = bodies.twist[i, 1] + bodies.twist[i, 2] * x
+    return math.sqrt(vx * vx + vy * vy)
+
+
+@inner_kernel
+def load_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> float:
+    """Largest relative speed that the loads of one step can give the two points of row c [m/s]."""
+    a, b = rows.index[c, A], rows.index[c, B]
+    speed = acceleration_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
+    speed += acceleration_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
+    return options.dt * speed
+
+
+@inner_kernel
+def is_resting(bodies: Bodies, rows: Rows, c: int, options: Options) -> bool:
+    """The points of row c meet no faster than the loads of one step explain; needs geometry only."""
+    a, b = rows.index[c, A], rows.index[c, B]
+    ax, ay, bx, by = rows.real[c, ARM_A], rows.real[c, ARM_A + 1], rows.real[c, ARM_B], rows.real[c, ARM_B + 1]
+    ux = (bodies.twist[b, 0] - bodies.twist[b, 2] * by) - (bodies.twist[a, 0] - bodies.twist[a, 2] * ay)
+    uy = (bodies.twist[b, 1] + bodies.twist[b, 2] * bx) - (bodies.twist[a, 1] + bodies.twist[a, 2] * ax)
+    return -(rows.real[c, NX] * ux + rows.real[c, NY] * uy) <= load_speed(bodies, rows, c, options)

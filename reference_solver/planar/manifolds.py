@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import find_candidates
-from reference_solver.planar.columns import FEATURE, IMPACT, PN, PT, A, B
+from reference_solver.planar.columns import EXTENT, FEATURE, GAP, IMPACT, PN, PT, ROW_INTEGERS, ROW_REALS, A, B
+from reference_solver.planar.kinematics import is_resting
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import (
     CANDIDATES,
@@ -17,6 +18,10 @@ from reference_solver.planar.state import (
     Pairs,
     Rows,
 )
+
+#: A gap below this fraction of the smaller half width is touching. Far above round-off, far below what a body
+#: moves in a step.
+TOUCHING = 1e-9
 
 
 @inner_kernel
@@ -35,6 +40,8 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
             return False
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
         found = collide(bodies, a, b, options.margin, rows, contacts)
+        if options.restitution and pairs.restitution[a, b] > 0.0:
+            found = drop_approaching(bodies, rows, contacts, found, options)
         if found > 0:
             rows.manifold[manifolds] = contacts
             manifolds += 1
@@ -43,6 +50,27 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     rows.count[CONTACTS], rows.count[MANIFOLDS] = contacts, manifolds
     recall(bodies, rows, options)
     return True
+
+
+@inner_kernel
+def drop_approaching(bodies: Bodies, rows: Rows, first: int, found: int, options: Options) -> int:
+    """Of the points of a pair with restitution, keep those that touch or rest; return how many.
+
+    A point that flies towards its impact must not be slowed down before it gets there (E8).
+    """
+    kept = 0
+    for i in range(found):
+        c = first + i
+        a, b = rows.index[c, A], rows.index[c, B]
+        touching = TOUCHING * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+        if rows.real[c, GAP] <= touching or is_resting(bodies, rows, c, options):
+            if kept < i:
+                for k in range(ROW_INTEGERS):
+                    rows.index[first + kept, k] = rows.index[c, k]
+                for k in range(ROW_REALS):
+                    rows.real[first + kept, k] = rows.real[c, k]
+            kept += 1
+    return kept
 
 
 @inner_kernel

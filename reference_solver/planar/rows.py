@@ -20,7 +20,6 @@ from reference_solver.planar.columns import (
     IMPACT,
     INVERSE_INERTIA,
     INVERSE_MASS,
-    LOAD,
     NORMAL_MASS,
     NX,
     NY,
@@ -33,7 +32,14 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import (
+    apply_normal,
+    apply_tangent,
+    load_speed,
+    normal_velocity,
+    speed_at,
+    tangent_velocity,
+)
 from reference_solver.planar.state import BAUMGARTE, CONTACTS, Bodies, Options, Pairs, Rows
 
 #: Round-off floor of a contact's reference speed, as a share of the speeds of its two points: with a residual of
@@ -107,32 +113,15 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
     step before does not guess this step's, nor this one the next (E9).
     """
     a, b = rows.index[c, A], rows.index[c, B]
-    push = options.dt * (acceleration_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1]))
-    push += options.dt * (acceleration_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1]))
-    slip = tangent_velocity(bodies.twist, rows, c)
-    meeting = math.sqrt(rows.real[c, APPROACH] * rows.real[c, APPROACH] + slip * slip)
+    push = load_speed(bodies, rows, c, options)
+    approach, slip = rows.real[c, APPROACH], tangent_velocity(bodies.twist, rows, c)
+    meeting = math.sqrt(approach * approach + slip * slip)
     moving = speed_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
     rows.real[c, SPEED] = max(meeting, push, SPEED_SHARE * moving)
-    rows.index[c, IMPACT] = 1 if abs(rows.real[c, APPROACH]) > push else 0
-    if rows.real[c, APPROACH] > push:
+    rows.index[c, IMPACT] = 1 if abs(approach) > push else 0
+    if approach > push:
         rows.real[c, PN] = rows.real[c, PT] = 0.0
-
-
-@inner_kernel
-def acceleration_at(bodies: Bodies, i: int, x: float, y: float) -> float:
-    """Magnitude of what loads alone do to a point of body i at arm (x, y) [m/s^2]."""
-    ax = bodies.real[i, LOAD] - bodies.real[i, LOAD + 2] * y
-    ay = bodies.real[i, LOAD + 1] + bodies.real[i, LOAD + 2] * x
-    return math.sqrt(ax * ax + ay * ay)
-
-
-@inner_kernel
-def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
-    """Speed of a point of body i at arm (x, y) [m/s]."""
-    vx = bodies.twist[i, 0] - bodies.twist[i, 2] * y
-    vy = bodies.twist[i, 1] + bodies.twist[i, 2] * x
-    return math.sqrt(vx * vx + vy * vy)
 
 
 @inner_kernel
