@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from validation.cells import Slot
+from adapters.trajectory import load_trajectory
+from validation.cells import Slot, prepare
 from validation.store import Run, Store
+from validation.tracks import record, representatives
 from validation.workers import TIMEOUT, run_cells
 
 
@@ -44,11 +47,18 @@ def run_plan(
     jobs = jobs or min(len(todo) or 1, os.cpu_count() or 1)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    shown = representatives(slots) if finish else set()
+    with (
+        TemporaryDirectory(prefix="crosscheck-") as scratch,
+        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
+    ):
         task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
         try:
-            path = (lambda slot: keep / f"{slot.key()}.npz") if keep else (lambda slot: None)
-            for observation in run_cells(todo, jobs, timeout, keep=path):
+            folder = Path(scratch)
+            paths = {slot: (keep or folder) / f"{slot.key()}.npz" for slot in todo if keep or slot in shown}
+            for observation in run_cells(todo, jobs, timeout, keep=paths.get):
+                if observation.slot in shown:
+                    _keep_recording(store, run, observation.slot, paths[observation.slot])
                 store.add(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
         except KeyboardInterrupt:
@@ -57,3 +67,10 @@ def run_plan(
     if finish:
         store.finish(run)
     return run
+
+
+def _keep_recording(store: Store, run: Run, slot: Slot, path: Path) -> None:
+    """Keep what a replay shows; a cell that was refused or crashed left no trajectory."""
+    if path.exists():
+        prepared = prepare(slot)
+        store.add_recording(run, slot, record(prepared.canonical, prepared.scene, load_trajectory(path)))

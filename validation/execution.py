@@ -51,7 +51,10 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
     try:
         slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
-        trajectory = run(engine, scene, slot.dt, values, prepared.canonical.sampling(scene))
+        sampling = prepared.canonical.sampling(scene)
+        if keep is not None and sampling.stride == 1:  # what is kept is looked at: with its contacts, from the start
+            sampling = replace(sampling, contacts_from=0.0)
+        trajectory = run(engine, scene, slot.dt, values, sampling)
     except Exception as error:  # whatever an engine raises costs this cell only
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         return replace(blank, outcome=Outcome.CRASHED, reason=reason, settings=shown)

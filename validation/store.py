@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from validation.bench.timing import Timing, timing_from_dict
-from validation.cells import Observation, Slot, observation_from_dict
+from validation.cells import Observation, Slot, observation_from_dict, slot_from_dict
 from validation.identity import code_hash, commit, machine
+from validation.tracks import Recording, recording_from_bytes
 
 FILE = "results.sqlite"
 _SCHEMA = """
@@ -28,6 +29,9 @@ CREATE TABLE IF NOT EXISTS timings (
     purpose TEXT NOT NULL, engine TEXT NOT NULL, scene TEXT NOT NULL, seconds REAL NOT NULL, body TEXT NOT NULL,
     PRIMARY KEY (run, slot, purpose, sampled, round));
 CREATE TABLE IF NOT EXISTS protocols (run TEXT PRIMARY KEY REFERENCES runs(id), body TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS recordings (
+    run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, request TEXT NOT NULL, body BLOB NOT NULL,
+    PRIMARY KEY (run, slot));
 """
 
 
@@ -195,3 +199,15 @@ class Store:
         """Protocol of a bench run; None for a run that timed nothing."""
         row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
         return None if row is None else dict(json.loads(row[0]))
+
+    def add_recording(self, run: Run, slot: Slot, recording: Recording) -> None:
+        """Keep what a replay shows of a cell."""
+        row = (run.id, slot.key(), json.dumps(slot.as_dict()), recording.to_bytes())
+        self._db.execute("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", row)
+
+    def recordings(self, run: Run) -> list[tuple[Slot, Recording]]:
+        """Recordings of a run, in the order of its plan."""
+        rows = self._db.execute("SELECT slot, request, body FROM recordings WHERE run = ?", (run.id,)).fetchall()
+        order = {key: position for position, key in enumerate(run.plan)}
+        rows.sort(key=lambda row: order.get(row[0], len(order)))
+        return [(slot_from_dict(json.loads(slot)), recording_from_bytes(body)) for _, slot, body in rows]

@@ -1,0 +1,93 @@
+"""Recordings: small, faithful to what is shown, and they say when a motion left what the tolerances allow."""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.trajectory import Trajectory
+from validation.cells import Slot
+from validation.scenes import CATALOGUE
+from validation.tracks import record, recording_from_bytes, representatives
+
+DT = 1.0 / 240.0
+
+
+def trajectory_of(scene, t, position):
+    pose = np.tile([body.pose for body in scene.bodies], (len(t), 1, 1))
+    pose[:, 1, : scene.dimension] = position
+    return Trajectory(t, pose, np.zeros_like(pose), None, DT, "completed")
+
+
+def bouncing(e, height, position_first):
+    """A correct fixed-step method: reflects the velocity in the step after which the ball would be in the floor."""
+    scene = CATALOGUE["bounce"].scene(2, {"e": 0.8, "height": height})
+    steps = math.ceil(scene.duration / DT)
+    y, v, path = height, 0.0, [height]
+    for _ in range(steps):
+        if position_first:
+            y += v * DT
+            v = -e * v if y <= 0.0 and v < 0.0 else v - 9.81 * DT
+        else:
+            v = -e * v if y <= 0.0 and v < 0.0 else v - 9.81 * DT
+            y += v * DT
+        path.append(y)
+    t = np.arange(steps + 1) * DT
+    return scene, trajectory_of(scene, t, np.column_stack([np.zeros(steps + 1), np.array(path) + 0.5]))
+
+
+@pytest.mark.parametrize("position_first", [True, False])
+def test_a_correct_method_stays_in_the_tube_in_every_phase_of_its_impacts(position_first):
+    for height in np.linspace(1.0, 1.04, 9):
+        scene, trajectory = bouncing(0.8, float(height), position_first)
+        assert record(CATALOGUE["bounce"], scene, trajectory).departure is None
+
+
+@pytest.mark.parametrize("e", [0.75, 0.85, 0.13])
+def test_a_wrong_rebound_leaves_the_tube_before_its_second_impact(e):
+    scene, trajectory = bouncing(e, 1.0, True)
+    fall = math.sqrt(2.0 / 9.81)
+    gone = record(CATALOGUE["bounce"], scene, trajectory).departure
+    assert gone is not None and fall < gone < fall * (1.0 + 2.0 * 0.85)
+
+
+def test_the_departure_is_the_first_sample_outside_the_tube():
+    canonical = CATALOGUE["incline"]
+    scene = canonical.scene(2, {"ratio": 0.9})
+    t = np.arange(481) * DT
+    allowed = 9.81 * DT**2  # nothing moves: the checks allow g dt^2 over the whole run
+    x = np.where(t < 1.0, 0.9 * allowed, 1.1 * allowed)
+    trajectory = trajectory_of(scene, t, np.column_stack([x, np.full_like(x, 0.5)]))
+    assert record(canonical, scene, trajectory).departure == t[240]
+
+
+def test_bytes_give_back_poses_to_half_a_level_of_sixteen_bits_and_times_exactly():
+    scene, trajectory = bouncing(0.8, 1.0, True)
+    recording = record(CATALOGUE["bounce"], scene, trajectory)
+    again = recording_from_bytes(recording.to_bytes())
+    half_range = 0.5 * np.ptp(recording.pose, axis=(0, 1))
+    assert np.array_equal(again.t, recording.t)
+    assert (np.abs(again.pose - recording.pose) <= 0.5 * half_range / 32767 * (1 + 1e-9) + 1e-15).all()
+
+
+def test_frames_are_sixty_a_second_and_at_least_a_hundred_and_twenty():
+    scene, trajectory = bouncing(0.8, 1.0, True)
+    t = record(CATALOGUE["bounce"], scene, trajectory).t
+    assert np.allclose(np.diff(t), 1 / 60)
+    short = CATALOGUE["impact"].scene(2)
+    t = np.arange(121) * DT
+    assert len(record(CATALOGUE["impact"], short, trajectory_of(short, t, (0.0, 1.0))).t) == 121
+
+
+def test_one_cell_per_profile_is_kept_with_the_same_parameters_and_step_for_all():
+    def slot(profile, n, dt, iterations=None):
+        return Slot("stack", (("n", float(n)),), 2, "toy", profile, dt, iterations)
+
+    a, b = slot("default", 10, DT), slot("tuned", 10, DT)
+    others = [slot("default", 10, DT, 30), slot("default", 20, DT), slot("tuned", 10, 1 / 60), slot("tuned", 2, DT)]
+    assert representatives([*others, b, a]) == {a, b}
+    # A plan without the preferred parameters keeps what all its profiles share.
+    assert representatives([slot("default", 3, 1 / 60), slot("tuned", 3, 1 / 60)]) == {
+        slot("default", 3, 1 / 60),
+        slot("tuned", 3, 1 / 60),
+    }
