@@ -72,7 +72,8 @@ def _slides(observation: Observation) -> bool:
 def _threshold(observations: Sequence[Observation]) -> tuple[float | None, str, Check] | None:
     """Middle of the bracket [largest ratio that sticks, smallest that slides], and half its width as bound."""
     canonical = resolve("incline")
-    ratios = [(canonical.complete(dict(o.slot.params))["ratio"], _slides(o)) for o in observations]
+    measured = [o for o in observations if o.metrics.get("acceleration", (None, ""))[0] is not None]
+    ratios = [(canonical.complete(dict(o.slot.params))["ratio"], _slides(o)) for o in measured]
     below = [ratio for ratio, _ in ratios if ratio < 1.0]
     above = [ratio for ratio, _ in ratios if ratio > 1.0]
     if not below or not above:

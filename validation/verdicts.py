@@ -105,6 +105,6 @@ def judge(
         return Verdict(
             physics, Standing.DRIFTED, f"left the band of its law, {centre:.6g} +- {band:.1g}: {law.because}"
         )
-    return Verdict(
-        physics, Standing.NEW if has_list else None, "" if has_list else "the engine has no list of findings"
-    )
+    if has_list:
+        return Verdict(physics, Standing.NEW, "neither listed nor explained by a law")
+    return Verdict(physics, None, "the engine has no list of findings")
