@@ -12,6 +12,7 @@ import pandas as pd
 from rich.table import Table
 from rich.text import Text
 
+from adapters import registry
 from reports.wording import number
 from validation.bench import agreement, reading, work
 from validation.bench.primary import PRIMARY
@@ -121,25 +122,35 @@ def overhead_table(overhead: pd.DataFrame) -> Table:
     table.add_column("engine", no_wrap=True)
     for scene, sampled in columns:
         table.add_column({"empty": "empty", "flight": "free body"}[scene] + (", sampled" if sampled else ""))
-    for (dimension, engine, profile), rows in reading.grouped(overhead, ["dimension", "engine", "profile"]):
+    ordered = in_order(overhead, ["dimension"])
+    for (dimension, engine, profile), rows in reading.grouped(ordered, ["dimension", "engine", "profile"]):
         found = {(row["scene"], row["sampled"]): row for row in rows.to_dict("records")}
         shown = [duration(found[c]["per_step"]) if c in found and not found[c]["void"] else "-" for c in columns]
         table.add_row(f"{engine}/{profile} {dimension}-D", *shown)
     return table
 
 
+def in_order(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
+    """Rows sorted by ``names``, then engines as everywhere else (timings come in random order)."""
+    if len(table) == 0:
+        return table
+    rank = {name: k for k, name in enumerate(registry.names())}
+    keyed = table.assign(_engine=table["engine"].map(rank))
+    return keyed.sort_values([*names, "_engine", "profile"], kind="stable").drop(columns="_engine")
+
+
 def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
     """Cost per step at the largest size that ran, and the fitted exponent."""
     table = Table(title="Cost of a step ~ x^p (x: bodies, or iterations)", title_justify="left")
-    for column in ("what", "engine", "largest x", "per step", "p", "left out"):
-        table.add_column(column)
+    for column in ("what", "engine", "x", "per step", "p", "left out"):
+        table.add_column(column, no_wrap=column != "left out")
     names = ["purpose", *reading.SERIES]
     groups = {key: group for key, group in reading.grouped(scaling, names)}
-    for fit in fits.to_dict("records"):
+    for fit in in_order(fits, ["purpose", "scene", "dimension"]).to_dict("records"):
         group = groups[tuple(fit[name] for name in names)]
         ran, lost = group[group["void"] == ""].sort_values("x"), group[group["void"] != ""].sort_values("x")
         table.add_row(
-            f"{fit['purpose']}, {fit['scene']} {fit['dimension']}-D",
+            f"{fit['scene']} {fit['dimension']}-D, {fit['purpose']}",
             f"{fit['engine']}/{fit['profile']}",
             f"{ran['x'].iloc[-1]:g}" if len(ran) else "-",
             duration(ran["per_step"].iloc[-1]) if len(ran) else "-",

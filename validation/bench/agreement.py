@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from validation.bench.reading import POINT, identity
+from validation.bench.reading import POINT, identity, table_of
 from validation.bench.statistics import spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
@@ -40,7 +40,7 @@ def ratios(store: Store, run: Run) -> pd.DataFrame:
         row = {"purpose": purpose, **identity(slot), "opponent": own[rounds[0]].opponent, "rounds": len(rounds)}
         row |= {"ratio": math.exp(found.median), "ratio_low": math.exp(found.low), "ratio_high": math.exp(found.high)}
         rows.append(row)
-    return pd.DataFrame(rows)
+    return table_of(rows)
 
 
 def opponent_slot(timing: Timing) -> Slot:

@@ -134,9 +134,9 @@ PRIMARY: dict[str, Primary] = {
             "any column at rest carries its weight on average",
             lambda dt: [{"n": 10.0}],
             _stack_error,
-            "the standing column, one second after the start",
-            1.0,
+            "the standing column, half a second after the start",
             0.5,
+            0.25,
         ),
         Primary(
             "incline",
@@ -150,7 +150,7 @@ PRIMARY: dict[str, Primary] = {
             _incline_error,
             "the sliding box, half a second after the start",
             0.5,
-            0.5,
+            0.25,
         ),
     )
 }

@@ -45,7 +45,7 @@ def timings_summary(store: Store, run: Run) -> pd.DataFrame:
     for timing in store.timings(run):
         groups[timing.purpose, timing.slot, timing.sampled].append(timing)
     rows = [_summary(members) for members in groups.values()]
-    return pd.DataFrame(rows, columns=None if rows else [*POINT, "purpose", "sampled"])
+    return table_of(rows) if rows else pd.DataFrame(columns=[*POINT, "purpose", "sampled"])
 
 
 def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
@@ -78,6 +78,14 @@ def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
         "states": len({timing.state_hash for timing in timings}),
         "void": void,
     }
+
+
+def table_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """Rows as a table; a missing iteration count stays None (pandas would make it NaN, which equals nothing)."""
+    table = pd.DataFrame(rows)
+    if "iterations" in table:
+        table["iterations"] = pd.Series([row["iterations"] for row in rows], dtype=object)
+    return table
 
 
 def identity(slot: Slot) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from validation.bench.primary import PRIMARY
-from validation.bench.reading import POINT, SERIES, grouped, identity, timings_summary
+from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import resolve
@@ -55,7 +55,7 @@ def work_points(store: Store, run: Run) -> pd.DataFrame:
         row["cost_corrected"] = row["cost"] - empty.get(key[1:4], math.nan) / row["dt"]
         row["reason"] = row["reason"] or ("" if math.isfinite(row["cost"]) else "not timed")
         rows.append(row)
-    return with_fronts(pd.DataFrame(rows))
+    return with_fronts(table_of(rows))
 
 
 def accuracy(members: Sequence[Observation]) -> dict[str, Any]:
@@ -134,7 +134,7 @@ def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LE
             reached = group[(group["error"] <= level) & group["cost"].notna()]
             row = dict(zip(SERIES, names, strict=True)) | {"level": level}
             rows.append(row | _chosen(reached, "cost", _why_not(group, level)))
-    return _ranked(pd.DataFrame(rows), "cost", "times_cheapest")
+    return _ranked(table_of(rows), "cost", "times_cheapest")
 
 
 def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEVELS) -> pd.DataFrame:
@@ -150,7 +150,7 @@ def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEV
             cheapest = group.loc[group["error"].notna(), "cost"].min()
             why = f"cheapest point costs {cheapest:.2g} s/s" if math.isfinite(cheapest) else _no_point(group)
             rows.append(row | _chosen(affordable, "error", why))
-    return _ranked(pd.DataFrame(rows), "error", "times_best")
+    return _ranked(table_of(rows), "error", "times_best")
 
 
 def _chosen(candidates: pd.DataFrame, column: str, why_not: str) -> dict[str, Any]:
