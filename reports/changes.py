@@ -5,40 +5,67 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.exports import load_rows
 from reports.wording import number, reproduce
+from validation.bench.agreement import ratios
+from validation.bench.reading import bench_runs
 from validation.comparison import Change, Kind
-from validation.store import StoreError
+from validation.rows import rows_of
+from validation.store import Store, StoreError
 
 
-def load_side(argument: str, out: Path) -> list[Mapping[str, Any]]:
-    """Rows of one side: a run id in ``out``, a results folder (``FOLDER`` or ``FOLDER:RUN``), or a .jsonl file.
+@dataclass(frozen=True)
+class Side:
+    """One side of a comparison: judged rows, and ratios of times where a bench run has them."""
+
+    rows: Sequence[Mapping[str, Any]]
+    ratios: Sequence[Mapping[str, Any]]
+
+
+def load_side(argument: str, out: Path) -> Side:
+    """One side: a run id in ``out``, a results folder (``FOLDER`` or ``FOLDER:RUN``), or a .jsonl file.
 
     Raises
     ------
     StoreError
-        If there is nothing of that name, or a file is not JSON Lines of rows.
+        If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
     """
     path = Path(argument)
     if path.suffix == ".jsonl":
         return _load_lines(path)
     folder, _, run = argument.partition(":")
     if Path(folder).is_dir():
-        return [row.as_dict() for row in load_rows(folder, run or "latest")]
-    return [row.as_dict() for row in load_rows(out, argument)]
+        return _load_run(Path(folder), run or "latest")
+    return _load_run(out, argument)
 
 
-def _load_lines(path: Path) -> list[Mapping[str, Any]]:
+def _load_run(folder: Path, run_id: str) -> Side:
+    """Rows of the run; ratios of the run itself, or of the last bench run where no run was named."""
+    store = Store(folder, create=False)
     try:
-        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+        timed = bench_runs(store)
+        judged = [run for run in store.runs() if run.id not in {bench.id for bench in timed}]
+        run = store.run(run_id) if run_id != "latest" or not judged else judged[-1]
+        source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
+        table = [row for bench in source for row in ratios(store, bench).to_dict("records")]
+        return Side([row.as_dict() for row in rows_of(run.id, store.observations(run))], table)
+    finally:
+        store.close()
+
+
+def _load_lines(path: Path) -> Side:
+    try:
+        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise StoreError(f"run: cannot read {path}: {error}") from None
-    if not all(isinstance(row, dict) and {"slot", "metric", "value"} <= set(row) for row in rows):
+    rows = [line for line in lines if isinstance(line, dict) and {"slot", "metric", "value"} <= set(line)]
+    times = [line for line in lines if isinstance(line, dict) and {"slot", "purpose", "ratio"} <= set(line)]
+    if len(rows) + len(times) != len(lines):
         raise StoreError(f"run: {path} does not hold rows of this project")
-    return rows
+    return Side(rows, times)
 
 
 def headline(changes: Sequence[Change]) -> str:

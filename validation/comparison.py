@@ -75,10 +75,11 @@ def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change
     changes += [
         _make(Kind.ADDED, b[key]["physics"] == "fail", b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()
     ]
-    return sorted(changes, key=_order)
+    return sorted(changes, key=by_seriousness)
 
 
-def _order(change: Change) -> tuple[Any, ...]:
+def by_seriousness(change: Change) -> tuple[Any, ...]:
+    """Sort key: flips before errors before speed, regressions first, larger ones first."""
     kinds = list(Kind)
     size = change.size if math.isfinite(change.size) else math.inf
     return (kinds.index(change.kind), not change.regressed, -abs(size), change.engine, change.profile, change.scene,
@@ -139,6 +140,39 @@ def _make(kind: Kind, regressed: bool, row: Plain, before: str, after: str, size
         row["slot"],
         note,
     )
+
+
+#: A change of speed counts if its whole interval lies beyond this factor: ten per cent is what a user might notice, and
+#: more than what two runs of the same code differ by on a shared machine.
+PRACTICAL = 1.1
+
+
+def compare_speeds(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
+    """Changes of speed between two bench runs.
+
+    Each side lists ratios of a unit's time to its opponent's, taken in the same rounds (columns of
+    `validation.bench.agreement.ratios`): a busier or slower machine moves both. The interval of the quotient is made
+    from the bootstrap intervals of both sides.
+    """
+    a = {_unit(row): row for row in before}
+    b = {_unit(row): row for row in after}
+    changes = []
+    for key in a.keys() & b.keys():
+        low = b[key]["ratio_low"] / a[key]["ratio_high"]
+        high = b[key]["ratio_high"] / a[key]["ratio_low"]
+        if low <= PRACTICAL and high >= 1.0 / PRACTICAL:
+            continue
+        slot = slot_from_dict(b[key]["slot"])
+        size = b[key]["ratio"] / a[key]["ratio"]
+        said = [f"{row['ratio']:.3g} x {row['opponent']}" for row in (a[key], b[key])]
+        note = f"interval x{low:.3g} to x{high:.3g}, threshold x{PRACTICAL:g}; {b[key]['purpose']}"
+        identity = (slot.engine, slot.profile, slot.scene, slot.dimension, slot.params_text(), "time")
+        changes.append(Change(Kind.SPEED, size > 1.0, *identity, *said, size, b[key]["slot"], note))
+    return sorted(changes, key=by_seriousness)
+
+
+def _unit(row: Plain) -> tuple[str, str, str]:
+    return row["purpose"], json.dumps(row["slot"], sort_keys=True), row["opponent"]
 
 
 #: What ``--fail-on`` may name, and the changes that it means.

@@ -9,7 +9,7 @@ import click
 
 from reports import changes as rendering
 from reports.command.group import AS_JSON, OUT, main
-from validation.comparison import FAIL_ON, compare_rows, failing
+from validation.comparison import FAIL_ON, by_seriousness, compare_rows, compare_speeds, failing
 
 
 @main.command()
@@ -35,7 +35,8 @@ def compare(
 
     A and B are run ids in OUT, results folders (FOLDER or FOLDER:RUN), or .jsonl files of rows.
     """
-    changes = compare_rows(rendering.load_side(before, out), rendering.load_side(after, out))
+    a, b = rendering.load_side(before, out), rendering.load_side(after, out)
+    changes = sorted(compare_rows(a.rows, b.rows) + compare_speeds(a.ratios, b.ratios), key=by_seriousness)
     if only_regressed:
         changes = [change for change in changes if change.regressed]
     if only_changed:
