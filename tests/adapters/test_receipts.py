@@ -166,3 +166,15 @@ def test_probe_balls_touch_the_floor_at_their_phase_of_a_step(dimension):
     for body, phase in zip(scene.bodies[1:], REBOUND_PHASES, strict=True):
         steps = (body.pose[dimension - 1] - body.shape.radius) / (REBOUND_SPEED * DT)
         assert steps % 1.0 == pytest.approx(phase, abs=1e-9)
+
+
+def test_few_sweeps_that_were_asked_for_widen_the_band_of_friction_alone(toy):
+    own, starved = (by_quantity(receipts(toy(), "default", IMPACT, DT, n)) for n in (None, 2))
+    widened = {quantity for quantity in own if starved[quantity].band > own[quantity].band}
+    assert widened == {"friction"}
+    assert all(slip.holds for slip in starved.values())
+
+
+def test_friction_applied_twice_does_not_hide_behind_few_sweeps(toy):
+    slip = by_quantity(receipts(toy("friction applied twice"), "default", IMPACT, DT, 4))["friction"]
+    assert not slip.holds

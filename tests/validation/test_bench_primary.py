@@ -56,7 +56,7 @@ def test_a_dead_rebound_is_wrong_by_e():
 
 def test_an_apex_counts_relative_to_the_drop_and_only_while_it_is_resolved():
     metrics = truth("bounce", {"e": 0.5, "height": 1.0})
-    # e^n v0 > 20 g dt holds for n = 1, 2, 3, 4 at 1/240 s: 4.43 m/s halves, the limit is .82 m/s; .55 is below.
+    # 4.43 m/s halves with every bounce; 20 g dt is 0.82 m/s: 1.1 m/s (n = 2) is resolved, 0.55 (n = 3) is not.
     assert error("bounce", {"e": 0.5}, {**metrics, "apex[2]": metrics["apex[2]"] + 0.03})[0] == pytest.approx(0.03)
     assert error("bounce", {"e": 0.5}, {**metrics, "apex[3]": 5.0})[0] == 0.0
     speed = math.sqrt(2.0 * GRAVITY)
