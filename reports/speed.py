@@ -77,7 +77,8 @@ def level_tables(points: pd.DataFrame) -> list[Table]:
     out = []
     for (scene, dimension), group in reading.grouped(levels, ["scene", "dimension"]):
         primary = PRIMARY[scene]
-        title = f"{scene} {dimension}-D: CPU time per simulated second at {primary.name} [{primary.unit}] of at most"
+        unit = "" if primary.unit == "1" else f" / {primary.unit}"
+        title = f"{scene} {dimension}-D: CPU time per simulated second at {primary.name}{unit} of at most"
         table = Table(title=title, title_justify="left")
         table.add_column("engine", no_wrap=True)
         for level in SHOWN_LEVELS:
