@@ -36,7 +36,7 @@ REBOUND_PHASES = (0.1, 0.37, 0.6, 0.87)
 REBOUND_LEAD = 3
 #: Time that a rebound may take [s]: twice what the softest contact known here takes (MuJoCo as shipped, 0.1 s).
 REBOUND_TIME = 0.2
-#: Sliding: speed at the start [m/s] (more if friction would stop the box within the window) and time [s].
+#: Sliding: least speed at the start [m/s] and time [s].
 SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5
 #: Speed of the landing bodies [m/s]: low, since the step of motion limits what their size can be told to.
 LANDING_SPEED = 0.25
@@ -298,9 +298,14 @@ def read_rebound(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 # ---- slide -------------------------------------------------------------------------------------------------------
 
 
+def slide_speed(friction: float) -> float:
+    """Speed at which even twice the friction does not stop the box within the window [m/s]; 0.85 is a margin."""
+    return max(SLIDE_SPEED, 2.0 * friction * GRAVITY * SLIDE_TIME / 0.85)
+
+
 def slide(case: Case) -> Scene:
-    """A unit box slides along x; flatter above mu = 1, where a cube would tip, and faster if it would stop."""
-    speed = max(SLIDE_SPEED, case.friction * GRAVITY * SLIDE_TIME / 0.85)
+    """A unit box slides along x; flatter above mu = 0.5, so that it neither tips nor nearly does."""
+    speed = slide_speed(case.friction)
     height = 0.5 * min(1.0, 0.5 / case.friction) if case.friction > 0.0 else 0.5
     box = _box(case, "box", 1.0, (0.5, 0.5, height), 0.0, height)
     twist = (*_vector(case, speed, 0.0), *((0.0,) if case.dimension == 2 else (0.0, 0.0, 0.0)))
