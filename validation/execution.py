@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,8 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
 
 
 def _plain(slip: Any) -> dict[str, Any]:
-    return asdict(slip)
+    """A receipt as JSON-ready data; what could not be measured is null, JSON has no NaN."""
+    return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in asdict(slip).items()}
 
 
 def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observation:
