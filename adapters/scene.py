@@ -215,15 +215,25 @@ class Scene:
         return [body.name for body in self.bodies].index(name)
 
     def material(self, a: str, b: str) -> Pair:
-        """Material of the pair (a, b): the most specific entry wins, the default is smooth and plastic."""
-        best, best_rank = Pair(a, b), -1
+        """Material of the pair (a, b): the most specific entry wins, the default is smooth and plastic.
+
+        Raises
+        ------
+        SceneError
+            If two entries are equally specific and say different things.
+        """
+        found: dict[int, set[tuple[float, float]]] = {}
         for pair in self.pairs:
             for first, second in ((pair.a, pair.b), (pair.b, pair.a)):
                 if first in (a, "*") and second in (b, "*"):
                     rank = (first != "*") + (second != "*")
-                    if rank > best_rank:
-                        best, best_rank = Pair(a, b, pair.restitution, pair.friction), rank
-        return best
+                    found.setdefault(rank, set()).add((pair.restitution, pair.friction))
+        if not found:
+            return Pair(a, b)
+        said = found[max(found)]
+        if len(said) > 1:
+            raise SceneError(f"pair {a}-{b}: {len(said)} entries say different things; name both bodies in one")
+        return Pair(a, b, *said.pop())
 
     def contact_pairs(self) -> Iterator[tuple[int, int, Pair]]:
         """Yield ``(i, j, material)`` for every pair of bodies of which at least one is free."""
@@ -307,6 +317,8 @@ def _validate_scene(scene: Scene) -> None:
         _validate_body(body, scene.dimension)
     for pair in scene.pairs:
         _validate_pair(pair, names)
+    for _ in scene.contact_pairs():
+        pass  # an ambiguous material raises
 
 
 def _validate_body(body: Body, dimension: int) -> None:

@@ -182,3 +182,15 @@ def test_needs_follow_from_the_scene() -> None:
 
 
 PINNED = "43a280c6c7e6f74a"
+
+
+def test_two_entries_that_say_different_things_of_one_pair_are_refused():
+    bodies = (
+        Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"),
+        Body("ball", Disc(0.5), pose=(0.0, 1.0, 0.0)),
+    )
+    vague = (Pair("ball", "*", friction=0.1), Pair("*", "floor", friction=0.2))
+    with pytest.raises(SceneError, match="pair floor-ball: 2 entries"):
+        Scene("s", 1, 2, bodies, vague, (0.0, -9.81), 1.0)
+    named = (*vague, Pair("floor", "ball", friction=0.3))
+    assert Scene("s", 1, 2, bodies, named, (0.0, -9.81), 1.0).material("ball", "floor").friction == 0.3
