@@ -143,8 +143,11 @@ def in_order(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
 def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
     """Cost per step at the largest size that ran, and the fitted exponent."""
     table = Table(title="Cost of a step ~ x^p (x: bodies, or iterations)", title_justify="left")
-    for column in ("what", "engine", "x", "per step", "p", "left out"):
-        table.add_column(column, no_wrap=column != "left out")
+    for column in ("what", "engine", "x", "per step", "p"):
+        table.add_column(column, no_wrap=True)
+    lost_any = scaling["void"].ne("").any() if len(scaling) else False
+    if lost_any:
+        table.add_column("left out")
     names = ["purpose", *reading.SERIES]
     groups = {key: group for key, group in reading.grouped(scaling, names)}
     for fit in in_order(fits, ["purpose", "scene", "dimension"]).to_dict("records"):
@@ -156,7 +159,7 @@ def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
             f"{ran['x'].iloc[-1]:g}" if len(ran) else "-",
             duration(ran["per_step"].iloc[-1]) if len(ran) else "-",
             f"{fit['exponent']:.2f} +- {fit['standard_error']:.2f}" if math.isfinite(fit["exponent"]) else "-",
-            f"x >= {lost['x'].iloc[0]:g}: {lost['void'].iloc[0]}" if len(lost) else "",
+            *([f"x >= {lost['x'].iloc[0]:g}: {lost['void'].iloc[0]}" if len(lost) else ""] if lost_any else []),
         )
     return table
 

@@ -1,0 +1,104 @@
+"""``crosscheck bench``: errors and times of one engine end to end, its files, its refusals."""
+
+import csv
+import json
+import math
+
+import pytest
+from click.testing import CliRunner
+
+from reports import speed
+from reports.command import main
+from validation.bench import reading
+from validation.bench.lane import QUICK
+from validation.store import Store
+
+ONE = ["bench", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--dt", "1/60", "--dt", "1/240"]
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    pytest.importorskip("pymunk")
+    out = tmp_path_factory.mktemp("bench")
+    return out, call(*ONE, "--seed", 3, "--json", "--out", out)
+
+
+def test_a_bench_tells_error_and_time_of_every_point(bench):
+    _, result = bench
+    assert result.exit_code == 0, result.stderr
+    data = json.loads(result.stdout)
+    points = data["work_points"]
+    assert [(p["dt"], p["cells"], p["outcome"]) for p in points] == [(1 / 60, 16, "ok"), (1 / 240, 16, "ok")]
+    for point in points:
+        assert 0.0 <= point["error"] < 1e-12  # Newton's law holds at every step, to round-off
+        assert 0.0 < point["cost_low"] <= point["cost"] <= point["cost_high"] < 1.0
+    # Half a second of one ball: four times the steps cost more, whatever the machine.
+    assert points[1]["cost"] > 1.5 * points[0]["cost"]
+    assert data["protocol"]["seed"] == 3 and data["protocol"]["primary"]["impact"]["because"]
+    assert {row["scene"] for row in data["overhead"]} == {"empty", "flight"}
+
+
+def test_every_raw_timing_has_the_error_and_the_state_beside_it(bench):
+    out, _ = bench
+    store = Store(out, create=False)
+    (run,) = reading.bench_runs(store)
+    timings = store.timings(run)
+    assert run.finished and len(timings) >= QUICK.fewest * 6
+    for timing in timings:
+        assert timing.seconds > 0.0 and timing.state_hash and not timing.void
+        assert timing.error is not None or timing.slot.scene == "empty"
+    states = {(t.slot, t.purpose): set() for t in timings}
+    for timing in timings:
+        states[timing.slot, timing.purpose].add(timing.state_hash)
+    assert all(len(found) == 1 for found in states.values())  # sampled or not, in any round: the same physics
+    store.close()
+
+
+def test_tables_are_written_as_csv_and_json(bench):
+    out, result = bench
+    assert json.loads((out / "bench" / "bench.json").read_text()) == json.loads(result.stdout)
+    with (out / "bench" / "work_points.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["dt"]) for row in rows] == [1 / 60, 1 / 240]
+    names = {path.name for path in (out / "bench").iterdir()}
+    assert {"raw_timings.csv", "scaling.csv", "overhead.csv", "time_at_equal_error.csv", "ratios.csv"} <= names
+
+
+def test_a_dry_run_says_how_many_cells_and_times_nothing(tmp_path):
+    result = call(*ONE, "--dry-run", "--out", tmp_path / "none")
+    assert result.exit_code == 0 and result.stdout == "32 cells\n"
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["bench", "bounse"], "did you mean 'bounce'"),
+        (["bench", "impact", "--engine", "chipmonk"], "did you mean 'chipmunk'"),
+        (["bench", "impact", "--against", "latest"], "there is no bench run 'latest'"),
+        (["bench", "impact", "--ulp", "1"], "a bench has no use for it"),
+        (["bench", "impact", "--dt", "0"], "dt: 0 must be a positive"),
+    ],
+)
+def test_a_bad_call_exits_with_two_and_one_line(tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    result = call(*arguments)
+    assert result.exit_code == 2 and said in result.stderr and "Traceback" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("seconds", "shown"), [(2.5, "2.5 s"), (3.14159e-3, "3.14 ms"), (412e-6, "412 us"), (8.4e-9, "8.4 ns")]
+)
+def test_durations_are_shown_with_a_fitting_unit(seconds, shown):
+    assert speed.duration(seconds) == shown
+
+
+def test_what_is_not_a_number_is_null_in_json():
+    import pandas as pd
+
+    table = pd.DataFrame([{"a": math.nan, "b": 1.0, "c": "x"}])
+    assert speed.plain(table) == [{"a": None, "b": 1.0, "c": "x"}]
