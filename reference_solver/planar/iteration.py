@@ -16,6 +16,8 @@ from reference_solver.tally import RESIDUAL, SWEEPS, UNCONVERGED, WORST_SWEEPS
 CHECK_INTERVAL = 4
 #: Sweeps over which a contraction rate is measured: long enough for the slowest mode to dominate.
 RATE_INTERVAL = 16
+#: Sweeps without a new smallest residual after which the factor is taken back.
+PATIENCE = 64
 #: Bound of the estimated factor; at 2 projected over-relaxation stops converging.
 LARGEST_RELAXATION = 1.99
 
@@ -30,44 +32,68 @@ def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> No
 
 
 @inner_kernel
-def better_relaxation(relaxation: float, rate: float) -> float:
+def better_relaxation(relaxation: float, rate: float, limit: float = LARGEST_RELAXATION) -> float:
     """Factor that suits a contraction ``rate`` per sweep measured at ``relaxation`` (E13).
 
     From Young's relation (rate + w - 1)^2 = rate w^2 mu^2 between the rate and mu, the spectral radius of the
-    Jacobi iteration, follows mu and with it the best factor. A residual that grew asks for caution instead.
+    Jacobi iteration, follows mu and with it the best factor. At or past the best factor the rate is w - 1 and
+    tells no more; a residual that grew tells nothing either.
     """
-    if rate >= 1.0:
-        return 1.0 + 0.5 * (relaxation - 1.0)
-    if rate <= relaxation - 1.0:
-        return relaxation  # at or past the best factor the rate is w - 1 and tells no more
+    if rate >= 1.0 or rate <= relaxation - 1.0:
+        return relaxation
     jacobi = (rate + relaxation - 1.0) / (relaxation * math.sqrt(rate))
     best = 2.0 / (1.0 + math.sqrt(max(1.0 - jacobi * jacobi, 0.0)))
-    return min(max(best, relaxation), LARGEST_RELAXATION)
+    return min(max(best, relaxation), limit)
+
+
+@inner_kernel
+def sweep_to_residual(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
+    """Sweep until the residual is reached, with the factor given or estimated.
+
+    Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
+    in circles. When the residual has made no progress for a while, the factor and its bound go half way to 1.
+    """
+    relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
+    limit = LARGEST_RELAXATION
+    residual = natural_map(bodies, rows, options)
+    before = best = residual
+    sweeps, best_at = 0, 0
+    while residual > options.residual and sweeps < options.max_sweeps:
+        sweep(bodies, rows, options, relaxation)
+        sweeps += 1
+        if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
+            continue
+        residual = natural_map(bodies, rows, options)
+        if residual < best:
+            best, best_at = residual, sweeps
+        if options.relaxation <= 0.0:
+            if sweeps - best_at >= PATIENCE:
+                limit = 1.0 + 0.5 * (relaxation - 1.0)
+                relaxation, best, best_at = limit, residual, sweeps
+            elif sweeps % RATE_INTERVAL == 0 and before > 0.0 and residual > 0.0:
+                relaxation = better_relaxation(relaxation, (residual / before) ** (1.0 / RATE_INTERVAL), limit)
+        if sweeps % RATE_INTERVAL == 0:
+            before = residual
+    if residual > options.residual:
+        tally[UNCONVERGED] += 1.0
+    enter(tally, residual, sweeps)
+
+
+@inner_kernel
+def enter(tally: Array, residual: float, sweeps: int) -> None:
+    """Add one step to the tally of the run."""
+    tally[RESIDUAL] = max(tally[RESIDUAL], residual)
+    tally[SWEEPS] += sweeps
+    tally[WORST_SWEEPS] = max(tally[WORST_SWEEPS], sweeps)
 
 
 @inner_kernel
 def solve_velocities(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     """Sweep as `Options` asks and enter residual and sweeps in the tally."""
+    if options.residual >= 0.0:
+        sweep_to_residual(bodies, rows, options, tally)
+        return
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
-    sweeps, residual, before = 0, 0.0, 0.0
-    if options.residual < 0.0:
-        for _ in range(options.iterations):
-            sweep(bodies, rows, options, relaxation)
-        sweeps, residual = options.iterations, natural_map(bodies, rows, options)
-    else:
-        residual = before = natural_map(bodies, rows, options)
-        while residual > options.residual and sweeps < options.max_sweeps:
-            sweep(bodies, rows, options, relaxation)
-            sweeps += 1
-            if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
-                continue
-            residual = natural_map(bodies, rows, options)
-            if sweeps % RATE_INTERVAL == 0:
-                if options.relaxation <= 0.0 and before > 0.0 and residual > 0.0:
-                    relaxation = better_relaxation(relaxation, (residual / before) ** (1.0 / RATE_INTERVAL))
-                before = residual
-        if residual > options.residual:
-            tally[UNCONVERGED] += 1.0
-    tally[RESIDUAL] = max(tally[RESIDUAL], residual)
-    tally[SWEEPS] += sweeps
-    tally[WORST_SWEEPS] = max(tally[WORST_SWEEPS], sweeps)
+    for _ in range(options.iterations):
+        sweep(bodies, rows, options, relaxation)
+    enter(tally, natural_map(bodies, rows, options), options.iterations)

@@ -28,7 +28,9 @@ def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
         extent = min(bodies.real[rows.index[c, A], EXTENT], bodies.real[rows.index[c, B], EXTENT])
         # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
         after = rows.real[c, GAP] + options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
-        excess = -after - max(options.slop, ROUND_OFF * extent)
+        excess = -after - options.slop
+        if abs(excess) <= ROUND_OFF * extent:
+            excess = 0.0
         # Within what is allowed a contact may close, but not farther (negative target).
         rows.real[c, PUSH_TARGET] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
         largest = max(largest, rows.real[c, PUSH_TARGET])

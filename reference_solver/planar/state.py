@@ -28,6 +28,7 @@ from reference_solver.planar.columns import (
     SIN,
     SIZE,
 )
+from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 
 Indices = NDArray[np.int64]
@@ -73,7 +74,7 @@ class Rows(NamedTuple):
     real: Array  # (c, ROW_REALS)
     manifold: Indices  # (m + 1,): first row of each manifold
     block: Array  # (m, 4, 4): W of a two-point manifold, rows n1, t1, n2, t2 (E12)
-    local: Array  # (2, 4): impulses and velocities of the block being solved
+    local: Array  # (LOCAL_ROWS, LOCAL_COLUMNS): scratch of the block being solved, see pair_modes.py
     old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
     old_impulse: Array  # (c, 2)
 
@@ -161,7 +162,7 @@ def allocate_rows(capacity: int) -> Rows:
         real=np.zeros((capacity, ROW_REALS)),
         manifold=np.zeros(capacity + 1, np.int64),
         block=np.zeros((capacity, 4, 4)),
-        local=np.zeros((2, 4)),
+        local=np.zeros((LOCAL_ROWS, LOCAL_COLUMNS)),
         old_key=np.zeros(capacity, np.int64),
         old_impulse=np.zeros((capacity, 2)),
     )

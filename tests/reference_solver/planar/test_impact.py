@@ -1,0 +1,127 @@
+"""Impacts: Newton's law, oblique and off-centre, against closed forms.
+
+Tolerances: a single impact is a handful of roundings, so 4 units in the last place (1e-15 relative) of the largest
+quantity; several rows carry the solver's residual stop 1e-13 times a condition number below ten.
+"""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from reference_solver import Settings
+
+EPS = np.finfo(float).eps
+
+
+def test_worked_example_rebounds_at_4_8_with_impulse_5_4(build, settings):
+    simulation = build.simulation(
+        [build.floor(), build.disc(0.0, 0.5, (0.0, -6.0, 0.0), mass=0.5)], settings, restitution=0.8
+    )
+    simulation.advance(1)
+    assert simulation.twist[1] == pytest.approx([0.0, 4.8, 0.0], abs=4 * EPS * 6.0)
+    contacts = simulation.contacts()
+    assert contacts.impulse[0] == pytest.approx([0.0, 5.4], abs=4 * EPS * 5.4)
+    assert contacts.impulse[0, 1] / 0.5 == pytest.approx(10.8, abs=4 * EPS * 10.8)
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
+@pytest.mark.parametrize("profile", [Settings.classical, Settings.reference])
+def test_rebound_ratio_is_e_at_any_speed_phase_and_gravity(build, profile, dt):
+    for e, v, phase, g in itertools.product((0.2, 0.5, 0.8, 0.95, 1.0), (1e-3, 0.1, 1.0, 6.0, 50.0, 1e3), (0.0, 0.3, 0.7), (0.0, 9.81)):
+        bodies = [build.floor(), build.disc(0.0, 0.5 + phase * v * dt, (0.0, -v, 0.0))]
+        record = build.simulation(bodies, profile(dt), (0.0, -g), e).record(3)
+        speed = record.twist[:, 1, 1]
+        hit = int(np.argmax(speed > 0.0))
+        assert hit > 0, (e, v, phase, g)
+        before = speed[hit - 1]
+        # Two roundings of terms no larger than the speed and the step's gravity increment.
+        assert abs(speed[hit] + e * before) <= 4 * EPS * max(abs(before), g * dt), (e, v, phase, g)
+
+
+def test_inelastic_impact_leaves_no_speed_and_no_overlap(build, settings):
+    simulation = build.simulation([build.floor(), build.disc(0.0, 0.5015, (0.0, -3.0, 0.0))], settings)
+    simulation.advance(200)
+    assert abs(simulation.twist[1, 1]) <= 1e-15
+    # 200 steps of a correction by 0.2 leave the slop of the classical profile, and nothing in the other one.
+    assert simulation.pose[1, 1] - 0.5 >= -settings.slop - 1e-12
+    assert simulation.pose[1, 1] - 0.5 <= 1e-12
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("e", [0.2, 0.5, 0.8, 1.0])
+def test_flat_box_rebounds_by_e_without_spin(build, reference, e, friction):
+    simulation = build.simulation([build.floor(), build.box(0.0, 0.5, (0.0, -3.0, 0.0))], reference, (0.0, -9.81), e, friction)
+    simulation.advance(1)
+    assert simulation.twist[1] == pytest.approx([0.0, 3.0 * e, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("vt", "spin", "mu", "e"),
+    [(1.0, 10.0, 0.5, 0.5), (3.0, 0.0, 0.1, 0.5), (1.0, 0.0, 0.5, 0.0), (2.0, -4.0, 0.05, 1.0), (1.0, 30.0, 0.2, 0.8)],
+)
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_oblique_disc_sticks_or_slips_as_coulomb_says(build, settings, vt, spin, mu, e, side):
+    """Scene S-A7: with k = I/(m R^2) = 1/2 a disc sticks iff |u| k/(1 + k) <= mu (1 + e) v_n, u = v_t + omega R."""
+    vn, radius, k = 2.0, 0.5, 0.5
+    vt, spin = side * vt, side * spin
+    simulation = build.simulation([build.floor(), build.disc(0.0, radius, (vt, -vn, spin))], settings, (0.0, 0.0), e, mu)
+    simulation.advance(1)
+    u = vt + spin * radius
+    if abs(u) * k / (1.0 + k) <= mu * (1.0 + e) * vn:
+        after = (vt - k * spin * radius) / (1.0 + k)
+        turned = -after / radius
+    else:
+        change = mu * (1.0 + e) * vn * math.copysign(1.0, u)
+        after, turned = vt - change, spin - change / (k * radius)
+    # Classical: the two rows of a disc do not couple, so one sweep is exact.
+    assert simulation.twist[1] == pytest.approx([after, e * vn, turned], abs=1e-14 * (abs(spin) + 4.0))
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.2, 1.0 / 12.0 * 2.0])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_off_centre_strike_on_a_free_rod(build, settings, offset, e):
+    """Scene S-A4: J = (1 + e) v / (1/m + 1/M + d^2/I) for a particle on a free rod, V = J/M, omega = J d / I."""
+    half, m, big, v = (1.0, 0.01), 0.3, 2.0, 4.0
+    rod = build.box(0.0, 0.0, half=half, mass=big)
+    ball = build.disc(offset, half[1] + 0.05, (0.0, -v, 0.0), radius=0.05, mass=m)
+    simulation = build.simulation([rod, ball], settings, restitution=e)
+    simulation.advance(1)
+    impulse = (1.0 + e) * v / (1.0 / m + 1.0 / big + offset**2 / rod.inertia)
+    assert simulation.twist[0] == pytest.approx([0.0, -impulse / big, -impulse * offset / rod.inertia], abs=1e-13 * v)
+    assert simulation.twist[1, 1] == pytest.approx(-v + impulse / m, abs=1e-13 * v)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3, 1e6])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_two_discs_exchange_momentum_as_in_one_dimension(build, settings, ratio, e):
+    v1, v2 = 2.0, -1.0
+    bodies = [build.disc(-0.5, 0.0, (v1, 0.0, 0.0)), build.disc(0.5, 0.0, (v2, 0.0, 0.0), mass=ratio)]
+    simulation = build.simulation(bodies, settings, restitution=e)
+    simulation.advance(1)
+    total = 1.0 + ratio
+    expected = [(v1 + ratio * v2 - ratio * e * (v1 - v2)) / total, (v1 + ratio * v2 + e * (v1 - v2)) / total]
+    assert simulation.twist[:, 0] == pytest.approx(expected, abs=8 * EPS * 3.0)
+
+
+def test_three_balls_in_a_row_follow_the_simultaneous_law(build, reference):
+    """Law N-SIM: v1 = (1 - 2 e)/3, v2 = v3 = (1 + e)/3 (scene S-B1)."""
+    for e in (0.0, 0.4, 1.0):
+        bodies = [build.disc(float(i), 0.0, (1.0 if i == 0 else 0.0, 0.0, 0.0)) for i in range(3)]
+        simulation = build.simulation(bodies, reference, restitution=e)
+        simulation.advance(1)
+        # Residual stop 1e-13, three bodies: condition below ten.
+        assert simulation.twist[:, 0] == pytest.approx([(1 - 2 * e) / 3, (1 + e) / 3, (1 + e) / 3], abs=1e-12)
+
+
+def test_apexes_never_rise_at_e_1(build, settings):
+    """Fixed steps cost a phase error per bounce, bounded and without trend; energy must not be pumped."""
+    bodies = [build.floor(), build.disc(0.0, 1.53)]
+    record = build.simulation(bodies, settings, (0.0, -9.81), 1.0).record(240 * 20)
+    height = record.pose[:, 1, 1] - 0.5
+    start = height[0]
+    # Hitting at depth d <= v h instead of 0 shifts the energy by at most g d.
+    v = math.sqrt(2 * 9.81 * start)
+    assert height.max() <= start + v * build.dt
+    assert height[-480:].max() >= start - 2.0 * v * build.dt

@@ -1,0 +1,159 @@
+"""Things at rest: columns, wedges, loads, overlap."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_solver import Settings
+
+G = 9.81
+
+
+def interface_impulses(record, n):
+    """Sum of the vertical impulses over each interface, (steps, n)."""
+    totals = np.zeros((len(record.t) - 1, n))
+    for s in range(1, len(record.t)):
+        rows = slice(record.offset[s], record.offset[s + 1])
+        np.add.at(totals[s - 1], record.contacts.body_b[rows] - 1, record.contacts.impulse[rows, 1])
+    return totals
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 10, 20])
+def test_column_carries_the_weight_above_and_does_not_move(build, reference, n):
+    record = build.column(n, reference).record(1200, contacts=True)
+    weight = G * build.dt * np.arange(n, 0, -1)
+    # Residual 1e-13 over the condition of the column, which grows like n^2 (0.4 n^2): 2e-11 at n = 20.
+    assert interface_impulses(record, n) / weight == pytest.approx(1.0, abs=1e-10)
+    assert np.abs(record.pose - record.pose[0]).max() <= 1e-11
+    assert np.abs(record.twist).max() <= 1e-11
+
+
+def test_column_of_twenty_needs_no_sweeps_once_it_stands(build, reference):
+    simulation = build.column(20, reference)
+    simulation.advance(1)
+    first = simulation.certificate["sweeps"]
+    simulation.advance(1199)
+    certificate = simulation.certificate
+    assert certificate["converged"] and certificate["residual"] <= 1e-13
+    assert first < 5000
+    assert certificate["sweeps"] - first < 2400  # two per step
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_short_columns_stand_at_ten_sweeps(build, classical, n):
+    record = build.column(n, classical).record(1200, contacts=True)
+    settled = record.twist[240:]
+    assert np.abs(settled).max() <= 1e-10
+    # Natural length of a step g h^2: the error of a few unfinished steps stays below one of them.
+    assert np.abs(record.pose[-1] - record.pose[0])[:, :2].max() <= G * build.dt**2
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 960])
+def test_column_stands_at_other_steps(build, dt):
+    record = build.column(10, Settings.reference(dt)).record(200, contacts=True)
+    assert interface_impulses(record, 10)[-1] / (G * dt * np.arange(10, 0, -1)) == pytest.approx(1.0, abs=1e-10)
+
+
+def test_heavy_box_on_a_light_one(build, reference):
+    """Interface impulses are the weights above, a hundred to one; the residual is scaled per contact."""
+    bodies = [build.floor(), build.box(0.0, 0.5), build.box(0.0, 1.5, mass=100.0)]
+    record = build.simulation(bodies, reference, (0.0, -G), 0.0, 0.5).record(100, contacts=True)
+    expected = np.array([101.0, 100.0]) * G * build.dt
+    assert interface_impulses(record, 2)[-1] / expected == pytest.approx(1.0, abs=1e-10)
+
+
+def test_disc_in_a_wedge_presses_by_half_its_weight_over_cos(build, reference):
+    """Walls at alpha from the horizontal, no friction: N = m g / (2 cos alpha) each (scene S-D7)."""
+    from reference_solver import Body, HalfSpace
+
+    alpha = math.radians(35.0)
+    walls = [Body(HalfSpace((s * math.sin(alpha), math.cos(alpha))), motion="fixed") for s in (1.0, -1.0)]
+    simulation = build.simulation([*walls, build.disc(0.0, 0.5 / math.cos(alpha))], reference, (0.0, -G))
+    simulation.advance(240)
+    contacts = simulation.contacts()
+    normal = (contacts.impulse * contacts.normal).sum(axis=1)
+    assert normal == pytest.approx(G * build.dt / (2.0 * math.cos(alpha)), rel=1e-11)
+
+
+def test_corner_loads_of_a_box_on_an_incline(build, reference):
+    """N = m g (cos +- (h/b) sin) / 2 on the two corners while it stands (scene S-C11)."""
+    theta, half = math.atan(0.3), (0.5, 0.4)
+    gravity = (G * math.sin(theta), -G * math.cos(theta))
+    simulation = build.simulation([build.floor(), build.box(0.0, half[1], half=half)], reference, gravity, 0.0, 0.5)
+    simulation.advance(240)
+    contacts = simulation.contacts()
+    order = np.argsort(contacts.point[:, 0])
+    share = half[1] / half[0] * math.sin(theta)
+    expected = 0.5 * G * build.dt * np.array([math.cos(theta) - share, math.cos(theta) + share])
+    assert contacts.impulse[order, 1] == pytest.approx(expected, rel=1e-10)
+
+
+def test_box_tips_beyond_its_base_and_not_before(build, reference):
+    """With friction to hold it, a box b x h tips iff tan(theta) > b / h (scene S-C11)."""
+    half = (0.3, 0.6)
+    for ratio, tips in ((0.98, False), (1.02, True)):
+        theta = math.atan(ratio * half[0] / half[1])
+        gravity = (G * math.sin(theta), -G * math.cos(theta))
+        simulation = build.simulation([build.floor(), build.box(0.0, half[1], half=half)], reference, gravity, 0.0, 2.0)
+        simulation.advance(240)
+        assert bool(abs(simulation.pose[1, 2]) > 0.01) is tips
+        assert tips or np.abs(simulation.twist).max() <= 1e-12
+
+
+def test_overhang_stands_until_the_centre_of_mass_leaves_the_edge(build, reference):
+    for offset, stands in ((0.4999, True), (0.501, False)):
+        table = build.box(0.0, -0.5, motion="fixed")
+        simulation = build.simulation([table, build.box(offset, 0.5)], reference, (0.0, -G), 0.0, 0.9)
+        simulation.advance(480)
+        assert bool(abs(simulation.pose[1, 2]) < 1e-9) is stands
+
+
+def test_baumgarte_injects_beta_delta_over_dt_and_split_impulse_nothing(build, classical):
+    overlap, beta = 0.01, 0.2
+    bodies = [build.floor(), build.disc(0.0, 0.5 - overlap)]
+    speeds = {}
+    for correction in ("baumgarte", "split", "none"):
+        simulation = build.simulation(bodies, replace(classical, position_correction=correction, slop=0.0, beta=beta))
+        simulation.advance(1)
+        speeds[correction] = simulation.twist[1, 1]
+        moved = simulation.pose[1, 1] - 0.5 + overlap
+        assert moved == pytest.approx(0.0 if correction == "none" else beta * overlap, rel=1e-12, abs=1e-15)
+    assert speeds == pytest.approx({"baumgarte": beta * overlap / build.dt, "split": 0.0, "none": 0.0}, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.5, 0.9])
+def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, reference, depth):
+    """Two discs overlapping by a share of their radius: projected apart, symmetric, velocity untouched."""
+    gap = 1.0 - 0.5 * depth
+    simulation = build.simulation([build.disc(0.0, 0.0), build.disc(gap, 0.0)], reference)
+    simulation.advance(3)
+    assert np.abs(simulation.twist).max() == 0.0
+    assert simulation.pose[1, 0] - simulation.pose[0, 0] == pytest.approx(1.0, abs=1e-12)
+    assert simulation.pose[:, 0].sum() == pytest.approx(gap, abs=1e-15)
+    assert simulation.certificate["projected"] == pytest.approx(0.5 * depth, rel=1e-9)
+
+
+def test_overlapping_column_is_separated(build, reference):
+    """Ten boxes each 1 mm into the one below: all gaps close to zero, and the column then stands."""
+    boxes = [build.box(0.0, 0.499 + 0.999 * i) for i in range(10)]
+    simulation = build.simulation([build.floor(), *boxes], reference, (0.0, -G), 0.0, 0.5)
+    simulation.advance(60)
+    assert simulation.contacts().gap.min() >= -1e-9
+    assert np.abs(simulation.twist).max() <= 1e-10
+
+
+def test_pyramid_rows_carry_the_weight_above(build, reference):
+    """Single impulses are not unique, their sum per row is (scene S-D8)."""
+    rows, bodies = 5, [build.floor()]
+    for level in range(rows):
+        bodies += [build.box(1.1 * (i - 0.5 * (rows - 1 - level)), 0.5 + level) for i in range(rows - level)]
+    simulation = build.simulation(bodies, reference, (0.0, -G), 0.0, 0.5)
+    simulation.advance(240)
+    assert simulation.certificate["converged"]
+    contacts = simulation.contacts()
+    for level in range(rows):
+        above = sum(rows - k for k in range(level, rows))
+        at = np.abs(contacts.point[:, 1] - level) < 1e-6
+        assert contacts.impulse[at, 1].sum() == pytest.approx(above * G * build.dt, rel=1e-10)
