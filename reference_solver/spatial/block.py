@@ -7,11 +7,11 @@ on the bodies, and with it every velocity, is.
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
 from reference_solver.spatial.one_contact import coulomb_impulse, into_disc
-from reference_solver.spatial.state import MANIFOLDS, Bodies, Manifolds
+from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, length, row, sub
 
 #: Inner sweeps of one block at most; later outer sweeps go on where this ends.
@@ -23,10 +23,10 @@ INNER_GAIN = 1e-3
 INNER_FLOOR = 4e-16
 
 
-@kernel
+@inner_kernel
 def sweep_blocks(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
     """One sweep over all manifolds in canonical order."""
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             for k in range(3):
@@ -35,7 +35,7 @@ def sweep_blocks(bodies: Bodies, manifolds: Manifolds, options: Options, relaxat
         apply_block(bodies, manifolds, m, options, relaxation)
 
 
-@kernel
+@inner_kernel
 def solve_block(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
     """Impulses of manifold m that solve its points together, the rest of the world held."""
     first_change = 0.0
@@ -52,7 +52,7 @@ def solve_block(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
             return
 
 
-@kernel
+@inner_kernel
 def solve_point(manifolds: Manifolds, m: int, p: int, u: Vector) -> Vector:
     """Exact solution of one point, all others held; returns the change of its impulse."""
     k = manifolds.matrix[m, p]
@@ -68,7 +68,7 @@ def solve_point(manifolds: Manifolds, m: int, p: int, u: Vector) -> Vector:
     return sub(new, old)
 
 
-@kernel
+@inner_kernel
 def apply_block(bodies: Bodies, manifolds: Manifolds, m: int, options: Options, relaxation: float) -> None:
     """Go from the old impulses through the block's solution by the factor, stay in the cone, apply the change."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.points import share_of_gap, write_point
 from reference_solver.spatial.polygon import ON_SIDE, clip_to_rectangle, keep_within_reach, reduce_to_four
-from reference_solver.spatial.state import POINTS, Bodies, Manifolds, Pairs
+from reference_solver.spatial.state import POINTS, Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add_scaled, axis, cross, dot, length, row, scale, sub
 
 #: A lower-ranked axis must separate better by this part of the smallest half extent. It has to exceed the tilt
@@ -25,9 +25,9 @@ PARALLEL = 1e-6
 EDGES = 72 * 64
 
 
-@kernel
+@inner_kernel
 def box_box(
-    bodies: Bodies, pairs: Pairs, f: int, s: int, reach: float, manifolds: Manifolds, m: int
+    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Boxes f and s: up to four points of two faces, or one of two edges."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
@@ -42,10 +42,10 @@ def box_box(
     by_s = gap_s > gap_f + preference
     if gap_e <= (gap_s if by_s else gap_f) + preference:
         if by_s:
-            count, normal = _clip_faces(bodies, pairs, s, f, face_s, 36, reach, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, manifolds, m)
             normal = scale(-1.0, normal)
         else:
-            count, normal = _clip_faces(bodies, pairs, f, s, face_f, 0, reach, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, f, s, face_f, 0, reach, manifolds, m)
         if count > 0:
             return count, normal
     if edges < 0:  # parallel boxes whose overlap is thinner than the reach at every vertex
@@ -54,29 +54,29 @@ def box_box(
     return 1, normal_e
 
 
-@kernel
+@inner_kernel
 def _half_width(bodies: Bodies, i: int, n: Vector) -> float:
     """Half width of box i along the unit vector n."""
     return (
-        bodies.size[i, 0] * abs(dot(axis(bodies.axes, i, 0), n))
-        + bodies.size[i, 1] * abs(dot(axis(bodies.axes, i, 1), n))
-        + bodies.size[i, 2] * abs(dot(axis(bodies.axes, i, 2), n))
+        bodies.geometry[i, 0] * abs(dot(axis(bodies.axes, i, 0), n))
+        + bodies.geometry[i, 1] * abs(dot(axis(bodies.axes, i, 1), n))
+        + bodies.geometry[i, 2] * abs(dot(axis(bodies.axes, i, 2), n))
     )
 
 
-@kernel
+@inner_kernel
 def _best_face(bodies: Bodies, r: int, c: int, between: Vector) -> tuple[int, float]:
     """Face axis of box r with the largest gap to box c, and that gap."""
     best, best_gap = 0, -math.inf
     for k in range(3):
         n = axis(bodies.axes, r, k)
-        gap = abs(dot(between, n)) - bodies.size[r, k] - _half_width(bodies, c, n)
+        gap = abs(dot(between, n)) - bodies.geometry[r, k] - _half_width(bodies, c, n)
         if gap > best_gap + ON_SIDE * bodies.extent[r]:
             best, best_gap = k, gap
     return best, best_gap
 
 
-@kernel
+@inner_kernel
 def _best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, float, Vector]:
     """Pair of edges (3 i + j) with the largest gap, that gap, and the unit normal from f to s; -1 if none."""
     best, best_gap, best_normal = -1, -math.inf, (0.0, 0.0, 1.0)
@@ -93,7 +93,7 @@ def _best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, f
     return best, best_gap, best_normal
 
 
-@kernel
+@inner_kernel
 def _write_edges(
     bodies: Bodies,
     f: int,
@@ -116,15 +116,15 @@ def _write_edges(
     divisor = 1.0 - cosine * cosine
     x = (dot(across, e) - cosine * dot(across, g)) / divisor
     y = (cosine * dot(across, e) - dot(across, g)) / divisor
-    x = max(-bodies.size[f, i], min(bodies.size[f, i], x))
-    y = max(-bodies.size[s, j], min(bodies.size[s, j], y))
+    x = max(-bodies.geometry[f, i], min(bodies.geometry[f, i], x))
+    y = max(-bodies.geometry[s, j], min(bodies.geometry[s, j], y))
     on_f = add_scaled(p, x, e)
     on_s = add_scaled(add_scaled(between, 1.0, q), y, g)
     where = add_scaled(on_f, share_of_gap(bodies, f, s), sub(on_s, on_f))
     write_point(manifolds, m, 0, f, s, EDGES + 12 * name_f + name_s, where, sub(where, between), gap)
 
 
-@kernel
+@inner_kernel
 def _supporting_edge(bodies: Bodies, i: int, k: int, n: Vector) -> tuple[Vector, int]:
     """Middle of the edge of box i, parallel to its axis k, farthest along n, from its centre; number 0..11."""
     middle = (0.0, 0.0, 0.0)
@@ -133,17 +133,17 @@ def _supporting_edge(bodies: Bodies, i: int, k: int, n: Vector) -> tuple[Vector,
         if other != k:
             direction = axis(bodies.axes, i, other)
             if dot(direction, n) >= 0.0:
-                middle = add_scaled(middle, bodies.size[i, other], direction)
+                middle = add_scaled(middle, bodies.geometry[i, other], direction)
                 name += bit
             else:
-                middle = add_scaled(middle, -bodies.size[i, other], direction)
+                middle = add_scaled(middle, -bodies.geometry[i, other], direction)
             bit *= 2
     return middle, name
 
 
-@kernel
+@inner_kernel
 def _clip_faces(
-    bodies: Bodies, pairs: Pairs, r: int, c: int, k: int, base: int, reach: float, manifolds: Manifolds, m: int
+    bodies: Bodies, detection: Detection, r: int, c: int, k: int, base: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Clip the face of box c that looks against face +-k of box r; return point count and normal from r to c."""
     between = sub(row(bodies.pose, c, 0), row(bodies.pose, r, 0))
@@ -153,24 +153,24 @@ def _clip_faces(
         n = scale(-1.0, n)
     ku, kv = (k + 1) % 3, (k + 2) % 3
     u, v = axis(bodies.axes, r, ku), axis(bodies.axes, r, kv)
-    face = _project_incident_face(bodies, pairs, c, n, u, v, between, bodies.size[r, k])
-    half_u, half_v = bodies.size[r, ku], bodies.size[r, kv]
-    count = clip_to_rectangle(pairs, half_u, half_v)
-    count = keep_within_reach(pairs, count, reach)
+    face = _project_incident_face(bodies, detection, c, n, u, v, between, bodies.geometry[r, k])
+    half_u, half_v = bodies.geometry[r, ku], bodies.geometry[r, kv]
+    count = clip_to_rectangle(detection, half_u, half_v)
+    count = keep_within_reach(detection, count, reach)
     if count > POINTS:
-        count = reduce_to_four(pairs, count, ON_SIDE * (half_u + half_v))
+        count = reduce_to_four(detection, count, ON_SIDE * (half_u + half_v))
     name = 64 * (base + 6 * (2 * k + (1 if towards else 0)) + face)
     share = share_of_gap(bodies, r, c)
     for p in range(count):
-        x, y, gap = pairs.polygon[1, p, 0], pairs.polygon[1, p, 1], pairs.polygon[1, p, 2]
-        arm = add_scaled(add_scaled(scale(bodies.size[r, k] + share * gap, n), x, u), y, v)
-        write_point(manifolds, m, p, r, c, name + pairs.polygon_edge[1, p], arm, sub(arm, between), gap)
+        x, y, gap = detection.polygon[1, p, 0], detection.polygon[1, p, 1], detection.polygon[1, p, 2]
+        arm = add_scaled(add_scaled(scale(bodies.geometry[r, k] + share * gap, n), x, u), y, v)
+        write_point(manifolds, m, p, r, c, name + detection.polygon_edge[1, p], arm, sub(arm, between), gap)
     return count, n
 
 
-@kernel
+@inner_kernel
 def _project_incident_face(
-    bodies: Bodies, pairs: Pairs, c: int, n: Vector, u: Vector, v: Vector, between: Vector, height: float
+    bodies: Bodies, detection: Detection, c: int, n: Vector, u: Vector, v: Vector, between: Vector, height: float
 ) -> int:
     """Write the face of box c that looks most against n as polygon 0; return its number 0..5.
 
@@ -181,15 +181,15 @@ def _project_incident_face(
         if abs(dot(axis(bodies.axes, c, i), n)) > abs(dot(axis(bodies.axes, c, k), n)) + ON_SIDE:
             k = i
     e, g = axis(bodies.axes, c, (k + 1) % 3), axis(bodies.axes, c, (k + 2) % 3)
-    half_e, half_g = bodies.size[c, (k + 1) % 3], bodies.size[c, (k + 2) % 3]
+    half_e, half_g = bodies.geometry[c, (k + 1) % 3], bodies.geometry[c, (k + 2) % 3]
     sign = -1.0 if dot(axis(bodies.axes, c, k), n) > 0.0 else 1.0
-    middle = add_scaled(between, sign * bodies.size[c, k], axis(bodies.axes, c, k))
+    middle = add_scaled(between, sign * bodies.geometry[c, k], axis(bodies.axes, c, k))
     for i in range(4):
         along = half_e if i == 0 or i == 3 else -half_e
         aside = half_g if i < 2 else -half_g
         vertex = add_scaled(add_scaled(middle, along, e), aside, g)
-        pairs.polygon[0, i, 0] = dot(vertex, u)
-        pairs.polygon[0, i, 1] = dot(vertex, v)
-        pairs.polygon[0, i, 2] = dot(vertex, n) - height
-        pairs.polygon_edge[0, i] = i
+        detection.polygon[0, i, 0] = dot(vertex, u)
+        detection.polygon[0, i, 1] = dot(vertex, v)
+        detection.polygon[0, i, 2] = dot(vertex, n) - height
+        detection.polygon_edge[0, i] = i
     return 2 * k + (1 if sign > 0.0 else 0)

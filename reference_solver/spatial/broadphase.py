@@ -4,89 +4,110 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.broadphase import sift_down
 from reference_solver.planar.state import Options
-from reference_solver.spatial.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Manifolds, Pairs
+from reference_solver.spatial.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Detection, Indices
 
 
-@kernel
-def bound_bodies(bodies: Bodies, pairs: Pairs, options: Options) -> None:
+@inner_kernel
+def bound_bodies(bodies: Bodies, options: Options) -> None:
     """Axis-aligned bounds, widened by the detection margin; a half-space is unbounded."""
-    for i in range(len(bodies.shape)):
+    for i in range(len(bodies)):
         # A pair's margin is the smaller of both extents, so that one body's own margin always covers it.
         grow = options.margin * bodies.extent[i]
         for d in range(3):
-            wide = bodies.size[i, 0]
-            if bodies.shape[i] == HALF_SPACE:
+            wide = bodies.geometry[i, 0]
+            if bodies.kind[i] == HALF_SPACE:
                 wide = math.inf
-            elif bodies.shape[i] == BOX:
+            elif bodies.kind[i] == BOX:
                 wide = 0.0
                 for k in range(3):
-                    wide += abs(bodies.axes[i, d, k]) * bodies.size[i, k]
+                    wide += abs(bodies.axes[i, d, k]) * bodies.geometry[i, k]
             far = wide + (grow + 1e-15 * (wide + abs(bodies.pose[i, d])))  # 1e-15: rounding of these sums
-            pairs.low[i, d] = bodies.pose[i, d] - far
-            pairs.high[i, d] = bodies.pose[i, d] + far
+            bodies.low[i, d] = bodies.pose[i, d] - far
+            bodies.high[i, d] = bodies.pose[i, d] + far
 
 
-@kernel
-def may_touch(bodies: Bodies, pairs: Pairs, i: int, j: int) -> bool:
+@inner_kernel
+def may_touch(bodies: Bodies, i: int, j: int) -> bool:
     """Bounds overlap and at least one body can respond."""
     if bodies.motion[i] != FREE and bodies.motion[j] != FREE:
         return False
-    if bodies.shape[i] == HALF_SPACE or bodies.shape[j] == HALF_SPACE:
+    if bodies.kind[i] == HALF_SPACE or bodies.kind[j] == HALF_SPACE:
         return True
     for d in range(3):
-        if pairs.low[i, d] > pairs.high[j, d] or pairs.low[j, d] > pairs.high[i, d]:
+        if bodies.low[i, d] > bodies.high[j, d] or bodies.low[j, d] > bodies.high[i, d]:
             return False
     return True
 
 
-@kernel
-def add_candidate(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, i: int, j: int) -> bool:
+@inner_kernel
+def add_candidate(bodies: Bodies, detection: Detection, i: int, j: int) -> bool:
     """Store the pair if it may touch; False if there is no room."""
-    if not may_touch(bodies, pairs, i, j):
+    if not may_touch(bodies, i, j):
         return True
-    count = manifolds.count[CANDIDATES]
-    if count == len(pairs.candidate):
+    count = detection.count[CANDIDATES]
+    if count == len(detection.candidate):
         return False
-    pairs.candidate[count] = min(i, j) * len(bodies.shape) + max(i, j)
-    manifolds.count[CANDIDATES] = count + 1
+    detection.candidate[count] = min(i, j) * len(bodies) + max(i, j)
+    detection.count[CANDIDATES] = count + 1
     return True
 
 
-@kernel
-def find_candidates(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, options: Options) -> bool:
-    """Fill `Pairs.candidate` in ascending order; False if there is no room."""
-    bound_bodies(bodies, pairs, options)
-    manifolds.count[CANDIDATES] = 0
+@inner_kernel
+def find_candidates(bodies: Bodies, detection: Detection, options: Options) -> bool:
+    """Fill `Detection.candidate` in ascending order; False if there is no room."""
+    bound_bodies(bodies, options)
+    detection.count[CANDIDATES] = 0
     if options.broadphase:
-        return sweep_candidates(bodies, pairs, manifolds)
-    n = len(bodies.shape)
+        return sweep_candidates(bodies, detection)
+    n = len(bodies)
     for i in range(n):
         for j in range(i + 1, n):
-            if not add_candidate(bodies, pairs, manifolds, i, j):
+            if not add_candidate(bodies, detection, i, j):
                 return False
     return True
 
 
-@kernel
-def sweep_candidates(bodies: Bodies, pairs: Pairs, manifolds: Manifolds) -> bool:
-    """Sort and sweep along x: only bodies whose x-intervals overlap are paired; then sort the keys.
+@inner_kernel
+def sweep_candidates(bodies: Bodies, detection: Detection) -> bool:
+    """Sort and sweep along x: only bodies whose x-intervals overlap are paired; then sort the pairs.
 
     An unbounded body has its lower end at -inf, stays open to the end, and so meets every other one.
     """
-    order = np.argsort(pairs.low[:, 0])
+    order = detection.order
+    sort_by_lower_x(bodies, order)
     n = len(order)
     for s in range(n):
         i = order[s]
         for r in range(s + 1, n):
             j = order[r]
-            if pairs.low[j, 0] > pairs.high[i, 0]:
+            if bodies.low[j, 0] > bodies.high[i, 0]:
                 break
-            if not add_candidate(bodies, pairs, manifolds, i, j):
+            if not add_candidate(bodies, detection, i, j):
                 return False
-    count = manifolds.count[CANDIDATES]
-    pairs.candidate[:count] = np.sort(pairs.candidate[:count])
+    sort_keys(detection.candidate, detection.count[CANDIDATES])
     return True
+
+
+@inner_kernel
+def sort_by_lower_x(bodies: Bodies, order: Indices) -> None:
+    """Insertion sort from the order of the step before, which is nearly right: bodies move little per step."""
+    for s in range(1, len(order)):
+        body = order[s]
+        r = s
+        while r > 0 and bodies.low[order[r - 1], 0] > bodies.low[body, 0]:
+            order[r] = order[r - 1]
+            r -= 1
+        order[r] = body
+
+
+@inner_kernel
+def sort_keys(key: Indices, count: int) -> None:
+    """Heap sort in place: no memory is allocated inside kernels."""
+    for root in range(count // 2 - 1, -1, -1):
+        sift_down(key, root, count)
+    for end in range(count - 1, 0, -1):
+        key[0], key[end] = key[end], key[0]
+        sift_down(key, 0, end)

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.iteration import CHECK_INTERVAL, RATE_INTERVAL, better_relaxation
+from reference_solver.planar.iteration import (
+    CHECK_INTERVAL,
+    LARGEST_RELAXATION,
+    PATIENCE,
+    RATE_INTERVAL,
+    better_relaxation,
+    enter,
+)
 from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.block import sweep_blocks
 from reference_solver.spatial.residual import natural_map
 from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import Bodies, Manifolds
-from reference_solver.tally import RESIDUAL, SWEEPS, UNCONVERGED, WORST_SWEEPS
+from reference_solver.tally import UNCONVERGED
 
 
-@kernel
+@inner_kernel
 def sweep(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
     """One sweep of the solver chosen."""
     if options.solver == BLOCK:
@@ -22,29 +29,46 @@ def sweep(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: fl
         sweep_points(bodies, manifolds, options, relaxation)
 
 
-@kernel
+@inner_kernel
+def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
+    """Sweep until the residual is reached, with the factor given or estimated.
+
+    Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
+    in circles. When the residual has made no progress for a while, the factor and its bound go half way to 1.
+    """
+    relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
+    limit = LARGEST_RELAXATION
+    residual = natural_map(bodies, manifolds, options)
+    before = best = residual
+    sweeps, best_at = 0, 0
+    while residual > options.residual and sweeps < options.max_sweeps:
+        sweep(bodies, manifolds, options, relaxation)
+        sweeps += 1
+        if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
+            continue
+        residual = natural_map(bodies, manifolds, options)
+        if residual < best:
+            best, best_at = residual, sweeps
+        if options.relaxation <= 0.0:
+            if sweeps - best_at >= PATIENCE:
+                limit = 1.0 + 0.5 * (relaxation - 1.0)
+                relaxation, best, best_at = limit, residual, sweeps
+            elif sweeps % RATE_INTERVAL == 0 and before > 0.0 and residual > 0.0:
+                relaxation = better_relaxation(relaxation, (residual / before) ** (1.0 / RATE_INTERVAL), limit)
+        if sweeps % RATE_INTERVAL == 0:
+            before = residual
+    if residual > options.residual:
+        tally[UNCONVERGED] += 1.0
+    enter(tally, residual, sweeps)
+
+
+@inner_kernel
 def solve_velocities(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
     """Sweep as `Options` asks and enter residual and sweeps in the tally."""
+    if options.residual >= 0.0:
+        sweep_to_residual(bodies, manifolds, options, tally)
+        return
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
-    sweeps, residual, before = 0, 0.0, 0.0
-    if options.residual < 0.0:
-        for _ in range(options.iterations):
-            sweep(bodies, manifolds, options, relaxation)
-        sweeps, residual = options.iterations, natural_map(bodies, manifolds, options)
-    else:
-        residual = before = natural_map(bodies, manifolds, options)
-        while residual > options.residual and sweeps < options.max_sweeps:
-            sweep(bodies, manifolds, options, relaxation)
-            sweeps += 1
-            if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
-                continue
-            residual = natural_map(bodies, manifolds, options)
-            if sweeps % RATE_INTERVAL == 0:
-                if options.relaxation <= 0.0 and before > 0.0 and residual > 0.0:
-                    relaxation = better_relaxation(relaxation, (residual / before) ** (1.0 / RATE_INTERVAL))
-                before = residual
-        if residual > options.residual:
-            tally[UNCONVERGED] += 1.0
-    tally[RESIDUAL] = max(tally[RESIDUAL], residual)
-    tally[SWEEPS] += sweeps
-    tally[WORST_SWEEPS] = max(tally[WORST_SWEEPS], sweeps)
+    for _ in range(options.iterations):
+        sweep(bodies, manifolds, options, relaxation)
+    enter(tally, natural_map(bodies, manifolds, options), options.iterations)

@@ -1,4 +1,4 @@
-"""Relative twist of two bodies at the centre of their manifold, and what a wrench there does to them.
+"""Relative twist of two bodies at the centre of their manifold, what loads and wrenches do to it.
 
 A manifold of any number of points sees its bodies through six numbers in its frame: relative velocity V and
 relative angular velocity W at the centre. A point at offset d has u = V + W x d. An impulse p at the point is the
@@ -7,13 +7,25 @@ wrench (p, d x p) at the centre.
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.planar.state import Options
 from reference_solver.spatial.state import Bodies, Manifolds
-from reference_solver.spatial.vector import Vector, add, add_scaled, cross, row, sub, times, times_transposed
+from reference_solver.spatial.vector import (
+    Vector,
+    add,
+    add_scaled,
+    cross,
+    dot,
+    length,
+    row,
+    sub,
+    times,
+    times_transposed,
+)
 
 
-@kernel
+@inner_kernel
 def relative_twist(twist: Array, manifolds: Manifolds, m: int, rotation: int) -> tuple[Vector, Vector]:
     """(V, W) of manifold m, B relative to A, frame; ``twist`` may hold velocities or pseudo-velocities."""
     a, b = manifolds.body_a[m], manifolds.body_b[m]
@@ -25,13 +37,13 @@ def relative_twist(twist: Array, manifolds: Manifolds, m: int, rotation: int) ->
     return times(manifolds.frame, m, v), times(manifolds.frame, m, sub(wb, wa))
 
 
-@kernel
+@inner_kernel
 def velocity_at(v: Vector, w: Vector, manifolds: Manifolds, m: int, p: int) -> Vector:
-    """u = V + W x d at point p, frame [m/s]."""
+    """U = V + W x d at point p, frame [m/s]."""
     return add(v, cross(w, row(manifolds.offset[m], p, 0)))
 
 
-@kernel
+@inner_kernel
 def apply_wrench(
     bodies: Bodies, twist: Array, manifolds: Manifolds, m: int, rotation: int, force: Vector, moment: Vector
 ) -> None:
@@ -51,7 +63,7 @@ def apply_wrench(
         twist[b, 3 + d] += spin_b[d]
 
 
-@kernel
+@inner_kernel
 def respond(v: Vector, w: Vector, manifolds: Manifolds, m: int, p: int, change: Vector) -> tuple[Vector, Vector]:
     """(V, W) after an impulse `change` (frame) at point p: a product with `Manifolds.response`."""
     r = manifolds.response[m, p]
@@ -59,3 +71,35 @@ def respond(v: Vector, w: Vector, manifolds: Manifolds, m: int, p: int, change: 
         v = add_scaled(v, change[k], (r[0, k], r[1, k], r[2, k]))
         w = add_scaled(w, change[k], (r[3, k], r[4, k], r[5, k]))
     return v, w
+
+
+@inner_kernel
+def point_velocity(bodies: Bodies, i: int, arm: Vector) -> Vector:
+    """Velocity of a point of body i [m/s]."""
+    return add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), arm))
+
+
+@inner_kernel
+def acceleration_at(bodies: Bodies, i: int, arm: Vector) -> float:
+    """Magnitude of what loads alone do to a point of body i [m/s^2]."""
+    spin = times(bodies.inverse_inertia, i, row(bodies.torque, i, 0))
+    return length(add(row(bodies.acceleration, i, 0), cross(spin, arm)))
+
+
+@inner_kernel
+def load_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> float:
+    """Largest relative speed that the loads of one step can give the two bodies at point p [m/s]."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    at_a = acceleration_at(bodies, a, row(manifolds.arm_a[m], p, 0))
+    at_b = acceleration_at(bodies, b, row(manifolds.arm_b[m], p, 0))
+    return options.dt * (at_a + at_b)
+
+
+@inner_kernel
+def is_resting(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> bool:
+    """The bodies meet at point p no faster than the loads of one step explain; needs geometry only."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    at_a = point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0))
+    at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
+    approach = -dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
+    return approach <= load_speed(bodies, manifolds, m, p, options)

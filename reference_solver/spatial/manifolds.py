@@ -2,42 +2,73 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.manifolds import TOUCHING
 from reference_solver.planar.state import Options
 from reference_solver.spatial.broadphase import find_candidates
+from reference_solver.spatial.kinematics import is_resting
 from reference_solver.spatial.narrowphase import collide
-from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Manifolds, Pairs
+from reference_solver.spatial.state import (
+    CANDIDATES,
+    MANIFOLDS,
+    REMEMBERED,
+    Bodies,
+    Detection,
+    Manifolds,
+    Memory,
+)
 from reference_solver.spatial.vector import dot, row, tangents
 
 
-@kernel
-def detect(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, options: Options) -> bool:
-    """Fill the geometry of all manifolds; False if an array is too small (nothing else has changed then).
+@inner_kernel
+def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> int:
+    """Fill the geometry of all manifolds and return how many; -1 if an array is too small.
 
     Candidates come in ascending order and the points of a pair are sorted by feature, so that contacts are
     sorted by (body_a, body_b, feature): the same order in every run, whatever happened before.
     """
-    if not find_candidates(bodies, pairs, manifolds, options):
-        return False
-    n = len(bodies.shape)
+    if not find_candidates(bodies, detection, options):
+        return -1
+    n = len(bodies)
     m = 0
-    for k in range(manifolds.count[CANDIDATES]):
-        if m == len(manifolds.body_a):
-            return False
+    for k in range(detection.count[CANDIDATES]):
+        if m == len(manifolds):
+            return -1
         found = collide(
-            bodies, pairs, pairs.candidate[k] // n, pairs.candidate[k] % n, options.margin, manifolds, m
+            bodies, detection, detection.candidate[k] // n, detection.candidate[k] % n, options.margin, manifolds, m
         )
+        if options.restitution and detection.restitution[manifolds.body_a[m], manifolds.body_b[m]] > 0.0:
+            found = drop_approaching(bodies, manifolds, m, options)
         if found > 0:
             sort_points(manifolds, m)
             set_frame(manifolds, m)
             set_world_points(bodies, manifolds, m)
             m += 1
-    manifolds.count[MANIFOLDS] = m
-    recall(bodies, manifolds, options)
-    return True
+    detection.count[MANIFOLDS] = m
+    return m
 
 
-@kernel
+@inner_kernel
+def drop_approaching(bodies: Bodies, manifolds: Manifolds, m: int, options: Options) -> int:
+    """Of the points of a pair with restitution, keep those that touch or rest; return how many.
+
+    A point that flies towards its impact must not be slowed down before it gets there (E8).
+    """
+    touching = TOUCHING * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+    kept = 0
+    for p in range(manifolds.points[m]):
+        if manifolds.gap[m, p] <= touching or is_resting(bodies, manifolds, m, p, options):
+            manifolds.feature[m, kept] = manifolds.feature[m, p]
+            manifolds.gap[m, kept] = manifolds.gap[m, p]
+            for d in range(3):
+                manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
+                manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
+            kept += 1
+    manifolds.points[m] = kept
+    return kept
+
+
+@inner_kernel
 def sort_points(manifolds: Manifolds, m: int) -> None:
     """Sort the points of manifold m by feature (insertion sort of at most four)."""
     for i in range(1, manifolds.points[m]):
@@ -51,13 +82,13 @@ def sort_points(manifolds: Manifolds, m: int) -> None:
             j -= 1
 
 
-@kernel
+@inner_kernel
 def swap(values, j):  # type: ignore[no-untyped-def]
     """Exchange entries j and j - 1."""
     values[j], values[j - 1] = values[j - 1], values[j]
 
 
-@kernel
+@inner_kernel
 def set_frame(manifolds: Manifolds, m: int) -> None:
     """Tangents, levers of the manifold's centre, and the points' offsets from it in the contact frame.
 
@@ -82,7 +113,7 @@ def set_frame(manifolds: Manifolds, m: int) -> None:
             manifolds.offset[m, p, k] = offset
 
 
-@kernel
+@inner_kernel
 def set_world_points(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
     """Contact points in world axes, from B's centre: B is the one that moves where A is the ground."""
     b = manifolds.body_b[m]
@@ -91,50 +122,51 @@ def set_world_points(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
             manifolds.point[m, p, d] = bodies.pose[b, d] + manifolds.arm_b[m, p, d]
 
 
-@kernel
-def recall(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
-    """Give each point the impulse of the same feature one step before: a merge of two sorted lists of pairs."""
-    n = len(bodies.shape)
+@inner_kernel
+def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options) -> None:
+    """Give each point the impulse of the same feature one step before: a merge of two sorted lists of detection."""
+    n = len(bodies)
     old = 0
-    for m in range(manifolds.count[MANIFOLDS]):
-        manifolds.impulse[m] = 0.0
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            for k in range(3):
+                manifolds.impulse[m, p, k] = 0.0
         pair = manifolds.body_a[m] * n + manifolds.body_b[m]
-        while old < manifolds.count[REMEMBERED] and manifolds.old_pair[old] < pair:
+        while old < detection.count[REMEMBERED] and memory.pair[old] < pair:
             old += 1
-        if options.warm_starting and old < manifolds.count[REMEMBERED] and manifolds.old_pair[old] == pair:
-            recall_points(manifolds, m, old)
+        if options.warm_starting and old < detection.count[REMEMBERED] and memory.pair[old] == pair:
+            recall_points(manifolds, m, memory, old)
 
 
-@kernel
-def recall_points(manifolds: Manifolds, m: int, old: int) -> None:
+@inner_kernel
+def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> None:
     """Match the points of manifold m with those of remembered manifold `old`; impulses turn into the new frame."""
     for p in range(manifolds.points[m]):
-        for o in range(manifolds.old_points[old]):
-            if manifolds.old_feature[old, o] == manifolds.feature[m, p]:
+        for o in range(memory.points[old]):
+            if memory.feature[old, o] == manifolds.feature[m, p]:
                 for k in range(3):
                     manifolds.impulse[m, p, k] = dot(
-                        row(manifolds.frame[m], k, 0), row(manifolds.old_impulse[old], o, 0)
+                        row(manifolds.frame[m], k, 0), row(memory.impulse[old], o, 0)
                     )
                 manifolds.impulse[m, p, 2] = max(manifolds.impulse[m, p, 2], 0.0)
 
 
-@kernel
-def remember(bodies: Bodies, manifolds: Manifolds) -> None:
+@inner_kernel
+def remember(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
-    n = len(bodies.shape)
-    count = manifolds.count[MANIFOLDS]
-    for m in range(count):
-        manifolds.old_pair[m] = manifolds.body_a[m] * n + manifolds.body_b[m]
-        manifolds.old_points[m] = manifolds.points[m]
+    n = len(bodies)
+    for m in range(len(manifolds)):
+        memory.pair[m] = manifolds.body_a[m] * n + manifolds.body_b[m]
+        memory.points[m] = manifolds.points[m]
         for p in range(manifolds.points[m]):
-            manifolds.old_feature[m, p] = manifolds.feature[m, p]
-            kept = 0.0 if manifolds.bounce[m, p] else 1.0
+            memory.feature[m, p] = manifolds.feature[m, p]
+            kept = 0.0 if manifolds.impact[m, p] else 1.0
             for d in range(3):
-                manifolds.old_impulse[m, p, d] = kept * world_component(manifolds, m, p, d)
-    manifolds.count[REMEMBERED] = count
+                memory.impulse[m, p, d] = kept * world_component(manifolds, m, p, d)
+    detection.count[REMEMBERED] = len(manifolds)
 
 
-@kernel
+@inner_kernel
 def world_component(manifolds: Manifolds, m: int, p: int, d: int) -> float:
     """World component d of the impulse on B at point p of manifold m [N s]."""
     return (

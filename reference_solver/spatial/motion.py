@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.planar.state import Options
 from reference_solver.spatial.state import FIXED, FREE, Bodies
 from reference_solver.spatial.vector import (
@@ -27,13 +27,13 @@ from reference_solver.spatial.vector import (
 )
 
 
-@kernel
+@inner_kernel
 def quaternion(bodies: Bodies, i: int) -> Quaternion:
     """Quaternion of body i."""
     return (bodies.pose[i, 3], bodies.pose[i, 4], bodies.pose[i, 5], bodies.pose[i, 6])
 
 
-@kernel
+@inner_kernel
 def set_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
     """Store a unit quaternion with the rotation matrix and world inertia that belong to it."""
     q = normalised(q)
@@ -51,7 +51,7 @@ def set_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
 @kernel
 def initialise(bodies: Bodies) -> None:
     """Fill everything that follows from poses and twists."""
-    for i in range(len(bodies.motion)):
+    for i in range(len(bodies)):
         set_orientation(bodies, i, quaternion(bodies, i))
         if bodies.gyroscopic[i]:
             momentum = momentum_of(bodies, i, row(bodies.twist, i, 3))
@@ -59,7 +59,7 @@ def initialise(bodies: Bodies) -> None:
                 bodies.angular_momentum[i, d] = momentum[d]
 
 
-@kernel
+@inner_kernel
 def momentum_of(bodies: Bodies, i: int, w: Vector) -> Vector:
     """Angular momentum I w of body i, world axes [kg m^2/s]."""
     local = times_transposed(bodies.axes, i, w)
@@ -67,22 +67,23 @@ def momentum_of(bodies: Bodies, i: int, w: Vector) -> Vector:
     return times(bodies.axes, i, (moments[i, 0] * local[0], moments[i, 1] * local[1], moments[i, 2] * local[2]))
 
 
-@kernel
+@inner_kernel
 def accelerate(bodies: Bodies, options: Options) -> None:
     """v* = v + h M^-1 f (E5). The gyroscopic term acts while the body turns, in `turn_freely`."""
-    for i in range(len(bodies.motion)):
+    for i in range(len(bodies)):
         if bodies.motion[i] != FREE:
             continue
         spin = times(bodies.inverse_inertia, i, row(bodies.torque, i, 0))
         for d in range(3):
+            bodies.spin_before[i, d] = bodies.twist[i, 3 + d]
             bodies.twist[i, d] += options.dt * bodies.acceleration[i, d]
             bodies.twist[i, 3 + d] += options.dt * spin[d]
 
 
-@kernel
+@inner_kernel
 def move(bodies: Bodies, options: Options) -> None:
-    """x += h v, and the turn that belongs to h omega (E17, E18)."""
-    for i in range(len(bodies.motion)):
+    """X += h v, and the turn that belongs to h omega (E17, E18)."""
+    for i in range(len(bodies)):
         if bodies.motion[i] == FIXED:
             continue
         for d in range(3):
@@ -97,7 +98,7 @@ def move(bodies: Bodies, options: Options) -> None:
             set_orientation(bodies, i, quaternion_product(turn, quaternion(bodies, i)))
 
 
-@kernel
+@inner_kernel
 def collect_momentum(bodies: Bodies, i: int, before: Vector) -> None:
     """Add to the stored angular momentum what changed the spin in this step: nothing, exactly, in free flight."""
     w = row(bodies.twist, i, 3)
@@ -106,7 +107,7 @@ def collect_momentum(bodies: Bodies, i: int, before: Vector) -> None:
         bodies.angular_momentum[i, d] += gained[d]
 
 
-@kernel
+@inner_kernel
 def turn_freely(bodies: Bodies, i: int, dt: float) -> None:
     """Turn body i with constant angular momentum for dt: axes 1 and 2 half, 3 whole, 2 and 1 half (E18)."""
     local = times_transposed(bodies.axes, i, row(bodies.angular_momentum, i, 0))
@@ -124,7 +125,7 @@ def turn_freely(bodies: Bodies, i: int, dt: float) -> None:
         bodies.twist[i, 3 + d] = w[d]
 
 
-@kernel
+@inner_kernel
 def turn_about(k: int, local: Vector, q: Quaternion, moments: Vector, dt: float) -> tuple[Vector, Quaternion]:
     """Flow of L_k^2 / 2 I_k: the body turns about its axis k by L_k dt / I_k, and L turns back in the body."""
     angle = local[k] / moments[k] * dt
@@ -140,10 +141,10 @@ def turn_about(k: int, local: Vector, q: Quaternion, moments: Vector, dt: float)
     return turned, quaternion_product(q, (half_c, 0.0, 0.0, half_s))
 
 
-@kernel
+@inner_kernel
 def displace(bodies: Bodies, dt: float) -> None:
     """Move bodies by their pseudo-velocities; velocities, and the angular momentum, stay what they are (E16)."""
-    for i in range(len(bodies.motion)):
+    for i in range(len(bodies)):
         if bodies.motion[i] != FREE:
             continue
         for d in range(3):

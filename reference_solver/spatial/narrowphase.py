@@ -12,10 +12,10 @@ survive from step to step and carry accumulated impulses with them.
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.box_box import box_box
 from reference_solver.spatial.points import share_of_gap, write_point
-from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, Pairs
+from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import (
     Vector,
     add,
@@ -33,16 +33,16 @@ from reference_solver.spatial.vector import (
 SAME_SLOPE = 1e-9
 
 
-@kernel
-def collide(bodies: Bodies, pairs: Pairs, a: int, b: int, margin: float, manifolds: Manifolds, m: int) -> int:
+@inner_kernel
+def collide(bodies: Bodies, detection: Detection, a: int, b: int, margin: float, manifolds: Manifolds, m: int) -> int:
     """Write the manifold of bodies a < b in row m; return its number of points (0: no contact)."""
     reach = margin * min(bodies.extent[a], bodies.extent[b])
     manifolds.body_a[m] = a
     manifolds.body_b[m] = b
-    if bodies.shape[a] <= bodies.shape[b]:
-        count, normal = _pair(bodies, pairs, a, b, reach, manifolds, m)
+    if bodies.kind[a] <= bodies.kind[b]:
+        count, normal = _pair(bodies, detection, a, b, reach, manifolds, m)
     else:
-        count, normal = _pair(bodies, pairs, b, a, reach, manifolds, m)
+        count, normal = _pair(bodies, detection, b, a, reach, manifolds, m)
         normal = scale(-1.0, normal)
     manifolds.points[m] = count
     for d in range(3):
@@ -50,39 +50,39 @@ def collide(bodies: Bodies, pairs: Pairs, a: int, b: int, margin: float, manifol
     return count
 
 
-@kernel
+@inner_kernel
 def _pair(
-    bodies: Bodies, pairs: Pairs, f: int, s: int, reach: float, manifolds: Manifolds, m: int
+    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
-    if bodies.shape[f] == HALF_SPACE:
-        if bodies.shape[s] == SPHERE:
+    if bodies.kind[f] == HALF_SPACE:
+        if bodies.kind[s] == SPHERE:
             return half_space_sphere(bodies, f, s, reach, manifolds, m)
-        if bodies.shape[s] == BOX:
+        if bodies.kind[s] == BOX:
             return half_space_box(bodies, f, s, reach, manifolds, m)
         return 0, (0.0, 0.0, 1.0)  # two half-spaces: neither is ever free
-    if bodies.shape[f] == SPHERE:
+    if bodies.kind[f] == SPHERE:
         return sphere_sphere(bodies, f, s, reach, manifolds, m)
-    if bodies.shape[s] == SPHERE:
+    if bodies.kind[s] == SPHERE:
         return box_sphere(bodies, f, s, reach, manifolds, m)
-    return box_box(bodies, pairs, f, s, reach, manifolds, m)
+    return box_box(bodies, detection, f, s, reach, manifolds, m)
 
 
-@kernel
+@inner_kernel
 def half_space_sphere(
     bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Half-space f and sphere s: one point under the centre."""
-    normal = times(bodies.axes, f, row(bodies.size, f, 0))
+    normal = times(bodies.axes, f, row(bodies.geometry, f, 0))
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
-    gap = dot(normal, between) - bodies.size[f, 3] - bodies.size[s, 0]
+    gap = dot(normal, between) - bodies.geometry[f, 3] - bodies.geometry[s, 0]
     if gap > reach:
         return 0, normal
-    arm = scale(-bodies.size[s, 0], normal)
+    arm = scale(-bodies.geometry[s, 0], normal)
     write_point(manifolds, m, 0, f, s, 0, add(between, arm), arm, gap)
     return 1, normal
 
 
-@kernel
+@inner_kernel
 def half_space_box(
     bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
@@ -90,9 +90,9 @@ def half_space_box(
 
     The feature is the number of the corner: bit k is set where it lies at +half_extent along body axis k.
     """
-    normal = times(bodies.axes, f, row(bodies.size, f, 0))
+    normal = times(bodies.axes, f, row(bodies.geometry, f, 0))
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
-    height = dot(normal, between) - bodies.size[f, 3]
+    height = dot(normal, between) - bodies.geometry[f, 3]
     down = times_transposed(bodies.axes, s, scale(-1.0, normal))
     k = 0
     for i in range(1, 3):
@@ -106,9 +106,9 @@ def half_space_box(
             bodies.axes,
             s,
             (
-                bodies.size[s, 0] if corner & 1 else -bodies.size[s, 0],
-                bodies.size[s, 1] if corner & 2 else -bodies.size[s, 1],
-                bodies.size[s, 2] if corner & 4 else -bodies.size[s, 2],
+                bodies.geometry[s, 0] if corner & 1 else -bodies.geometry[s, 0],
+                bodies.geometry[s, 1] if corner & 2 else -bodies.geometry[s, 1],
+                bodies.geometry[s, 2] if corner & 4 else -bodies.geometry[s, 2],
             ),
         )
         gap = height + dot(normal, arm)
@@ -118,34 +118,34 @@ def half_space_box(
     return count, normal
 
 
-@kernel
+@inner_kernel
 def sphere_sphere(
     bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Spheres f and s: one point on the line of centres; concentric spheres separate along z."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     distance = length(between)
-    gap = distance - bodies.size[f, 0] - bodies.size[s, 0]
+    gap = distance - bodies.geometry[f, 0] - bodies.geometry[s, 0]
     normal = (0.0, 0.0, 1.0)
     if gap > reach:
         return 0, normal
     if distance > 0.0:
         normal = scale(1.0 / distance, between)
     share = share_of_gap(bodies, f, s)
-    near = bodies.size[f, 0] + share * gap
-    far = bodies.size[s, 0] + (1.0 - share) * gap
+    near = bodies.geometry[f, 0] + share * gap
+    far = bodies.geometry[s, 0] + (1.0 - share) * gap
     write_point(manifolds, m, 0, f, s, 0, scale(near, normal), scale(-far, normal), gap)
     return 1, normal
 
 
-@kernel
+@inner_kernel
 def box_sphere(
     bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Box f and sphere s: nearest point of the box, or its nearest face if the centre is inside."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     local = times_transposed(bodies.axes, f, between)
-    half = row(bodies.size, f, 0)
+    half = row(bodies.geometry, f, 0)
     outside = (
         local[0] - max(-half[0], min(half[0], local[0])),
         local[1] - max(-half[1], min(half[1], local[1])),
@@ -161,9 +161,9 @@ def box_sphere(
                 k = i
         distance = abs(local[k]) - half[k]
         normal = scale(1.0 if local[k] >= 0.0 else -1.0, axis(bodies.axes, f, k))
-    gap = distance - bodies.size[s, 0]
+    gap = distance - bodies.geometry[s, 0]
     if gap > reach:
         return 0, normal
-    arm = scale(-(bodies.size[s, 0] + (1.0 - share_of_gap(bodies, f, s)) * gap), normal)
+    arm = scale(-(bodies.geometry[s, 0] + (1.0 - share_of_gap(bodies, f, s)) * gap), normal)
     write_point(manifolds, m, 0, f, s, 0, add(between, arm), arm, gap)
     return 1, normal

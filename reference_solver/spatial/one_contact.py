@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 
 # Newton steps on a smooth scalar function; each at least doubles the digits once near, so 30 always suffice.
 NEWTON_STEPS = 30
@@ -17,7 +17,7 @@ NEWTON_STEPS = 30
 SCAN = 32
 
 
-@kernel
+@inner_kernel
 def disc_friction(k11, k12, k22, g1, g2, radius):
     """Friction impulse minimising 1/2 p.K p + g.p over the disc |p| <= radius.
 
@@ -47,7 +47,7 @@ def disc_friction(k11, k12, k22, g1, g2, radius):
     return radius * p1 / size, radius * p2 / size
 
 
-@kernel
+@inner_kernel
 def coulomb_impulse(k, q, mu):
     """Impulse (p1, p2, pn) with 0 <= K p + q, complementary to pn, and friction of largest dissipation.
 
@@ -71,7 +71,7 @@ def coulomb_impulse(k, q, mu):
     return (p1, p2, pn)
 
 
-@kernel
+@inner_kernel
 def _solve_symmetric(k, q):
     """-K^-1 q of a symmetric positive definite 3 x 3 matrix, by Cramer's rule on cofactors."""
     k11, k12, k13, k22, k23, k33 = k
@@ -89,7 +89,7 @@ def _solve_symmetric(k, q):
     )
 
 
-@kernel
+@inner_kernel
 def _slip_condition(k, q, mu, d1, d2):
     """Slip velocity along d and across d, times D, for friction -mu pn d; its turn rate; and D.
 
@@ -109,7 +109,7 @@ def _slip_condition(k, q, mu, d1, d2):
     return along, across, rate, divisor
 
 
-@kernel
+@inner_kernel
 def _slip_direction(k, q, mu):
     """Unit slip direction: Newton from the slip a frictionless impact would leave; failing that, a scan."""
     d1 = q[0] - q[2] / k[5] * k[2]
@@ -132,13 +132,13 @@ def _slip_direction(k, q, mu):
     return _scan_directions(k, q, mu)
 
 
-@kernel
+@inner_kernel
 def _turned(d1, d2, angle):
     c, s = math.cos(angle), math.sin(angle)
     return c * d1 - s * d2, s * d1 + c * d2
 
 
-@kernel
+@inner_kernel
 def _scan_directions(k, q, mu):
     """First admissible root of the slip condition on the circle, by sign changes and bisection."""
     width = 2.0 * math.pi / SCAN
@@ -162,7 +162,7 @@ def _scan_directions(k, q, mu):
     return False, 1.0, 0.0
 
 
-@kernel
+@inner_kernel
 def into_disc(p1: float, p2: float, radius: float) -> tuple[float, float]:
     """Nearest point of the disc of that radius."""
     size = math.sqrt(p1 * p1 + p2 * p2)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
 from reference_solver.spatial.vector import Vector
 
 
-@kernel
+@inner_kernel
 def share_of_gap(bodies: Bodies, f: int, s: int) -> float:
     """Where the contact point lies across the gap: 0 on the first body's surface, 1 on the second's."""
     if bodies.motion[s] != FREE:
@@ -17,7 +17,7 @@ def share_of_gap(bodies: Bodies, f: int, s: int) -> float:
     return 0.5
 
 
-@kernel
+@inner_kernel
 def write_point(
     manifolds: Manifolds, m: int, p: int, f: int, s: int, feature: int, arm_f: Vector, arm_s: Vector, gap: float
 ) -> None:

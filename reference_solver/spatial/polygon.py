@@ -1,7 +1,7 @@
 """Clipping one face by another and keeping at most four vertices.
 
-Polygons live in ``Pairs.polygon`` in the frame of a reference face: two coordinates along the face, the third
-above it. ``Pairs.polygon_edge`` numbers the line that leaves each vertex: 0..3 the edges of the clipped face,
+Polygons live in ``Detection.polygon`` in the frame of a reference face: two coordinates along the face, the third
+above it. ``Detection.polygon_edge`` numbers the line that leaves each vertex: 0..3 the edges of the clipped face,
 4..7 the sides of the reference face.
 """
 
@@ -9,34 +9,34 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
-from reference_solver.spatial.state import Pairs
+from reference_solver.compilation import inner_kernel
+from reference_solver.spatial.state import Detection
 
 #: Vertices this far outside a side, in half extents, count as on it: boxes of one size stacked flush have all
 #: their vertices exactly on the sides, and round-off must not turn vertices into edge crossings.
 ON_SIDE = 1e-8
 
 
-@kernel
-def clip_to_rectangle(pairs: Pairs, half_u: float, half_v: float) -> int:
+@inner_kernel
+def clip_to_rectangle(detection: Detection, half_u: float, half_v: float) -> int:
     """Clip the four-sided polygon 0 to |u| <= half_u, |v| <= half_v; the result is polygon 0 again."""
     count = 4
     source = 0
     for side in range(4):
         half = half_u if side < 2 else half_v
-        count = _clip(pairs, source, count, side, half)
+        count = _clip(detection, source, count, side, half)
         source = 1 - source
     return count
 
 
-@kernel
-def _clip(pairs: Pairs, source: int, count: int, side: int, half: float) -> int:
+@inner_kernel
+def _clip(detection: Detection, source: int, count: int, side: int, half: float) -> int:
     """Keep the part of polygon `source` inside one side (Sutherland and Hodgman, CACM 17, 1974)."""
     target = 1 - source
     coordinate = side // 2
     sign = 1.0 if side % 2 == 0 else -1.0
     tolerance = ON_SIDE * half
-    polygon, edge = pairs.polygon, pairs.polygon_edge
+    polygon, edge = detection.polygon, detection.polygon_edge
     kept = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
@@ -62,13 +62,13 @@ def _clip(pairs: Pairs, source: int, count: int, side: int, half: float) -> int:
     return kept
 
 
-@kernel
-def keep_within_reach(pairs: Pairs, count: int, reach: float) -> int:
+@inner_kernel
+def keep_within_reach(detection: Detection, count: int, reach: float) -> int:
     """Copy the vertices of polygon 0 no higher than reach to polygon 1, with vertex names in place of edges.
 
     A vertex of a convex polygon is where two of its lines meet: its name is 8 * line arriving + line leaving.
     """
-    polygon, edge = pairs.polygon, pairs.polygon_edge
+    polygon, edge = detection.polygon, detection.polygon_edge
     kept = 0
     for i in range(count):
         if polygon[0, i, 2] <= reach:
@@ -79,14 +79,14 @@ def keep_within_reach(pairs: Pairs, count: int, reach: float) -> int:
     return kept
 
 
-@kernel
-def reduce_to_four(pairs: Pairs, count: int, tolerance: float) -> int:
+@inner_kernel
+def reduce_to_four(detection: Detection, count: int, tolerance: float) -> int:
     """Keep of polygon 1 the deepest vertex, the one farthest from it, and the widest to either side of that line.
 
     A later vertex must be better by `tolerance` [m], so that round-off does not choose among equals. The order
     is kept. Returns the number of vertices, 3 or 4.
     """
-    p = pairs.polygon[1]
+    p = detection.polygon[1]
     first = 0
     for i in range(1, count):
         if p[i, 2] < p[first, 2] - tolerance:
@@ -110,6 +110,6 @@ def reduce_to_four(pairs: Pairs, count: int, tolerance: float) -> int:
         if i == first or i == second or i == left or i == right:
             for d in range(3):
                 p[kept, d] = p[i, d]
-            pairs.polygon_edge[1, kept] = pairs.polygon_edge[1, i]
+            detection.polygon_edge[1, kept] = detection.polygon_edge[1, i]
             kept += 1
     return kept

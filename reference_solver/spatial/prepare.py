@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.rows import SPEED_SHARE
+from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
 from reference_solver.planar.state import BAUMGARTE, Options
-from reference_solver.spatial.kinematics import apply_wrench, relative_twist, velocity_at
-from reference_solver.spatial.state import MANIFOLDS, Bodies, Manifolds, Pairs
+from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_velocity, relative_twist, velocity_at
+from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
 
 
-@kernel
-def prepare(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, options: Options) -> None:
+@inner_kernel
+def prepare(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> None:
     """Fill all manifolds from the poses and velocities at the start of the step, before forces act."""
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         a, b = manifolds.body_a[m], manifolds.body_b[m]
-        manifolds.friction[m] = pairs.friction[a, b] if options.friction else 0.0
+        manifolds.friction[m] = detection.friction[a, b] if options.friction else 0.0
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             set_response(bodies, manifolds, m, p, options)
             u = velocity_at(v, w, manifolds, m, p)
-            manifolds.approach[m, p] = u[2]
-            push = options.dt * loads_at(bodies, manifolds, m, p)
-            set_target(manifolds, m, p, pairs.restitution[a, b], push, options)
-            moving = speed_at(bodies, a, row(manifolds.arm_a[m], p, 0))
-            moving += speed_at(bodies, b, row(manifolds.arm_b[m], p, 0))
-            manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
-            if u[2] > push:  # parts faster than any load can press it together
-                manifolds.impulse[m, p] = 0.0
+            set_target(bodies, manifolds, m, p, u[2], detection.restitution[a, b], options)
+            set_speed(bodies, manifolds, m, p, u, options)
 
 
-@kernel
+@inner_kernel
 def set_response(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> None:
     """Relative twist at the centre per unit impulse at point p, and the point's own collision matrix.
 
@@ -56,7 +50,7 @@ def set_response(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: 
     set_matrix(manifolds.matrix[m, p], r, row(manifolds.offset[m], p, 0))
 
 
-@kernel
+@inner_kernel
 def set_matrix(matrix: Array, r: Array, offset: Vector) -> None:
     """K of one point from its response: u = V + W x d per unit impulse. Only the upper triangle is kept."""
     u1 = add((r[0, 0], r[1, 0], r[2, 0]), cross((r[3, 0], r[4, 0], r[5, 0]), offset))
@@ -66,40 +60,48 @@ def set_matrix(matrix: Array, r: Array, offset: Vector) -> None:
     matrix[3], matrix[4], matrix[5] = u2[1], u3[1], u3[2]
 
 
-@kernel
-def set_target(manifolds: Manifolds, m: int, p: int, restitution: float, push: float, options: Options) -> None:
-    """Normal velocity b_n to reach (E7, E8, E15). ``push`` [m/s] is what the loads can do in one step."""
-    u, gap = manifolds.approach[m, p], manifolds.gap[m, p]
-    # A gap may be closed within the step, not more; an overlap asks for nothing.
-    target = -max(gap, 0.0) / options.dt
+@inner_kernel
+def set_target(
+    bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, restitution: float, options: Options
+) -> None:
+    """Normal velocity b_n to reach (E7, E8, E15); u is the normal velocity before forces.
+
+    A gap may be closed within the step, not more; an overlap asks for nothing. A gap within round-off counts as
+    touching: divided by dt it would be noise that the solver had to answer in every step.
+    """
+    gap = manifolds.gap[m, p]
+    point = row(manifolds.point[m], p, 0)
+    place = max(abs(point[0]), abs(point[1]), abs(point[2]))
+    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+    target = -gap / options.dt if gap > ROUND_OFF * extent + COORDINATE_NOISE * place else 0.0
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
-    if options.restitution and u < 0.0:
-        target = max(-restitution * u, target) if restitution > 0.0 else target
+    if options.restitution and u < 0.0 and restitution > 0.0:
+        target = max(target, -restitution * u)
     manifolds.target[m, p] = target
-    # An impact is what loads cannot bring about in one step: a contact at rest keeps its warm start.
-    manifolds.bounce[m, p] = 1 if restitution > 0.0 and u < -push else 0
 
 
-@kernel
-def loads_at(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
-    """Acceleration that the loads of both bodies give their points, magnitudes added [m/s^2]."""
-    a, b = manifolds.body_a[m], manifolds.body_b[m]
-    turn_a = cross(times(bodies.inverse_inertia, a, row(bodies.torque, a, 0)), row(manifolds.arm_a[m], p, 0))
-    turn_b = cross(times(bodies.inverse_inertia, b, row(bodies.torque, b, 0)), row(manifolds.arm_b[m], p, 0))
-    return length(add(row(bodies.acceleration, a, 0), turn_a)) + length(add(row(bodies.acceleration, b, 0), turn_b))
+@inner_kernel
+def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, options: Options) -> None:
+    """Speed that the residual of this point is measured against (E14).
+
+    Points that meet or part faster than the loads of one step explain are in an impact: the impulse of the step
+    before does not guess this step's, nor this one the next (E9).
+    """
+    push = load_speed(bodies, manifolds, m, p, options)
+    moving = length(point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0)))
+    moving += length(point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0)))
+    manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
+    manifolds.impact[m, p] = 1 if abs(u[2]) > push else 0
+    if u[2] > push:
+        for k in range(3):
+            manifolds.impulse[m, p, k] = 0.0
 
 
-@kernel
-def speed_at(bodies: Bodies, i: int, arm: Vector) -> float:
-    """Speed of a point of body i [m/s]."""
-    return length(add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), arm)))
-
-
-@kernel
+@inner_kernel
 def warm_start(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
     """Apply the remembered impulses, the friction part inside the disc (E9)."""
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for p in range(manifolds.points[m]):
             bound = manifolds.friction[m] * manifolds.impulse[m, p, 2]

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.residual import IMPULSE_SHARE
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.one_contact import into_disc
-from reference_solver.spatial.state import MANIFOLDS, Bodies, Manifolds
+from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import Vector
 
 
-@kernel
+@inner_kernel
 def natural_map(bodies: Bodies, manifolds: Manifolds, options: Options) -> float:
     """Largest scaled natural-map residual over all points, dimensionless."""
     worst = 0.0
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             worst = max(worst, point_residual(manifolds, m, p, velocity_at(v, w, manifolds, m, p)))
     return worst
 
 
-@kernel
+@inner_kernel
 def point_residual(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
     """Larger of the normal and the friction defect of one point, each over its scale."""
     k = manifolds.matrix[m, p]
@@ -40,7 +40,7 @@ def point_residual(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
     return worst
 
 
-@kernel
+@inner_kernel
 def share(defect: float, scale: float) -> float:
     """Defect over scale; where nothing acts any defect is a whole one."""
     if defect == 0.0:

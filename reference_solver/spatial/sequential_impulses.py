@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
 from reference_solver.spatial.one_contact import disc_friction, into_disc
-from reference_solver.spatial.state import MANIFOLDS, Bodies, Manifolds
+from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, row
 
 
-@kernel
+@inner_kernel
 def sweep_points(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
     """One sweep over all points in canonical order, at each the normal row and then the friction rows."""
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for p in range(manifolds.points[m]):
@@ -28,7 +28,7 @@ def sweep_points(bodies: Bodies, manifolds: Manifolds, options: Options, relaxat
         apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
 
 
-@kernel
+@inner_kernel
 def press(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> Vector:
     """Normal row: bring u_n to its target, the total never pulling; returns the change of impulse."""
     old = manifolds.impulse[m, p, 2]
@@ -37,7 +37,7 @@ def press(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) ->
     return (0.0, 0.0, new - old)
 
 
-@kernel
+@inner_kernel
 def drag(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> Vector:
     """Friction rows together: the total that stops the slip, or all that the disc allows against it."""
     old1, old2 = manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1]
@@ -52,10 +52,10 @@ def drag(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> 
     return (new1 - old1, new2 - old2, 0.0)
 
 
-@kernel
+@inner_kernel
 def sweep_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows of position correction (E16)."""
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         v, w = relative_twist(bodies.pseudo, manifolds, m, options.rotation)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for p in range(manifolds.points[m]):

@@ -1,8 +1,11 @@
-"""Arrays that the spatial kernels work on, as named tuples of arrays.
+"""Arrays that the spatial kernels work on: one record per body, one per manifold.
+
+Records rather than one array per field: a kernel call hands over one pointer instead of two hundred numbers,
+which is what compilation time goes with, and the constants of a manifold lie side by side in memory.
 
 Symbols as in ``reference_solver/README.md``. A manifold ``m`` holds the one to four contact points ``s`` of one
 pair of bodies, which share a normal; manifolds are sorted by (body_a, body_b), their points by feature.
-Every manifold has room for four points, so that its constants are one contiguous block.
+Every manifold has room for four points.
 """
 
 from __future__ import annotations
@@ -24,79 +27,101 @@ FIXED, FREE, PRESCRIBED = 0, 1, 2
 #: Points per manifold: a plane support needs no more than four to carry any load.
 POINTS = 4
 
-#: Entries of `Manifolds.count`.
-MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2
+#: Entries of `Detection.count`.
+CANDIDATES, REMEMBERED, MANIFOLDS = 0, 1, 2
 
 
-class Bodies(NamedTuple):
-    """Bodies i = 0 .. n-1."""
+BODY = np.dtype(
+    [
+        ("pose", "f8", 7),  # position [m], quaternion (w, x, y, z) body to world
+        ("twist", "f8", 6),  # velocity [m/s], angular velocity [rad/s], world axes
+        ("axes", "f8", (3, 3)),  # rotation matrix of the pose; columns are the body axes in the world
+        ("inverse_inertia", "f8", (3, 3)),  # world axes, recomputed after every turn
+        ("inverse_mass", "f8"),  # 0 unless free
+        ("inverse_moments", "f8", 3),  # of the principal moments; 0 unless free, or where rotation is left out
+        ("pseudo", "f8", 6),  # pseudo-velocity of position correction
+        ("acceleration", "f8", 3),  # gravity plus constant force over mass [m/s^2]
+        ("torque", "f8", 3),  # constant torque [N m]
+        ("moments", "f8", 3),  # principal moments of free bodies [kg m^2]
+        ("angular_momentum", "f8", 3),  # world axes [kg m^2/s], kept for gyroscopic bodies only
+        ("spin_before", "f8", 3),  # angular velocity at the start of the step
+        ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
+        ("turning", "i8"),  # 1 where the quaternion can change
+        ("kind", "i8"),  # shape code
+        ("geometry", "f8", 4),  # half-space (normal, offset), box (half extents, .), sphere (radius, ., ., .)
+        ("extent", "f8"),  # smallest half width [m]
+        ("motion", "i8"),  # FIXED, FREE or PRESCRIBED
+        ("low", "f8", 3),  # lower corner of the bounding box
+        ("high", "f8", 3),  # upper corner
+    ],
+    align=True,
+)
 
-    pose: Array  # (n, 7): position [m], quaternion (w, x, y, z) body to world
-    twist: Array  # (n, 6): velocity [m/s], angular velocity [rad/s], world axes
-    axes: Array  # (n, 3, 3): rotation matrix of the pose; columns are the body axes in the world
-    pseudo: Array  # (n, 6): pseudo-velocity of position correction
-    acceleration: Array  # (n, 3): gravity plus constant force over mass [m/s^2]
-    torque: Array  # (n, 3): constant torque [N m]
-    inverse_mass: Array  # (n,): 0 unless free
-    inverse_moments: Array  # (n, 3): of the principal moments; 0 unless free, or where rotation is left out
-    moments: Array  # (n, 3): principal moments of free bodies [kg m^2]
-    inverse_inertia: Array  # (n, 3, 3): world axes, recomputed after every turn
-    angular_momentum: Array  # (n, 3): world axes [kg m^2/s], kept for gyroscopic bodies only
-    spin_before: Array  # (n, 3): angular velocity at the start of the step
-    gyroscopic: Indices  # (n,): 1 for free bodies with unequal moments
-    turning: Indices  # (n,): 1 where the quaternion can change
-    shape: Indices  # (n,)
-    size: Array  # (n, 4): half-space (normal, offset), box (half extents, .), sphere (radius, ., ., .)
-    extent: Array  # (n,): smallest half width [m]
-    motion: Indices  # (n,)
+# Vectors are in world axes, except those marked *frame*: components along (t1, t2, n) of the manifold.
+MANIFOLD = np.dtype(
+    [
+        ("body_a", "i8"),
+        ("body_b", "i8"),
+        ("points", "i8"),  # number of points, 1..4
+        ("friction", "f8"),  # mu
+        ("frame", "f8", (3, 3)),  # rows t1, t2, n; n points from A to B
+        ("lever_a", "f8", 3),  # centre of the manifold minus centre of A [m]
+        ("lever_b", "f8", 3),
+        ("offset", "f8", (POINTS, 3)),  # contact point minus centre of the manifold, frame [m]
+        ("response", "f8", (POINTS, 6, 3)),  # relative twist at the centre per impulse at the point, frame
+        ("matrix", "f8", (POINTS, 6)),  # collision matrix k11, k12, k13, k22, k23, k33, frame [1/kg]
+        ("target", "f8", POINTS),  # b_n [m/s]
+        ("impulse", "f8", (POINTS, 3)),  # accumulated impulse on B, frame [N s]
+        ("before", "f8", (POINTS, 3)),  # the same before a block was solved
+        ("push", "f8", POINTS),  # accumulated pseudo-impulse along n
+        ("push_target", "f8", POINTS),  # pseudo-velocity to reach [m/s]
+        ("speed", "f8", POINTS),  # reference speed of the residual [m/s]
+        ("impact", "i8", POINTS),  # 1 where bodies meet or part faster than loads explain
+        ("feature", "i8", POINTS),
+        ("gap", "f8", POINTS),  # [m], < 0 overlap
+        ("arm_a", "f8", (POINTS, 3)),  # contact point minus centre of A [m]
+        ("arm_b", "f8", (POINTS, 3)),
+        ("point", "f8", (POINTS, 3)),  # at detection, for records only [m]
+    ],
+    align=True,
+)
+
+#: What is remembered of a manifold until the next step.
+MEMORY = np.dtype(
+    [
+        ("pair", "i8"),  # a * n + b, ascending
+        ("points", "i8"),
+        ("feature", "i8", POINTS),
+        ("impulse", "f8", (POINTS, 3)),  # world axes, so that a turning contact frame does not turn the impulse
+    ],
+    align=True,
+)
+
+Bodies = np.recarray  # of BODY
+Manifolds = np.recarray  # of MANIFOLD
+Memory = np.recarray  # of MEMORY
 
 
-class Pairs(NamedTuple):
+class Buffer(NamedTuple):
+    """Samples of a run; `index` and `real` of length 0 where contacts are not recorded."""
+
+    pose: Array  # (s, n, 7)
+    twist: Array  # (s, n, 6)
+    offset: Indices  # (s + 1,)
+    index: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
+
+
+class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
+    count: Indices  # (3,): see CANDIDATES .. MANIFOLDS
     restitution: Array  # (n, n)
     friction: Array  # (n, n)
-    low: Array  # (n, 3): lower corner of the bounding box
-    high: Array  # (n, 3): upper corner
+    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
     polygon: Array  # (2, 16, 3): two polygons, each made from the other by one clip
     polygon_edge: Indices  # (2, 16): number of the edge that leaves each vertex
-
-
-class Manifolds(NamedTuple):
-    """Contacts of the current step, and what is remembered of the step before.
-
-    Vectors are in world axes, except those marked *frame*: components along (t1, t2, n) of the manifold.
-    """
-
-    count: Indices  # (3,): see MANIFOLDS .. CANDIDATES
-    body_a: Indices  # (m,)
-    body_b: Indices
-    points: Indices  # (m,): number of points, 1..4
-    frame: Array  # (m, 3, 3): rows t1, t2, n; n points from A to B
-    friction: Array  # (m,): mu
-    lever_a: Array  # (m, 3): centre of the manifold minus centre of A [m]
-    lever_b: Array
-    feature: Indices  # (m, 4)
-    arm_a: Array  # (m, 4, 3): contact point minus centre of A [m]
-    arm_b: Array
-    point: Array  # (m, 4, 3): at detection, for records only [m]
-    gap: Array  # (m, 4) [m], < 0 overlap
-    offset: Array  # (m, 4, 3): contact point minus centre of the manifold, frame [m]
-    response: Array  # (m, 4, 6, 3): relative twist at the manifold's centre per impulse at the point, frame
-    matrix: Array  # (m, 4, 6): collision matrix k11, k12, k13, k22, k23, k33, frame [1/kg]
-    approach: Array  # (m, 4): u_n before forces [m/s]
-    target: Array  # (m, 4): b_n
-    bounce: Indices  # (m, 4): 1 where the target comes from restitution
-    speed: Array  # (m, 4): reference speed of the residual [m/s]
-    impulse: Array  # (m, 4, 3): accumulated impulse on B, frame [N s]
-    before: Array  # (m, 4, 3): impulses before a block was solved, frame
-    push: Array  # (m, 4): accumulated pseudo-impulse along n
-    push_target: Array  # (m, 4): pseudo-velocity to reach [m/s]
-    old_pair: Indices  # (m,): a * n + b of the step before, ascending
-    old_points: Indices  # (m,)
-    old_feature: Indices  # (m, 4)
-    old_impulse: Array  # (m, 4, 3): world axes, so that a turning contact frame does not turn the impulse
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -107,34 +132,28 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     moments = np.array([body.inertia if body.motion == "free" else (np.inf,) * 3 for body in model.bodies])
     acceleration = np.array([body.force for body in model.bodies], dtype=np.float64) / mass[:, None]
     acceleration[free] += model.gravity
-    twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
-    return Bodies(
-        pose=np.array([body.pose for body in model.bodies], dtype=np.float64),
-        twist=twist,
-        axes=np.zeros((n, 3, 3)),
-        pseudo=np.zeros((n, 6)),
-        acceleration=acceleration,
-        torque=np.array([body.torque for body in model.bodies], dtype=np.float64) * free[:, None],
-        inverse_mass=1.0 / mass,
-        inverse_moments=1.0 / moments if needs.rotation else np.zeros((n, 3)),
-        moments=moments,
-        inverse_inertia=np.zeros((n, 3, 3)),
-        angular_momentum=np.zeros((n, 3)),
-        spin_before=np.zeros((n, 3)),
-        gyroscopic=(free & (moments != moments[:, :1]).any(axis=1)).astype(np.int64),
-        turning=((free & needs.rotation) | twist[:, 3:].any(axis=1)).astype(np.int64),
-        shape=np.array([_SHAPE_CODE[type(body.shape)] for body in model.bodies]),
-        size=np.array([_size(body) for body in model.bodies]),
-        extent=np.array([smallest_extent(body.shape) for body in model.bodies]),
-        motion=np.array([_MOTION_CODE[body.motion] for body in model.bodies]),
-    )
+    bodies = np.zeros(n, BODY).view(np.recarray)
+    bodies.pose = [body.pose for body in model.bodies]
+    bodies.twist = [body.twist for body in model.bodies]
+    bodies.acceleration = acceleration
+    bodies.torque[free] = [body.torque for body in model.bodies if body.motion == "free"]
+    bodies.inverse_mass = 1.0 / mass
+    bodies.inverse_moments = 1.0 / moments if needs.rotation else 0.0
+    bodies.moments = moments
+    bodies.gyroscopic = free & (moments != moments[:, :1]).any(axis=1)
+    bodies.turning = (free & needs.rotation) | bodies.twist[:, 3:].any(axis=1)
+    bodies.kind = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
+    bodies.geometry = [_geometry(body) for body in model.bodies]
+    bodies.extent = [smallest_extent(body.shape) for body in model.bodies]
+    bodies.motion = [_MOTION_CODE[body.motion] for body in model.bodies]
+    return bodies
 
 
 _SHAPE_CODE = {HalfSpace: HALF_SPACE, Box: BOX, Sphere: SPHERE}
 _MOTION_CODE = {"fixed": FIXED, "free": FREE, "prescribed": PRESCRIBED}
 
 
-def _size(body: Body) -> tuple[float, ...]:
+def _geometry(body: Body) -> tuple[float, ...]:
     shape = body.shape
     if isinstance(shape, HalfSpace):
         return (*shape.normal, shape.offset)
@@ -144,42 +163,24 @@ def _size(body: Body) -> tuple[float, ...]:
     return (shape.radius, 0.0, 0.0, 0.0)
 
 
-def allocate_pairs(model: Model, capacity: int) -> Pairs:
+def allocate_detection(model: Model, capacity: int) -> Detection:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    n = len(model.bodies)
-    return Pairs(
+    return Detection(
+        count=np.zeros(3, np.int64),
         restitution=model.restitution.copy(),
         friction=model.friction.copy(),
-        low=np.zeros((n, 3)),
-        high=np.zeros((n, 3)),
+        order=np.arange(len(model.bodies)),
         candidate=np.zeros(capacity, np.int64),
         polygon=np.zeros((2, 16, 3)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
 
 
-_PER_POINT = {"arm_a": (3,), "arm_b": (3,), "offset": (3,), "response": (6, 3), "matrix": (6,), "impulse": (3,)}
-_PER_POINT |= {"before": (3,), "point": (3,), "old_impulse": (3,), "gap": (), "approach": (), "target": (), "speed": (), "push": ()}
-_PER_POINT |= {"push_target": (), "feature": (), "bounce": (), "old_feature": ()}
-_PER_MANIFOLD = {"frame": (3, 3), "lever_a": (3,), "lever_b": (3,)}
-_INTEGERS = {"body_a", "body_b", "points", "feature", "bounce", "old_pair", "old_points", "old_feature"}
-
-
 def allocate_manifolds(capacity: int) -> Manifolds:
     """Return room for ``capacity`` manifolds."""
-    fields: dict[str, NDArray[np.generic]] = {}
-    for name in Manifolds._fields:
-        inner = (POINTS, *_PER_POINT[name]) if name in _PER_POINT else _PER_MANIFOLD.get(name, ())
-        fields[name] = np.zeros((capacity, *inner), np.int64 if name in _INTEGERS else np.float64)
-    fields["count"] = np.zeros(3, np.int64)
-    return Manifolds(**fields)  # type: ignore[arg-type]
+    return np.zeros(capacity, MANIFOLD).view(np.recarray)
 
 
-def grown(manifolds: Manifolds) -> Manifolds:
-    """Return twice the room, with what is remembered of the step before; the current step must be redone."""
-    capacity = len(manifolds.body_a)
-    bigger = allocate_manifolds(2 * capacity)
-    bigger.count[:] = manifolds.count
-    for name in ("old_pair", "old_points", "old_feature", "old_impulse"):
-        getattr(bigger, name)[:capacity] = getattr(manifolds, name)
-    return bigger
+def allocate_memory(capacity: int) -> Memory:
+    """Return room to remember ``capacity`` manifolds."""
+    return np.zeros(capacity, MEMORY).view(np.recarray)

@@ -1,48 +1,52 @@
 """The step, and the loop over steps that a whole run is one call of.
 
-    detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
+detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
 """
 
 from __future__ import annotations
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
-from reference_solver.planar.state import Buffer, Options
+from reference_solver.planar.state import Options
 from reference_solver.spatial.iteration import solve_velocities
-from reference_solver.spatial.manifolds import detect, remember, world_component
+from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
-from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Manifolds, Pairs
+from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Buffer, Detection, Manifolds, Memory
 
 
-@kernel
-def step(bodies: Bodies, pairs: Pairs, manifolds: Manifolds, options: Options, tally: Array) -> bool:
+@inner_kernel
+def step(
+    bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, options: Options, tally: Array
+) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
-    if not detect(bodies, pairs, manifolds, options):
+    found = detect(bodies, detection, room, options)
+    if found < 0:
         return False
-    touching = manifolds.count[MANIFOLDS] > 0
-    if touching:
-        prepare(bodies, pairs, manifolds, options)
-    bodies.spin_before[:] = bodies.twist[:, 3:]
+    manifolds = room[:found]
+    recall(bodies, detection, manifolds, memory, options)
+    prepare(bodies, detection, manifolds, options)
     accelerate(bodies, options)
-    if touching:
+    pushed = False
+    if found > 0:
         warm_start(bodies, manifolds, options)
         solve_velocities(bodies, manifolds, options, tally)
-    # Pushes belong to the poses at which contacts were found, and so come before bodies move.
-    pushed = touching and correct_positions(bodies, manifolds, options, tally)
+        # Pushes belong to the poses at which contacts were found, and so come before bodies move.
+        pushed = correct_positions(bodies, manifolds, options, tally)
     move(bodies, options)
     if pushed:
         displace(bodies, options.dt)
-    remember(bodies, manifolds)
+    remember(bodies, detection, manifolds, memory)
     return True
 
 
 @kernel
 def run_steps(
     bodies: Bodies,
-    pairs: Pairs,
-    manifolds: Manifolds,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
     options: Options,
     tally: Array,
     buffer: Buffer,
@@ -57,24 +61,26 @@ def run_steps(
     """
     for k in range(first, steps):
         sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and buffer.gap.size > 0:
-            if buffer.offset[k // stride] + POINTS * len(manifolds.body_a) > buffer.gap.size:
-                return k
-        if not step(bodies, pairs, manifolds, options, tally):
+        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + POINTS * len(room) > len(buffer.real):
+            return k
+        if not step(bodies, detection, room, memory, options, tally):
             return k
         if sampled:
-            sample(bodies, manifolds, buffer, (k + 1) // stride - 1)
+            sample(bodies, room[: detection.count[MANIFOLDS]], buffer, (k + 1) // stride - 1)
     return steps
 
 
-@kernel
+@inner_kernel
 def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None:
     """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    buffer.pose[s] = bodies.pose
-    buffer.twist[s] = bodies.twist
+    for i in range(len(bodies)):
+        for d in range(7):
+            buffer.pose[s, i, d] = bodies.pose[i, d]
+        for d in range(6):
+            buffer.twist[s, i, d] = bodies.twist[i, d]
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
-    if buffer.gap.size > 0:
+    if len(buffer.real) > 0:
         buffer.offset[s + 1] = start + copy_contacts(manifolds, buffer, start)
 
 
@@ -82,14 +88,14 @@ def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None
 def copy_contacts(manifolds: Manifolds, buffer: Buffer, start: int) -> int:
     """Write the contacts of the last step from index ``start`` on; return how many."""
     k = start
-    for m in range(manifolds.count[MANIFOLDS]):
+    for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
-            buffer.body_a[k], buffer.body_b[k] = manifolds.body_a[m], manifolds.body_b[m]
-            buffer.feature[k] = manifolds.feature[m, p]
-            buffer.gap[k] = manifolds.gap[m, p]
+            buffer.index[k, 0], buffer.index[k, 1] = manifolds.body_a[m], manifolds.body_b[m]
+            buffer.index[k, 2] = manifolds.feature[m, p]
             for d in range(3):
-                buffer.point[k, d] = manifolds.point[m, p, d]
-                buffer.normal[k, d] = manifolds.frame[m, 2, d]
-                buffer.impulse[k, d] = world_component(manifolds, m, p, d)
+                buffer.real[k, d] = manifolds.point[m, p, d]
+                buffer.real[k, 3 + d] = manifolds.frame[m, 2, d]
+                buffer.real[k, 6 + d] = world_component(manifolds, m, p, d)
+            buffer.real[k, 9] = manifolds.gap[m, p]
             k += 1
     return k - start

@@ -7,50 +7,50 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-@kernel
+@inner_kernel
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@kernel
+@inner_kernel
 def sub(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@kernel
+@inner_kernel
 def scale(s: float, a: Vector) -> Vector:
-    """s a."""
+    """S a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@kernel
+@inner_kernel
 def add_scaled(a: Vector, s: float, b: Vector) -> Vector:
-    """a + s b."""
+    """A + s b."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
 
 
-@kernel
+@inner_kernel
 def dot(a: Vector, b: Vector) -> float:
-    """a . b."""
+    """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inner_kernel
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """A x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@kernel
+@inner_kernel
 def times(array: Array, i: int, a: Vector) -> Vector:
     """Product of matrix i of an (n, 3, 3) array with the vector a."""
     return (
@@ -60,7 +60,7 @@ def times(array: Array, i: int, a: Vector) -> Vector:
     )
 
 
-@kernel
+@inner_kernel
 def times_transposed(array: Array, i: int, a: Vector) -> Vector:
     """Product of the transpose of matrix i of an (n, 3, 3) array with the vector a."""
     return (
@@ -70,25 +70,25 @@ def times_transposed(array: Array, i: int, a: Vector) -> Vector:
     )
 
 
-@kernel
+@inner_kernel
 def length(a: Vector) -> float:
     """|a|."""
     return math.sqrt(dot(a, a))
 
 
-@kernel
+@inner_kernel
 def row(array: Array, i: int, start: int) -> Vector:
     """Three numbers of row i of a matrix, from column `start`."""
     return (array[i, start], array[i, start + 1], array[i, start + 2])
 
 
-@kernel
+@inner_kernel
 def axis(axes: Array, i: int, k: int) -> Vector:
     """Body axis k of body i in the world, from `axes` (n, 3, 3) whose columns are the body axes."""
     return (axes[i, 0, k], axes[i, 1, k], axes[i, 2, k])
 
 
-@kernel
+@inner_kernel
 def tangents(n: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors that make a right-handed frame (t1, t2, n) with the unit vector n.
 
@@ -106,7 +106,7 @@ def tangents(n: Vector) -> tuple[Vector, Vector]:
     return t1, cross(n, t1)
 
 
-@kernel
+@inner_kernel
 def axes_of_quaternion(q: Quaternion, axes: Array, i: int) -> None:
     """Write the rotation matrix (body to world) of the unit quaternion q = (w, x, y, z) into axes[i]."""
     w, x, y, z = q
@@ -121,7 +121,7 @@ def axes_of_quaternion(q: Quaternion, axes: Array, i: int) -> None:
     axes[i, 2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@kernel
+@inner_kernel
 def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
     """Hamilton product p q of quaternions (w, x, y, z)."""
     return (
@@ -132,14 +132,14 @@ def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
     )
 
 
-@kernel
+@inner_kernel
 def normalised(q: Quaternion) -> Quaternion:
     """Quaternion q scaled to unit length."""
     s = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (s * q[0], s * q[1], s * q[2], s * q[3])
 
 
-@kernel
+@inner_kernel
 def rotation_quaternion(v: Vector) -> Quaternion:
     """Unit quaternion of the turn by |v| radians about v (exponential map)."""
     angle = length(v)

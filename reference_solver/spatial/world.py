@@ -6,7 +6,7 @@ import numpy as np
 
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
-from reference_solver.planar.state import Buffer, options
+from reference_solver.planar.state import options
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.motion import initialise
@@ -14,10 +14,11 @@ from reference_solver.spatial.state import (
     CANDIDATES,
     MANIFOLDS,
     POINTS,
+    Buffer,
     allocate_bodies,
+    allocate_detection,
     allocate_manifolds,
-    allocate_pairs,
-    grown,
+    allocate_memory,
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.tally import new_tally
@@ -30,8 +31,9 @@ class World:
         n = len(model.bodies)
         self._bodies = allocate_bodies(model, needs)
         # A body of similar size has at most twelve neighbours, each pair counted once; arrays grow when that fails.
-        self._pairs = allocate_pairs(model, 8 * n + 64)
+        self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
+        self._memory = allocate_memory(4 * n + 16)
         self._options = options(settings, needs)
         self.tally = new_tally()
         initialise(self._bodies)
@@ -39,58 +41,81 @@ class World:
     @property
     def pose(self) -> Array:
         """Current poses (n, 7)."""
-        return self._bodies.pose
+        return np.asarray(self._bodies.pose)
 
     @property
     def twist(self) -> Array:
         """Current twists (n, 6)."""
-        return self._bodies.twist
+        return np.asarray(self._bodies.twist)
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Make ``steps`` steps, sampling after every ``stride`` (0: never)."""
         samples = steps // stride if stride else 0
-        room = self._room_of_a_sample() + POINTS * samples if contacts else 0
+        # Four points per body are typical; at most a million rows (100 MB) before it is known that they are needed.
+        room = self._most_points + min(POINTS * samples * len(self._bodies), 1_000_000) if contacts else 0
         buffer = self._buffer(samples, room)
         done = 0
         while True:
             done = run_steps(
-                self._bodies, self._pairs, self._manifolds, self._options, self.tally, buffer, done, steps, stride
+                self._bodies,
+                self._detection,
+                self._manifolds,
+                self._memory,
+                self._options,
+                self.tally,
+                buffer,
+                done,
+                steps,
+                stride,
             )
             if done == steps:
                 break
-            buffer = self._grow(buffer)
-        used = int(buffer.offset[-1])
-        return Frames(buffer.pose, buffer.twist, buffer.offset, _contacts(buffer, used))
+            if contacts and buffer.offset[done // stride] + self._most_points > len(buffer.real):
+                buffer = self._doubled(buffer)
+            else:
+                self._grow()
+        return Frames(buffer.pose, buffer.twist, buffer.offset, _contacts(buffer, int(buffer.offset[-1])))
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
-        buffer = self._buffer(0, POINTS * int(self._manifolds.count[MANIFOLDS]))
-        count = copy_contacts(self._manifolds, buffer, 0)
-        return _contacts(buffer, count)
+        buffer = self._buffer(0, self._most_points)
+        return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.count[MANIFOLDS]], buffer, 0))
 
-    def _room_of_a_sample(self) -> int:
-        return POINTS * len(self._manifolds.body_a)
+    @property
+    def _most_points(self) -> int:
+        return POINTS * len(self._manifolds)
 
     def _buffer(self, samples: int, room: int) -> Buffer:
-        n = len(self._bodies.motion)
-        rows = Contacts.empty(room, 3)
-        columns = (rows.body_a, rows.body_b, rows.feature, rows.point, rows.normal, rows.impulse, rows.gap)
-        return Buffer(np.zeros((samples, n, 7)), np.zeros((samples, n, 6)), np.zeros(samples + 1, np.int64), *columns)
+        n = len(self._bodies)
+        return Buffer(
+            pose=np.zeros((samples, n, 7)),
+            twist=np.zeros((samples, n, 6)),
+            offset=np.zeros(samples + 1, np.int64),
+            index=np.zeros((room, 3), np.int64),
+            real=np.zeros((room, 10)),
+        )
 
-    def _grow(self, buffer: Buffer) -> Buffer:
-        """Double whatever may have been too small."""
-        if self._manifolds.count[CANDIDATES] >= len(self._pairs.candidate):
-            room = np.zeros(2 * len(self._pairs.candidate), np.int64)
-            self._pairs = self._pairs._replace(candidate=room)
-        self._manifolds = grown(self._manifolds)
-        if len(buffer.gap) == 0:
-            return buffer
-        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.gap) + self._room_of_a_sample()))
+    def _doubled(self, buffer: Buffer) -> Buffer:
+        """Twice the room for contacts, and what has been recorded so far."""
+        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + self._most_points))
         for old, new in zip(buffer, bigger, strict=True):
             new[: len(old)] = old
         return bigger
 
+    def _grow(self) -> None:
+        """Double whatever detection found too small; the step that stopped has not begun."""
+        if self._detection.count[CANDIDATES] >= len(self._detection.candidate):
+            room = np.zeros(2 * len(self._detection.candidate), np.int64)
+            self._detection = self._detection._replace(candidate=room)
+            return
+        memory = allocate_memory(2 * len(self._memory))
+        memory[: len(self._memory)] = self._memory
+        self._memory = memory
+        self._manifolds = allocate_manifolds(2 * len(self._manifolds))
+
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:
-    columns = (buffer.body_a, buffer.body_b, buffer.feature, buffer.point, buffer.normal, buffer.impulse, buffer.gap)
-    return Contacts(*(np.array(column[:count]) for column in columns))
+    index, real = buffer.index[:count], buffer.real[:count]
+    body_a, body_b, feature = (index[:, k].copy() for k in range(3))
+    point, normal, impulse = (real[:, k : k + 3].copy() for k in (0, 3, 6))
+    return Contacts(body_a, body_b, feature, point, normal, impulse, real[:, 9].copy())
