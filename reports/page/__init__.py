@@ -1,0 +1,115 @@
+"""The report: one self-contained page, complete without JavaScript, without a single request.
+
+    Source (rows, replays, bench)  ->  sections as plain data  ->  templates  ->  one HTML text
+
+Sections are computed in the modules beside this one; templates only arrange them. Everything that comes from a name,
+a reason or a parameter is escaped by the templates; the only text that is not are our own style and script and the
+charts, whose own text vl-convert escapes.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from reports.page import conclusions, verdicts
+from reports.page.scenes import scene_sections
+from reports.page.source import Bench, Source, load_source
+from reports.page.styling import engine_style, symbol
+from reports.speed import duration
+from reports.wording import number
+from validation.cells import format_dt
+
+__all__ = ["Bench", "Source", "load_source", "render"]
+
+#: Order matters: the first defines what the others use.
+SCRIPTS = ("page.js",)
+
+
+def render(source: Source) -> str:
+    """Return the page of ``source`` as HTML text."""
+    style = Markup(_text("page.css") + engine_style(source.engines))  # ours: nothing in it comes from a run
+    script = Markup("\n".join(_text(name) for name in SCRIPTS))
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            source=source,
+            policy=policy(style, script),
+            style=style,
+            script=script,
+            facts=facts(source),
+            sentences=conclusions.sentences(source),
+            matrix=verdicts.matrix(source),
+            findings=conclusions.findings(source),
+            scenes=scene_sections(source),
+            said=verdicts.SAID,
+            meanings=verdicts.MEANINGS,
+            marks_used=_marks_used(source),
+        )
+    )
+
+
+def policy(style: str, script: str) -> str:
+    """Content-security policy that allows this style and this script by their hashes, pictures as data, no request."""
+
+    def digest(text: str) -> str:
+        return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+    return (
+        f"default-src 'none'; style-src 'sha256-{digest(style)}'; script-src 'sha256-{digest(script)}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _text(name: str) -> str:
+    # Normalised, because a browser hashes what it parsed, and it parses line ends as \n.
+    return files(__name__).joinpath("templates", name).read_text(encoding="utf-8").replace("\r\n", "\n")
+
+
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("reports.page"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "dt": format_dt, "duration": duration, "data": as_data}
+    environment.globals |= {"slug": verdicts.slug, "symbol": symbol}
+    return environment
+
+
+def as_data(value: Any) -> Markup:
+    """JSON for a data block: no character in it can end the block."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def facts(source: Source) -> dict[str, Any]:
+    """What was compared, when, where, with which code."""
+    versions: dict[str, str] = {}
+    for row in source.rows:
+        versions.setdefault(row["engine"], row["engine_version"])
+    profiles: dict[str, list[str]] = {}
+    for engine, profile in source.columns:
+        profiles.setdefault(engine, []).append(profile)
+    steps = sorted({row["dt"] for row in source.rows}, reverse=True)
+    return {
+        "engines": [(engine, versions[engine], profiles[engine]) for engine in source.engines],
+        "steps": [format_dt(dt) for dt in steps],
+        "cells": len(source.observations),
+        "checks": len(source.rows),
+        "machine": source.run.machine,
+    }
+
+
+def _marks_used(source: Source) -> list[str]:
+    used = {verdicts.mark_of(row) for row in source.rows}
+    return [mark for mark in verdicts.SAID if mark in used]

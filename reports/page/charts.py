@@ -1,0 +1,124 @@
+"""Static charts: Altair makes the specification, vl-convert the SVG; both work without a browser or a network.
+
+Text and lines are ``currentColor``, so that one picture serves the light and the dark page. Charts carry no legend:
+the page shows one for all of them, made from `reports.palette`. Every point's label says what it is, for screen
+readers and for the page's hover text.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import altair as alt
+import pandas as pd
+import vl_convert
+from markupsafe import Markup
+
+from reports.palette import colours_of, dash_of, shape_of
+
+WIDTH, HEIGHT = 400, 270
+#: Values at or below this are drawn on it and labelled "0": round-off has no place on a logarithmic axis.
+FLOOR = 1e-17
+_CONFIG: dict[str, Any] = {
+    "background": "transparent",
+    "font": "system-ui, sans-serif",
+    "view": {"stroke": None},
+    "axis": {
+        "labelColor": "currentColor", "titleColor": "currentColor", "gridColor": "currentColor",
+        "domainColor": "currentColor", "tickColor": "currentColor", "gridOpacity": 0.13, "domainOpacity": 0.5,
+        "tickOpacity": 0.5, "labelFontSize": 12, "titleFontSize": 12.5, "titleFontWeight": "normal",
+        "titlePadding": 8, "labelPadding": 5, "tickSize": 4,
+    },
+    "header": {"labelColor": "currentColor", "titleColor": "currentColor", "labelFontSize": 12.5},
+    "title": {"color": "currentColor", "fontSize": 13.5, "fontWeight": 600, "anchor": "start"},
+    "text": {"color": "currentColor", "fontSize": 11.5},
+    "rule": {"color": "currentColor"},
+}  # fmt: skip
+_EMPTY = re.compile(r'<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>')
+_LONG = re.compile(r"-?\d+\.\d{3,}(?:e-?\d+)?")
+_NOISE = re.compile(r' (?:pointer-events="none"|opacity="1"|stroke-miterlimit="10"|fill-opacity="1")')
+
+
+def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
+    """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
+    spec = chart.to_dict()
+    spec["config"] = _CONFIG
+    text = vl_convert.vegalite_to_svg(spec)
+    text = _NOISE.sub("", _EMPTY.sub("", text))
+    text = _LONG.sub(lambda m: f"{float(m.group()):.2f}".rstrip("0").rstrip("."), text)
+    name = Markup.escape(title)
+    head = f'<svg role="img" aria-label="{name}" '
+    return Markup(text.replace("<svg ", head, 1).replace(' class="marks"', "", 1))
+
+
+def log_axis(low: float, high: float) -> list[float]:
+    """Decades from ``low`` to ``high``, thinned to at most eight."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    stride = max(1, math.ceil((last - first) / 8))
+    return [10.0**k for k in range(first, last + 1, stride)]
+
+
+def log_scale(values: Sequence[float], pad: float = 1.3) -> tuple[alt.Scale, list[float]]:
+    """Logarithmic scale with some room at both ends, and its ticks."""
+    positive = [v for v in values if v > 0.0 and math.isfinite(v)] or [1.0]
+    low, high = min(positive) / pad, max(positive) * pad
+    if high / low < 10.0:
+        low, high = low / math.sqrt(10.0), high * math.sqrt(10.0)
+    ticks = [tick for tick in log_axis(low, high) if low <= tick <= high]
+    return alt.Scale(type="log", domain=[low, high], nice=False), ticks
+
+
+#: 1e-6 as 10 to the power of -6, and plain numbers between 0.01 and 100.
+POWER = (
+    "datum.value <= 1.01e-17 ? '0' : datum.value >= 0.0099 && datum.value <= 101 ? format(datum.value, '~r') : "
+    "'1e' + round(log(datum.value)/log(10))"
+)
+
+
+def power_axis(title: str, ticks: list[float], **more: Any) -> alt.Axis:
+    """Axis in powers of ten."""
+    return alt.Axis(title=title, values=ticks, labelExpr=POWER, labelOverlap=True, **more)
+
+
+def styled(table: pd.DataFrame) -> dict[str, Any]:
+    """Encodings of colour, shape and dash for the columns ``engine`` and ``profile``."""
+    engines, profiles = sorted(set(table["engine"])), sorted(set(table["profile"]))
+    colours = colours_of(engines)
+    colour = alt.Scale(domain=engines, range=[colours[name] for name in engines])
+    shapes = alt.Scale(domain=profiles, range=[shape_of(name) for name in profiles])
+    return {
+        "color": alt.Color("engine:N", scale=colour, legend=None),
+        "shape": alt.Shape("profile:N", scale=shapes, legend=None),
+    }
+
+
+def dashes(table: pd.DataFrame) -> alt.StrokeDash:
+    """Dash pattern by ``profile``."""
+    profiles = sorted(set(table["profile"]))
+    # Vega wants a pattern for a full line as well.
+    patterns = [list(dash_of(name)) or [1, 0] for name in profiles]
+    return alt.StrokeDash("profile:N", scale=alt.Scale(domain=profiles, range=patterns), legend=None)
+
+
+def lines(
+    table: pd.DataFrame,
+    x: alt.X,
+    y: alt.Y,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    order: str | None = None,
+    below: Sequence[alt.Chart] = (),
+) -> alt.LayerChart | alt.FacetChart:
+    """Points with thin lines per engine and profile; the column ``label`` says what a point is."""
+    style = styled(table)
+    base = alt.Chart(table)
+    detail = [alt.Detail("engine:N"), alt.Detail("profile:N")]
+    ordered: dict[str, Any] = {"order": alt.Order(f"{order}:Q")} if order else {}
+    thin = base.mark_line(strokeWidth=1.4, opacity=0.75, aria=False).encode(
+        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=detail, **ordered
+    )
+    points = base.mark_point(size=52, filled=True, opacity=0.95).encode(x=x, y=y, description="label:N", **style)
+    return alt.layer(*below, thin, points).properties(width=width, height=height)

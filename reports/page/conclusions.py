@@ -1,0 +1,180 @@
+"""What the data say, in sentences: where engines agree, where they depart by a law, where something is wrong.
+
+Every sentence is computed from the rows; nothing in it is known in advance.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reports.page.source import Source
+from reports.page.verdicts import ALARMS, SAID, family_of, ratio_of, severity, slug, times
+from reports.wording import mark_of, number, params_text, reproduce
+
+Plain = Mapping[str, Any]
+
+
+def joined(words: Iterable[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    words = list(words)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else "none"
+
+
+def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
+    """Engine -> its profiles that pass every judged row of ``scene``, in every dimension the engine has."""
+    found: dict[str, list[str]] = {}
+    for engine, profile in source.columns:
+        rows = [r for r in source.of(scene=scene, engine=engine, profile=profile) if r["outcome"] != "unsupported"]
+        judged = [row for row in rows if row["physics"] or row["outcome"] != "ok"]
+        if judged and all(mark_of(row) == "pass" for row in judged):
+            found.setdefault(engine, []).append(profile)
+    return found
+
+
+def answering(source: Source) -> list[str]:
+    """Engines that gave at least one answer."""
+    return [engine for engine in source.engines if any(row["physics"] for row in source.of(engine=engine))]
+
+
+def agreement(source: Source) -> str:
+    """Where the engines agree."""
+    engines = answering(source)
+    clean = {scene: clean_profiles(source, scene) for scene in source.scenes}
+    everywhere = [scene for scene in source.scenes if engines and all(e in clean[scene] for e in engines)]
+    parts = []
+    if everywhere:
+        who = [f"{engine} ({'/'.join(clean[everywhere[0]][engine])})" for engine in engines]
+        same = all(clean[s] == clean[everywhere[0]] for s in everywhere)
+        parts.append(
+            f"on {joined(everywhere)} every engine has a profile within every tolerance"
+            + (f": {joined(who)}" if same else "")
+            + _spread(source, everywhere[0], clean[everywhere[0]])
+        )
+    for scene in source.scenes:
+        if scene not in everywhere:
+            who = [f"{e}/{p}" for e, profiles in clean[scene].items() for p in profiles]
+            parts.append(f"on {scene} only {joined(who)}" if who else f"on {scene} none passes everything")
+    return "; ".join(parts) + "."
+
+
+def _spread(source: Source, scene: str, clean: Mapping[str, Sequence[str]]) -> str:
+    """Largest difference between engines in the scene's first check."""
+    rows = [r for r in source.of(scene=scene) if r["profile"] in clean.get(r["engine"], ()) and r["value"] is not None]
+    if not rows:
+        return ""
+    metric, unit = rows[0]["metric"], rows[0]["unit"]
+    values: dict[Any, list[float]] = defaultdict(list)
+    for row in rows:
+        if row["metric"] == metric:
+            values[row["dimension"], params_text(row["params"]), row["dt"]].append(row["value"])
+    largest = max(max(group) - min(group) for group in values.values())
+    return f" (their {metric} in {scene} differs by at most {number(largest, 2)}{'' if unit == '1' else ' ' + unit})"
+
+
+def departures(source: Source) -> str:
+    """Where engines depart by a known law."""
+    groups: dict[tuple[str, str], list[Plain]] = defaultdict(list)
+    for row in source.rows:
+        if row["standing"] == "explained":
+            groups[row["engine"], row["profile"]].append(row)
+    if not groups:
+        return "No departure lies where a law of an engine predicts it."
+    total = sum(len(group) for group in groups.values())
+    parts = []
+    for (engine, profile), group in sorted(groups.items(), key=lambda item: -len(item[1]))[:4]:
+        scenes = joined(dict.fromkeys(row["scene"] for row in group))
+        because = Counter(_law_text(row["reason"]) for row in group).most_common(1)[0][0]
+        parts.append(f"{engine}/{profile} on {scenes} ({len(group)} rows: {because})")
+    return f"{total} failing rows lie where a law of their engine predicts them: {'; '.join(parts)}."
+
+
+def _law_text(reason: str) -> str:
+    """First clause of a law's reason, without the prediction of one row."""
+    return reason.partition(" (predicted")[0].partition(", and")[0].partition(";")[0].strip()
+
+
+def wrongs(source: Source) -> str:
+    """Where something is wrong: alarms first, else the largest failures that are known."""
+    counts = Counter(mark_of(row) for row in source.rows)
+    alarms = [f"{counts[mark]} {SAID[mark][1]}" for mark in ALARMS if counts[mark]]
+    said = ""
+    if alarms:
+        worst = max((row for row in source.rows if mark_of(row) in ALARMS), key=severity)
+        said = f"{joined(alarms)} rows need attention, first {_row_text(worst)}. "
+    listed = [row for row in source.rows if mark_of(row) in ("known", "fail")]
+    if not listed:
+        return said + ("Nothing else fails." if alarms else "No row fails without a law that explains it.")
+    worst = max(listed, key=lambda row: ratio_of(row) or 0.0)
+    unlisted = f" ({counts['fail']} of engines without a list)" if counts["fail"] else ""
+    head = "" if alarms else "Nothing is new, drifted, invalid or crashed. "
+    return f"{said}{head}{len(listed)} rows fail without a law{unlisted}; the largest is {_row_text(worst)}."
+
+
+def _row_text(row: Plain) -> str:
+    name = f"{row['engine']}/{row['profile']} on {row['scene']} {row['dimension']}-D"
+    where = params_text(row["slot"]["params"])
+    head = f"{name}{' with ' + where if where else ''}, {row['metric']}"
+    if row["value"] is None:
+        return f"{head}: {row['reason'] or row['outcome']}"
+    ratio = ratio_of(row)
+    off = f", {times(ratio)} tolerances off" if ratio is not None else ""
+    return f"{head}: {number(row['value'], 4)} instead of {number(row['truth'], 4)}{off}"
+
+
+def sentences(source: Source) -> list[tuple[str, str]]:
+    """Three headed sentences for the first screen."""
+    return [
+        ("They agree", agreement(source)),
+        ("They depart by a known law", departures(source)),
+        ("Something is wrong", wrongs(source)),
+    ]
+
+
+@dataclass(frozen=True)
+class FindingFamily:
+    """Rows that fail alike, shown by their worst one."""
+
+    engine: str
+    profile: str
+    scene: str
+    dimension: int
+    family: str
+    count: int
+    href: str
+    text: str
+    because: str
+    reason: str
+    command: str
+
+
+def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
+    """Failing rows by standing, most serious first, and within it by family, worst first."""
+    groups: dict[str, dict[tuple[Any, ...], list[Plain]]] = defaultdict(lambda: defaultdict(list))
+    for row in source.rows:
+        mark = mark_of(row)
+        if mark not in ("pass", "unsupported", "none", "not_installed"):
+            key = (row["engine"], row["profile"], row["scene"], row["dimension"], family_of(row["metric"]))
+            groups[mark][key].append(row)
+    order = [mark for mark in (*ALARMS, "fail", "known", "explained") if mark in groups]
+    out = []
+    for mark in order:
+        families = sorted(groups[mark].items(), key=lambda item: -max(ratio_of(r) or 0.0 for r in item[1]))
+        shown = [_finding(key, rows) for key, rows in families]
+        out.append((mark, sum(len(rows) for _, rows in families), shown))
+    return out
+
+
+def _finding(key: tuple[Any, ...], rows: Sequence[Plain]) -> FindingFamily:
+    worst = max(rows, key=severity)
+    engine, profile, scene, dimension, family = key
+    where = params_text(worst["slot"]["params"])
+    value = worst["outcome"] if worst["value"] is None else f"{number(worst['value'], 4)}"
+    text = f"{where + ': ' if where else ''}{worst['metric']} = {value}, truth {number(worst['truth'], 4)}, "
+    text += f"tolerance {number(worst['tolerance'], 2)} {worst['unit'] if worst['unit'] != '1' else ''}".strip()
+    href = "#" + slug(scene, dimension, "check", family)
+    return FindingFamily(
+        engine, profile, scene, dimension, family, len(rows), href, text, worst["because"], worst["reason"], reproduce(worst["slot"])
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""The figures of the page, each from a table to an SVG with a title, or None where there is nothing to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import altair as alt
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+
+from reports.page.charts import FLOOR, HEIGHT, WIDTH, lines, log_scale, power_axis, styled, svg
+from reports.speed import duration
+from reports.wording import number
+from validation.bench.primary import PRIMARY
+from validation.cells import format_dt
+from validation.convergence import Convergence
+from validation.tolerances import ROUND_OFF
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One picture: anchor, title, caption and the SVG itself."""
+
+    id: str
+    title: str
+    caption: str
+    picture: Markup
+
+
+def _error_text(error: float) -> str:
+    return "0" if error <= FLOOR else number(error, 2)
+
+
+def _guides(x: Sequence[float], anchor: tuple[float, float], scale_x: alt.X, scale_y: alt.Y, low: float) -> alt.Chart:
+    """Faint lines of slope 1 and 2 through ``anchor``."""
+    ends = np.array([min(x), max(x)])
+    table = pd.concat(
+        pd.DataFrame({"dt": ends, "error": np.maximum(anchor[1] * (ends / anchor[0]) ** p, low), "order": str(p)})
+        for p in (1, 2)
+    )
+    mark = alt.Chart(table).mark_line(color="currentColor", opacity=0.22, strokeDash=[2, 3], aria=False)
+    return mark.encode(x=scale_x, y=scale_y, detail="order:N")
+
+
+def error_against_step(entries: Iterable[Convergence], scene: str, dimension: int) -> Figure | None:
+    """Declared error over dt, one line per engine and profile."""
+    rows = [
+        {
+            "engine": c.engine, "profile": c.profile, "dt": dt, "error": max(error, FLOOR),
+            "label": f"{c.engine}/{c.profile}, dt {format_dt(dt)} s: error {_error_text(error)} ({c.because})",
+        }
+        for c in entries if (c.scene, c.dimension) == (scene, dimension)
+        for dt, error in zip(c.dts, c.errors, strict=True)
+    ]  # fmt: skip
+    table = pd.DataFrame(rows)
+    if len(table) == 0 or table["dt"].nunique() < 2:
+        return None
+    primary = PRIMARY[scene]
+    ticks = sorted(set(table["dt"]))
+    names = " : ".join(f"abs(datum.value - {dt!r}) < 1e-9 ? '{format_dt(dt)}'" for dt in ticks) + " : ''"
+    scale = alt.Scale(type="log", domain=[ticks[0] / 1.25, ticks[-1] * 1.25], nice=False)
+    x = alt.X("dt:Q", scale=scale, axis=alt.Axis(title="step dt [s]", values=ticks, labelExpr=names))
+    error_scale, error_ticks = log_scale(list(table["error"]), 2.0)
+    y = alt.Y("error:Q", scale=error_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", error_ticks))
+    # The guides start at the most exact engine of the coarsest step: what converges runs alongside them.
+    coarsest = table[(table["dt"] == ticks[-1]) & (table["error"] > ROUND_OFF)]["error"]
+    start = float(coarsest.min()) if len(coarsest) else float(table["error"].max())
+    guides = _guides(ticks, (ticks[-1], start), x, y, float(error_scale["domain"][0]))
+    title = f"{scene} {dimension}-D: {primary.name} against step"
+    caption = f"{primary.law}. Dotted: slopes of order 1 and 2."
+    picture = svg(lines(table, x, y, below=[guides]), title)
+    return Figure(f"fig-step-{scene}-{dimension}", title, caption, picture)
+
+
+def error_against_iterations(table: pd.DataFrame, scene: str, dimension: int, dt: float, what: str) -> Figure | None:
+    """Error over the iteration count at one step; columns engine, profile, iterations, error, label."""
+    if len(table) == 0 or table["iterations"].nunique() < 2:
+        return None
+    x_scale, _ = log_scale(list(table["iterations"]), 1.15)
+    x = alt.X(
+        "iterations:Q",
+        scale=x_scale,
+        axis=alt.Axis(title="iterations per step", values=sorted(set(table["iterations"]))),
+    )
+    y_scale, y_ticks = log_scale(list(table["error"]), 2.0)
+    y = alt.Y("error:Q", scale=y_scale, axis=power_axis(what, y_ticks))
+    title = f"{scene} {dimension}-D: error against iterations"
+    picture = svg(lines(table, x, y), title)
+    return Figure(f"fig-iterations-{scene}-{dimension}", title, f"dt = {format_dt(dt)} s.", picture)
+
+
+def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure | None:
+    """Error over cost, log-log; a series' line joins its own front, the grey steps are the front over all."""
+    table = points[(points["scene"] == scene) & (points["dimension"] == dimension)].copy()
+    table = table[table["cost"].notna() & table["error"].notna()]
+    if len(table) == 0:
+        return None
+    primary = PRIMARY[scene]
+    table["shown"] = table["error"].clip(lower=FLOOR)
+    table["label"] = [_point_text(row) for row in table.to_dict("records")]
+    x_scale, x_ticks = log_scale(list(table["cost"]), 1.4)
+    y_scale, y_ticks = log_scale(list(table["shown"]), 2.0)
+    x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU time per simulated second [s/s]", x_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", y_ticks))
+    style = styled(table)
+    best = table[table["best"]].sort_values("cost")
+    front = alt.Chart(best).mark_line(
+        interpolate="step-after", color="currentColor", opacity=0.25, strokeWidth=5, aria=False
+    )
+    plain = table[["cost", "shown", "engine", "profile", "label", "on_front"]]
+    own = alt.Chart(plain[plain["on_front"]]).mark_line(strokeWidth=1, opacity=0.55, aria=False)
+    mark = alt.Chart(plain).mark_point(size=46, filled=True, opacity=0.9)
+    chart = alt.layer(
+        front.encode(x=x, y=y),
+        own.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"]),
+        mark.encode(x=x, y=y, description="label:N", **style),
+    ).properties(width=WIDTH, height=HEIGHT)
+    title = f"{scene} {dimension}-D: {primary.name} against cost"
+    caption = "Lower left is better. Grey steps: the best of all engines. Lines join the best settings of one profile."
+    return Figure(f"fig-work-{scene}-{dimension}", title, caption, svg(chart, title))
+
+
+def _point_text(row: Mapping[Hashable, Any]) -> str:
+    own = (
+        "own iterations"
+        if row["iterations"] is None or pd.isna(row["iterations"])
+        else f"{row['iterations']:.0f} iterations"
+    )
+    return (
+        f"{row['engine']}/{row['profile']}, dt {format_dt(row['dt'])} s, {own}: error {_error_text(row['error'])}, "
+        f"{duration(row['cost'])} per simulated second ({duration(row['cost_low'])} to {duration(row['cost_high'])})"
+    )

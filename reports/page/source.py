@@ -1,0 +1,102 @@
+"""What the page is made from: one run of a store, its replays, and the last bench in the same store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reports import speed
+from validation.bench import reading
+from validation.cells import Observation, Slot
+from validation.rows import rows_of
+from validation.store import Run, Store
+from validation.tracks import Recording
+
+Plain = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A bench run: its protocol, the tables of `reports.speed.tables_of`, and its own judged rows."""
+
+    run: Run
+    protocol: Mapping[str, Any]
+    tables: Mapping[str, pd.DataFrame]
+    observations: Sequence[Observation]
+    rows: Sequence[Plain]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Everything that is shown; nothing below this line touches a store or an engine.
+
+    Parameters
+    ----------
+    rows
+        Judged rows as plain data.
+    observations
+        Without the cells whose start was moved by some units in the last place (they measure the noise floor).
+    replays
+        Recordings with the slots they show.
+    bench
+        The last bench of the same store; None if there is none.
+    """
+
+    run: Run
+    rows: Sequence[Plain]
+    observations: Sequence[Observation]
+    replays: Sequence[tuple[Slot, Recording]] = ()
+    bench: Bench | None = None
+    columns: tuple[tuple[str, str], ...] = field(init=False)
+    lines: tuple[tuple[str, int], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        columns = dict.fromkeys((row["engine"], row["profile"]) for row in self.rows)
+        lines = dict.fromkeys((row["scene"], row["dimension"]) for row in self.rows)
+        object.__setattr__(self, "columns", tuple(columns))
+        object.__setattr__(self, "lines", tuple(lines))
+
+    @property
+    def engines(self) -> list[str]:
+        """Engines in the order of the rows."""
+        return list(dict.fromkeys(engine for engine, _ in self.columns))
+
+    @property
+    def scenes(self) -> list[str]:
+        """Scenes in the order of the rows."""
+        return list(dict.fromkeys(scene for scene, _ in self.lines))
+
+    def of(self, **wanted: Any) -> list[Plain]:
+        """Rows whose fields have the wanted values."""
+        return [row for row in self.rows if all(row[name] == value for name, value in wanted.items())]
+
+
+def load_source(folder: Path, run: str = "latest") -> Source:
+    """Read a run.
+
+    Raises
+    ------
+    StoreError
+        If the folder has no results or no such run.
+    """
+    store = Store(folder, create=False)
+    try:
+        chosen = store.run(run)
+        every = store.observations(chosen)
+        rows = [row.as_dict() for row in rows_of(chosen.id, every)]
+        observations = [observation for observation in every if observation.slot.ulp == 0]
+        benches = reading.bench_runs(store)
+        bench = _bench(store, benches[-1]) if benches else None
+        return Source(chosen, rows, observations, store.recordings(chosen), bench)
+    finally:
+        store.close()
+
+
+def _bench(store: Store, run: Run) -> Bench:
+    observations = store.observations(run)
+    rows = [row.as_dict() for row in rows_of(run.id, observations)]
+    return Bench(run, store.protocol(run) or {}, speed.tables_of(store, run), observations, rows)

@@ -1,0 +1,273 @@
+"""Verdicts for the page: the matrix of the first screen, the checks of each scene, every value of every check."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reports.matrix import Field, matrix_of
+from reports.page.source import Source
+from reports.wording import MARKS, mark_of, number, params_text, reproduce
+from validation.cells import format_dt
+
+Plain = Mapping[str, Any]
+#: Mark -> how a cell of the page says it: a sign and a word, so that no meaning hangs on colour.
+SAID = {
+    "pass": ("✓", "pass"),
+    "explained": ("✗", "explained"),
+    "known": ("✗", "known"),
+    "fail": ("✗", "FAIL"),
+    "new": ("✗", "NEW"),
+    "drifted": ("✗", "DRIFTED"),
+    "diverged": ("✗", "DIVERGED"),
+    "invalid": ("!", "INVALID"),
+    "crashed": ("!", "CRASHED"),
+    "timed_out": ("!", "TIMED OUT"),
+    "unsupported": ("–", "n/a"),
+    "not_installed": ("–", "not installed"),
+    "none": ("–", "no value"),
+}
+ALARMS = ("crashed", "timed_out", "invalid", "new", "drifted")
+#: What the words mean, for the legend.
+MEANINGS = {
+    "pass": "within the stated tolerance of the truth",
+    "explained": "fails, and lies where a law of the engine predicts it",
+    "known": "fails, and is listed with a reason",
+    "fail": "fails; the engine has no list of known findings",
+    "new": "fails, and nobody knew",
+    "drifted": "left the band of its law, or passes although listed",
+    "diverged": "the state exploded or stopped being finite",
+    "invalid": "the profile does not realise what it declares (see receipts)",
+    "crashed": "the engine raised an error or killed its process",
+    "timed_out": "no answer in time",
+    "unsupported": "cannot be asked of this engine",
+    "not_installed": "the engine is not installed here",
+    "none": "the engine does not report what this needs",
+}
+
+
+def slug(*parts: Any) -> str:
+    """Anchor from names that may hold anything; distinct for names that differ in letters and digits."""
+    return re.sub(r"[^a-z0-9]+", "-", "-".join(map(str, parts)).lower()).strip("-") or "x"
+
+
+def family_of(metric: str) -> str:
+    """``apex`` of ``apex[3]``."""
+    return metric.partition("[")[0]
+
+
+def ratio_of(row: Plain) -> float | None:
+    """|error| in units of the tolerance; None where there is no error or no tolerance to compare with."""
+    if row["error"] is None or not row["tolerance"]:
+        return None
+    return abs(float(row["error"])) / float(row["tolerance"])
+
+
+def severity(row: Plain) -> tuple[int, float]:
+    """Order of rows by how bad they are."""
+    mark = mark_of(row)
+    rank = len(MARKS) - MARKS.index(mark) if mark in MARKS else 0
+    return rank, ratio_of(row) or 0.0
+
+
+def times(ratio: float | None) -> str:
+    """How far off: ``0.3``, ``1.2e+4``."""
+    return "" if ratio is None else number(ratio, 2)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What a cell shows: mark, words after it, where it leads, and the longer text."""
+
+    mark: str
+    text: str
+    href: str = ""
+    title: str = ""
+
+    @property
+    def sign(self) -> str:
+        """Sign and word."""
+        return " ".join(SAID[self.mark])
+
+
+def matrix(source: Source) -> list[tuple[tuple[str, int], list[Mark]]]:
+    """Verdict matrix: a line per scene and dimension, a mark per engine and profile."""
+    found = matrix_of(source.rows)
+    lines = []
+    for line in source.lines:
+        fields = [found.fields.get((line, column)) for column in source.columns]
+        marks = [_matrix_mark(f, line, c) for f, c in zip(fields, source.columns, strict=True)]
+        lines.append((line, marks))
+    return lines
+
+
+def _matrix_mark(field: Field | None, line: tuple[str, int], column: tuple[str, str]) -> Mark:
+    if field is None:
+        return Mark("unsupported", "")
+    mark = field.mark
+    judged = sum(n for m, n in field.marks.items() if m not in ("unsupported", "none", "not_installed"))
+    missed = judged - field.marks["pass"]
+    text = "" if not judged else f"{missed}/{judged}" if missed else str(judged)
+    said = ", ".join(f"{n} {SAID[m][1]}" for m, n in field.marks.most_common())
+    where = f"{line[0]} {line[1]}-D, {column[0]}/{column[1]}"
+    return Mark(mark, text, "#" + slug(*line, *column), f"{where}: {said}")
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst row of one engine and profile in one check."""
+
+    engine: str
+    profile: str
+    mark: Mark
+    row: Plain
+    where: str
+    value: str
+    truth: str
+    error: str
+    tolerance: str
+    ratio: str
+    passing: str
+    command: str
+
+
+@dataclass(frozen=True)
+class GridLine:
+    """One parameter set of a check: truth and tolerance once, then the error of each engine and profile."""
+
+    label: str
+    truth: str
+    tolerance: str
+    options: str
+    cells: list[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class CheckBlock:
+    """Everything about one family of checks in one scene and dimension."""
+
+    anchor: str
+    family: str
+    unit: str
+    becauses: list[str]
+    sources: list[str]
+    worst: list[Worst]
+    grid: list[GridLine]
+
+
+@dataclass(frozen=True)
+class SceneVerdicts:
+    """Checks of a scene in one dimension: an overview (engines x checks) and a block per check."""
+
+    scene: str
+    dimension: int
+    anchor: str
+    overview: list[tuple[tuple[str, str], str, list[Mark]]]
+    blocks: list[CheckBlock]
+
+
+def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
+    """Overview and blocks of one scene and dimension."""
+    rows = source.of(scene=scene, dimension=dimension)
+    families: dict[str, list[Plain]] = defaultdict(list)
+    for row in rows:
+        families[family_of(row["metric"])].append(row)
+    blocks = [_block(source, scene, dimension, name, group) for name, group in families.items()]
+    overview = []
+    for column in source.columns:
+        own = [_overview_mark(block, column) for block in blocks]
+        if any(mark is not None for mark in own):
+            marks = [mark or Mark("unsupported", "") for mark in own]
+            overview.append((column, slug(scene, dimension, *column), marks))
+    return SceneVerdicts(scene, dimension, slug(scene, dimension), overview, blocks)
+
+
+def _overview_mark(block: CheckBlock, column: tuple[str, str]) -> Mark | None:
+    worst = next((w for w in block.worst if (w.engine, w.profile) == column), None)
+    if worst is None:
+        return None
+    title = f"worst of {block.family}: {worst.where}, error {worst.error}, tolerance {worst.tolerance}"
+    return Mark(worst.mark.mark, worst.ratio, "#" + block.anchor, title)
+
+
+def _block(source: Source, scene: str, dimension: int, family: str, rows: Sequence[Plain]) -> CheckBlock:
+    by_column: dict[tuple[str, str], list[Plain]] = defaultdict(list)
+    for row in rows:
+        by_column[row["engine"], row["profile"]].append(row)
+    worst = [_worst(column, by_column[column]) for column in source.columns if by_column[column]]
+    units = dict.fromkeys(row["unit"] for row in rows)
+    becauses = dict.fromkeys(row["because"] for row in rows)
+    return CheckBlock(
+        slug(scene, dimension, "check", family),
+        family,
+        " / ".join(unit_text(unit) for unit in units),
+        list(becauses)[:4] + ([f"and {len(becauses) - 4} more, each beside its row"] if len(becauses) > 4 else []),
+        [text for text in dict.fromkeys(row["source"] for row in rows) if text],
+        worst,
+        grid(source.columns, rows),
+    )
+
+
+def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
+    row = max(rows, key=severity)
+    mark, ratio = mark_of(row), ratio_of(row)
+    judged = [r for r in rows if r["physics"]]
+    index = row["metric"].partition("[")[2]
+    where = params_text(row["params"] and varied(row)) + (f" [{index}" if index else "")
+    own = f" it={row['iterations']}" if row["iterations"] is not None else ""
+    return Worst(
+        *column,
+        Mark(mark, times(ratio)),
+        row,
+        (where.strip() or "defaults") + own,
+        number(row["value"], 6),
+        number(row["truth"], 6),
+        number(row["error"], 3),
+        number(row["tolerance"], 2),
+        times(ratio),
+        f"{sum(r['physics'] == 'pass' for r in judged)}/{len(judged)}" if judged else "",
+        reproduce(row["slot"]),
+    )
+
+
+def unit_text(unit: str) -> str:
+    """``1`` reads as what it is."""
+    return "dimensionless" if unit == "1" else unit
+
+
+def varied(row: Plain) -> dict[str, float]:
+    """Parameters that were asked for, not left at their defaults."""
+    return dict(row["slot"]["params"])
+
+
+def grid(columns: Sequence[tuple[str, str]], rows: Iterable[Plain]) -> list[GridLine]:
+    """One line per parameter set, step, iteration count and index; one error per engine and profile."""
+    rows = list(rows)
+    names = list(dict.fromkeys(name for row in rows for name in row["slot"]["params"]))
+    steps = {row["dt"] for row in rows}
+    table: dict[tuple[Any, ...], dict[tuple[str, str], Plain]] = defaultdict(dict)
+    for row in rows:
+        shown = tuple((name, row["params"][name]) for name in names if name in row["params"])
+        key = (shown, row["dt"], row["iterations"], row["metric"].partition("[")[2])
+        table[key][row["engine"], row["profile"]] = row
+    lines = []
+    for (shown, dt, iterations, index), found in table.items():
+        first = next(iter(found.values()))
+        label = params_text(dict(shown)) + (f" [{index}" if index else "")
+        label += f" dt={format_dt(dt)}" if len(steps) > 1 else ""
+        label += f" it={iterations}" if iterations is not None else ""
+        cells = [_cell(found.get(column)) for column in columns]
+        options = reproduce({**first["slot"], "engine": "@", "profile": "@"})
+        lines.append(GridLine(label.strip(), number(first["truth"], 6), number(first["tolerance"], 2), options, cells))
+    return lines
+
+
+def _cell(row: Plain | None) -> tuple[str, str]:
+    """Mark and error; the word where there is no error."""
+    if row is None:
+        return "", ""
+    mark = mark_of(row)
+    return mark, SAID[mark][1] if row["error"] is None else number(row["error"], 2)
