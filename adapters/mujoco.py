@@ -32,7 +32,7 @@ from adapters.engine import (
     Setting,
     Simulation,
 )
-from adapters.mujoco_law import ContactLaw
+from adapters.mujoco_law import ContactLaw, softness_of
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED, STEPS
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
@@ -92,7 +92,7 @@ def tuned(needs: Needs, dt: float) -> list[Setting]:
     )
     if needs.regime == "rest":
         settings = _replaced(settings, *_resting(needs, dt))
-    elif needs.gravity > 0.0:
+    elif needs.gravity > 0.0 and needs.restitution > 0.0:
         settings = _replaced(settings, Setting("kappa_plastic", KAPPA, CARRIES, SOLVER))
     if needs.friction > 0.0 and needs.restitution > 0.0:
         reverses = "the normal's damping (1 + e)/dt would reverse the slip: 1/dt stops it"
@@ -204,8 +204,9 @@ def pair_solreffriction(settings: Mapping[str, Any], dt: float) -> tuple[float, 
 def contact_law(settings: Mapping[str, Any], restitution: float, friction: float, dt: float) -> ContactLaw:
     """Scalar law that a contact of this pair follows under ``settings``."""
     condim = 3 if friction > 0.0 else settings["smooth_condim"]
+    softness = softness_of(settings["cone"], condim, friction)
     solref = pair_solref(settings, restitution, dt)
-    return ContactLaw.of(dt, solref, tuple(settings["solimp"]), settings["cone"], condim, friction)
+    return ContactLaw.of(dt, solref, tuple(settings["solimp"]), softness, settings["margin"])
 
 
 @final

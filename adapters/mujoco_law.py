@@ -63,11 +63,20 @@ class Impedance:
         return self.at_surface + y * (self.deep - self.at_surface)
 
 
+def softness_of(cone: str, condim: int, mu: float) -> float:
+    """s of the module's text: 1, or that of a pyramid."""
+    if cone != "pyramidal" or condim == 1:
+        return 1.0
+    mu = max(mu, SMALLEST_FRICTION)
+    return 0.5 * mu**2 * (1.0 + mu**2)
+
+
 @dataclass(frozen=True)
 class ContactLaw:
     """The scalar law of one contact at step ``dt`` [s].
 
-    ``damping`` b [1/s] and ``stiffness`` k [1/s^2] as they stand in aref; ``softness`` is s of the module's text.
+    ``damping`` b [1/s] and ``stiffness`` k [1/s^2] as they stand in aref; ``softness`` is s of the module's text;
+    contact acts at gaps below ``margin`` [m] and counts r from there.
     """
 
     dt: float
@@ -75,12 +84,18 @@ class ContactLaw:
     stiffness: float
     impedance: Impedance
     softness: float
+    margin: float = 0.0
 
     @classmethod
     def of(
-        cls, dt: float, solref: tuple[float, float], solimp: tuple[float, ...], cone: str, condim: int, mu: float
+        cls,
+        dt: float,
+        solref: tuple[float, float],
+        solimp: tuple[float, ...],
+        softness: float,
+        margin: float = 0.0,
     ) -> ContactLaw:
-        """Law of a contact with these parameters."""
+        """Law of a contact with these parameters; ``softness`` as `softness_of` gives it."""
         impedance = Impedance.of(solimp)
         deep = impedance.deep
         if solref[0] > 0.0:
@@ -89,16 +104,15 @@ class ContactLaw:
             stiffness = 1.0 / (deep * time_constant * solref[1]) ** 2
         else:
             damping, stiffness = -solref[1] / deep, -solref[0] / deep**2
-        mu = max(mu, SMALLEST_FRICTION)
-        pyramid = cone == "pyramidal" and condim > 1
-        return cls(dt, damping, stiffness, impedance, 0.5 * mu**2 * (1.0 + mu**2) if pyramid else 1.0)
+        return cls(dt, damping, stiffness, impedance, softness, margin)
 
     def force(self, gap: float, velocity: float, load: float) -> float:
         """Contact force per unit of mass [m/s^2]; ``load`` is the acceleration without it."""
-        if gap >= 0.0:
+        overlap = gap - self.margin
+        if overlap >= 0.0:
             return 0.0
-        d = self.impedance(gap)
-        reference = -self.damping * velocity - self.stiffness * d * gap
+        d = self.impedance(overlap)
+        reference = -self.damping * velocity - self.stiffness * d * overlap
         return max(0.0, (reference - load) / (1.0 + self.softness * (1.0 - d) / d))
 
     def advance(self, gap: float, velocity: float, load: float) -> tuple[float, float, float]:
@@ -113,7 +127,7 @@ class ContactLaw:
         ``duration`` [s] bounds the contact time.
         """
         gap, velocity, time = -phase * self.dt * speed, -speed, 0.0
-        while gap < 0.0 and time < duration:
+        while gap < self.margin and time < duration:
             gap, velocity, _ = self.advance(gap, velocity, 0.0)
             time += self.dt
         return velocity / speed
