@@ -60,7 +60,7 @@ def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
         prepare_masses(bodies, rows, c)
         a, b = rows.index[c, A], rows.index[c, B]
         for k in range(2):
-            rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, POINT + k]
+            rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
         rows.real[c, FRICTION] = pairs.friction[a, b]
         rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
         set_target(bodies, pairs, rows, c, options)

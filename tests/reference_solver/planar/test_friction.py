@@ -36,7 +36,8 @@ def test_box_above_the_friction_limit_slides_with_g_sin_minus_mu_cos(build, refe
     expected = G * (math.sin(theta) - MU * math.cos(theta))
     # The difference cancels to 1/1000 of its terms at worst: 1e-13 of the solver becomes 1e-10.
     assert acceleration == pytest.approx(expected, rel=1e-9)
-    assert np.abs(record.twist[:, 1, 2]).max() <= 1e-12
+    # The residual is scaled by the slip speed: 1e-13 of it may be left in the normal rows.
+    assert np.abs(record.twist[:, 1, 2]).max() <= 2e-13 * max(record.twist[-1, 1, 0], 1.0)
 
 
 def test_classical_profile_settles_to_no_creep_on_an_incline(build, classical):
