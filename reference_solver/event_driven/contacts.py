@@ -43,14 +43,24 @@ class Geometry:
         self.box = BoxGaps(bodies, flight) if bodies.box >= 0 else None
         self._found = np.zeros(bodies.count, np.int64)
 
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
         """What kernels read of the flight and the shapes."""
         f, b = self.flight, self.bodies
-        return f.x0, f.v0, f.a0, f.t0, b.radius, b.normal, b.offset
+        return f.x0, f.v0, f.a0, f.t0, f.late, b.radius, b.normal, b.offset
+
+    def overlapping(self, i: int, t: float) -> list[int]:
+        """Bodies that body i overlaps with by more than round-off."""
+        count = touching(i, t, -1.0, self.bodies.kind, *self.arrays(), self._found)
+        found = [int(j) for j in self._found[:count]]
+        if self.box is not None:
+            partners = self.box.partners() if i == self.box.box else [self.box.box]
+            deepest = {j: min(c.gap for c in self.between(i, j, t, always=True)) for j in partners if j != i}
+            found += [j for j, gap in deepest.items() if gap < -self.box.touch(j if i == self.box.box else i, t)]
+        return found
 
     def around(self, i: int, t: float) -> list[Contact]:
         """All contacts of body i at time t, sorted by key."""
-        count = touching(i, t, self.bodies.kind, *self.arrays(), self._found)
+        count = touching(i, t, 1.0, self.bodies.kind, *self.arrays(), self._found)
         partners = [int(j) for j in self._found[:count] if self.bodies.free[i] or self.bodies.free[j]]
         if self.box is not None:
             partners += self.box.partners() if i == self.box.box else [self.box.box]

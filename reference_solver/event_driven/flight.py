@@ -13,8 +13,11 @@ class Flight:
 
     Attributes
     ----------
-    t0, x0, v0, a0
-        (n,) [s], (n, d) [m], [m/s], [m/s^2].
+    t0, late
+        (n,) [s]: the anchor is at t0 + late, where `late` is what rounding took from the event's time. Without it
+        every event would shift the phase of all that follows by half a unit in the last place of the *time*.
+    x0, v0, a0
+        (n, d) [m], [m/s], [m/s^2].
     turn0
         Orientation at the anchor: (n, 1) angle [rad] or (n, 4) quaternion.
     w0, b0
@@ -26,26 +29,26 @@ class Flight:
         pose = np.array([body.pose for body in model.bodies])
         twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
         self.bodies = bodies
-        self.t0 = np.zeros(bodies.count)
+        self.t0, self.late = np.zeros(bodies.count), np.zeros(bodies.count)
         self.x0, self.turn0 = pose[:, :d].copy(), pose[:, d:].copy()
         self.v0, self.w0 = twist[:, :d].copy(), twist[:, d:].copy()
         self.a0, self.b0 = bodies.load.copy(), bodies.turning_load.copy()
 
+    def since(self, i: int, t: float, late: float = 0.0) -> float:
+        """Time from body i's anchor to t + late [s]; 0 where t is the rounded time of the anchor."""
+        return 0.0 if t == self.t0[i] else float((t - self.t0[i]) + (late - self.late[i]))
+
     def position(self, i: int, t: float) -> Array:
         """Return x (d,) [m] of body i (O1)."""
-        tau = t - self.t0[i]
-        x: Array = self.x0[i] + tau * (self.v0[i] + 0.5 * tau * self.a0[i])
-        return x
+        return self._position(i, self.since(i, t))
 
     def velocity(self, i: int, t: float) -> Array:
         """Return v (d,) [m/s] of body i (O1)."""
-        v: Array = self.v0[i] + (t - self.t0[i]) * self.a0[i]
-        return v
+        return self._velocity(i, self.since(i, t))
 
     def spin(self, i: int, t: float) -> Array:
         """Return omega (r,) [rad/s] of body i (O2)."""
-        w: Array = self.w0[i] + (t - self.t0[i]) * self.b0[i]
-        return w
+        return self._spin(i, self.since(i, t))
 
     def orientation(self, i: int, t: float) -> Array:
         """Return angle (1,) or quaternion (4,) of body i (O2); nan where its axis of rotation turns.
@@ -53,7 +56,21 @@ class Flight:
         A sphere that slides across its own rolling direction turns about a moving axis, which has no closed form;
         nothing that the oracle computes depends on it.
         """
-        tau = t - self.t0[i]
+        return self._orientation(i, self.since(i, t))
+
+    def _position(self, i: int, tau: float) -> Array:
+        x: Array = self.x0[i] + tau * (self.v0[i] + 0.5 * tau * self.a0[i])
+        return x
+
+    def _velocity(self, i: int, tau: float) -> Array:
+        v: Array = self.v0[i] + tau * self.a0[i]
+        return v
+
+    def _spin(self, i: int, tau: float) -> Array:
+        w: Array = self.w0[i] + tau * self.b0[i]
+        return w
+
+    def _orientation(self, i: int, tau: float) -> Array:
         if tau == 0.0:
             return self.turn0[i].copy()
         turned = tau * (self.w0[i] + 0.5 * tau * self.b0[i])
@@ -64,12 +81,13 @@ class Flight:
             return np.full(4, np.nan)
         return _turned(self.turn0[i], turned)
 
-    def anchor(self, i: int, t: float) -> None:
-        """Make time t the anchor of body i, its accelerations unchanged."""
+    def anchor(self, i: int, t: float, late: float = 0.0) -> None:
+        """Make time t + late the anchor of body i, its accelerations unchanged."""
         if t != self.t0[i]:
-            state = self.position(i, t), self.velocity(i, t), self.orientation(i, t), self.spin(i, t)
+            tau = self.since(i, t, late)
+            state = self._position(i, tau), self._velocity(i, tau), self._orientation(i, tau), self._spin(i, tau)
             self.x0[i], self.v0[i], self.turn0[i], self.w0[i] = state
-            self.t0[i] = t
+            self.t0[i], self.late[i] = t, late
 
     def pose(self, t: float) -> Array:
         """Return poses (n, 3 | 7) at time t."""

@@ -88,7 +88,8 @@ class EventDriven:
         self._rest = Rest(self.bodies, self.flight, self._geometry)
         self._next = np.full(self.bodies.count, math.inf)
         self._partner = np.full(self.bodies.count, -1)
-        self._work, self._best = np.zeros((5, 7)), np.zeros(1)
+        self._late = np.zeros(self.bodies.count)
+        self._work, self._best = np.zeros((5, 7)), np.zeros(2)
         self._require_apart()
         for i in np.flatnonzero(self.bodies.free):
             self._rest.settle([int(i)], 0.0)
@@ -120,6 +121,10 @@ class EventDriven:
             else:
                 self._meet(t)
         self.time = until if math.isfinite(until) else self.time
+
+    def next_event(self) -> float:
+        """Time of the next event [s]; inf if there is none."""
+        return max(min(float(self._next.min()), *self._rest.sticking.values(), math.inf), self.time)
 
     def run(self) -> None:
         """Let everything happen, until nothing more will."""
@@ -163,13 +168,10 @@ class EventDriven:
         return {"events": len(self.events), "created": max(created, 0.0), "kane": kane, "unique": unique}
 
     def _require_apart(self) -> None:
-        for a in range(self.bodies.count):
-            for b in range(a + 1, self.bodies.count):
-                if not (self.bodies.free[a] or self.bodies.free[b]):
-                    continue
+        for a in map(int, np.flatnonzero(self.bodies.free)):
+            for b in self._geometry.overlapping(a, 0.0):
                 gap = min(c.gap for c in self._geometry.between(a, b, 0.0, always=True))
-                if gap < -self._touch(a, b):
-                    raise ValueError(f"bodies: {a} and {b} overlap by {-gap:.3g} m")
+                raise ValueError(f"bodies: {min(a, b)} and {max(a, b)} overlap by {-gap:.3g} m")
 
     def _touch(self, a: int, b: int) -> float:
         f = self.flight
@@ -184,12 +186,13 @@ class EventDriven:
             return
         arrays = self._geometry.arrays()
         self._partner[i] = next_meeting(i, self.bodies.kind, self.bodies.skipped, *arrays, self._work, self._best)
-        self._next[i] = self._best[0]
+        self._next[i], self._late[i] = self._best
 
     def _predict_around(self, changed: set[int]) -> None:
         """Find the next contacts of changed bodies and of those that were going to meet one of them."""
         waiting = set(changed)
-        waiting.update(int(k) for k in np.flatnonzero(np.isin(self._partner, list(changed))))
+        for i in changed:
+            waiting.update(np.flatnonzero(self._partner == i).tolist())
         if self.bodies.box >= 0:
             waiting.add(self.bodies.box)
         for i in sorted(waiting):
@@ -201,13 +204,15 @@ class EventDriven:
         tied = np.flatnonzero(self._next <= earliest * (1.0 + TIE))
         pairs = [(min(int(i), int(self._partner[i])), max(int(i), int(self._partner[i])), int(i)) for i in tied]
         a, b, i = min(pairs)
-        t = max(float(self._next[i]), self.time)
+        t, late = float(self._next[i]), float(self._late[i])
+        if t < self.time:
+            t, late = self.time, 0.0
         self.time = t
         approach = self._approach(a, b)
         for k in (a, b):
-            self.flight.anchor(k, t)
+            self.flight.anchor(k, t, late)
         self._close(a, b, t, approach)
-        contacts = self._contacts(a, b, t)
+        contacts = self._contacts(a, b, t, late)
         struck = self._impacts.resolve(contacts, t)
         self.events += [self._event(s, t) for s in struck if s.approach < 0.0 or s.impulse.any()]
         changed = {k for c in contacts for k in (c.a, c.b) if self.bodies.free[k]}
@@ -240,7 +245,7 @@ class EventDriven:
             n = bodies.normal[plane]
             f.v0[ball] -= (approach + float(n @ (f.v0[ball] - f.v0[plane]))) * n
 
-    def _contacts(self, a: int, b: int, t: float) -> list[Contact]:
+    def _contacts(self, a: int, b: int, t: float, late: float) -> list[Contact]:
         """Return what the law looks at together."""
         pair = self._geometry.between(a, b, t, always=True)
         if self.law == "N-SEQ":
@@ -251,7 +256,7 @@ class EventDriven:
             i = waiting.pop()
             if not self.bodies.free[i]:
                 continue
-            self.flight.anchor(i, t)
+            self.flight.anchor(i, t, late)
             for c in self._geometry.around(i, t):
                 found.setdefault(c.key, c)
                 waiting += [k for k in (c.a, c.b) if k not in seen]

@@ -15,6 +15,9 @@ from reference_solver.event_driven.roots import GRAZE, first_fall, first_quartic
 #: two positions, two radii and an event time.
 TOUCH = 16.0 * 2.220446049250313e-16
 
+#: A bound that is only just beyond the limit may be round-off; such a pair is looked at in full.
+SURELY = 1.0 + 1e-9
+
 
 @kernel
 def touch_length(i, j, t, x0, v0, reach, offset):
@@ -26,40 +29,46 @@ def touch_length(i, j, t, x0, v0, reach, offset):
 
 
 @inner_kernel
-def plane_gap(ball, plane, t, x0, v0, a0, t0, radius, normal, offset):
+def since(i, t, extra, t0, late):
+    """Time from body i's anchor to t + extra; 0 where t is the rounded time of the anchor."""
+    return 0.0 if t == t0[i] else (t - t0[i]) + (extra - late[i])
+
+
+@inner_kernel
+def plane_gap(ball, plane, t, extra, x0, v0, a0, t0, late, radius, normal, offset):
     """Gap, its rate and its acceleration between a ball and a plane that moves uniformly."""
     gap = -offset[plane] - radius[ball]
     rate = 0.0
     acceleration = 0.0
-    since, moved = t - t0[ball], t - t0[plane]
+    flown, moved = since(ball, t, extra, t0, late), since(plane, t, extra, t0, late)
     for k in range(x0.shape[1]):
         n = normal[plane, k]
-        place = x0[ball, k] + since * (v0[ball, k] + 0.5 * since * a0[ball, k])
+        place = x0[ball, k] + flown * (v0[ball, k] + 0.5 * flown * a0[ball, k])
         gap += n * (place - (x0[plane, k] + moved * v0[plane, k]))
-        rate += n * (v0[ball, k] + since * a0[ball, k] - v0[plane, k])
+        rate += n * (v0[ball, k] + flown * a0[ball, k] - v0[plane, k])
         acceleration += n * a0[ball, k]
     return gap, rate, acceleration
 
 
 @inner_kernel
-def meet_plane(ball, plane, x0, v0, a0, t0, radius, normal, offset):
-    """Time [s] of the next contact of a ball with a plane; inf if never."""
-    base = max(t0[ball], t0[plane])
-    gap, rate, acceleration = plane_gap(ball, plane, base, x0, v0, a0, t0, radius, normal, offset)
-    if gap <= touch_length(ball, plane, base, x0, v0, radius, offset):
+def meet_plane(ball, plane, x0, v0, a0, t0, late, radius, normal, offset):
+    """Time [s] from the later anchor to the next contact of a ball with a plane; inf if never."""
+    last = ball if t0[ball] >= t0[plane] else plane
+    gap, rate, acceleration = plane_gap(ball, plane, t0[last], late[last], x0, v0, a0, t0, late, radius, normal, offset)
+    if gap <= touch_length(ball, plane, t0[last], x0, v0, radius, offset):
         gap = 0.0
     speed = 0.0
     for k in range(x0.shape[1]):
         speed += abs(v0[ball, k]) + abs(v0[plane, k])
     if gap == 0.0 and abs(rate) <= GRAZE * speed:
         rate = 0.0
-    return base + first_fall(gap, rate, acceleration)
+    return first_fall(gap, rate, acceleration)
 
 
 @inner_kernel
-def relative_flight(i, j, t, x0, v0, a0, t0, work):
-    """Position, velocity and acceleration of ball j seen from ball i at time t, into rows 1 to 3 of ``work``."""
-    since_i, since_j = t - t0[i], t - t0[j]
+def relative_flight(i, j, t, extra, x0, v0, a0, t0, late, work):
+    """Position, velocity, acceleration of ball j seen from ball i at t + extra, into rows 1 to 3 of ``work``."""
+    since_i, since_j = since(i, t, extra, t0, late), since(j, t, extra, t0, late)
     for k in range(x0.shape[1]):
         work[1, k] = x0[j, k] + since_j * (v0[j, k] + 0.5 * since_j * a0[j, k])
         work[1, k] -= x0[i, k] + since_i * (v0[i, k] + 0.5 * since_i * a0[i, k])
@@ -87,70 +96,117 @@ def crossed(x, v, size):
 
 
 @inner_kernel
-def meet_ball(i, j, x0, v0, a0, t0, radius, offset, work):
-    """Time [s] of the next contact of two balls; inf if never (O4, O5)."""
-    base, d = max(t0[i], t0[j]), x0.shape[1]
-    relative_flight(i, j, base, x0, v0, a0, t0, work)
+def meet_ball(i, j, x0, v0, a0, t0, late, radius, offset, work):
+    """Time [s] from the later anchor to the next contact of two balls; inf if never (O4, O5)."""
+    last, d = i if t0[i] >= t0[j] else j, x0.shape[1]
+    relative_flight(i, j, t0[last], late[last], x0, v0, a0, t0, late, work)
     x, v, a = work[1], work[2], work[3]
     reach, distance = radius[i] + radius[j], math.sqrt(dot(x, x, d))
     gap = (distance - reach) * (distance + reach)
     closing, vv, aa = dot(x, v, d), dot(v, v, d), dot(a, a, d)
-    if distance - reach <= touch_length(i, j, base, x0, v0, radius, offset):
+    speed = math.sqrt(dot(v0[i], v0[i], d)) + math.sqrt(dot(v0[j], v0[j], d))
+    if abs(closing) <= GRAZE * speed * distance:
+        closing = 0.0
+    if distance - reach <= touch_length(i, j, t0[last], x0, v0, radius, offset):
         gap = 0.0
-        speed = math.sqrt(dot(v0[i], v0[i], d)) + math.sqrt(dot(v0[j], v0[j], d))
-        if abs(closing) <= GRAZE * speed * distance:
-            closing = 0.0
         if closing < 0.0:
-            return base
+            return 0.0
     if aa == 0.0:
         if closing >= 0.0:
             return math.inf
         quarter = reach * reach * vv - crossed(x, v, d)
-        return base + gap / (-closing + math.sqrt(quarter)) if quarter > GRAZE * reach * reach * vv else math.inf
+        return gap / (-closing + math.sqrt(quarter)) if quarter > GRAZE * reach * reach * vv else math.inf
     cubic, square = dot(v, a, d), vv + dot(x, a, d)
     work[0, 0], work[0, 1], work[0, 2], work[0, 3], work[0, 4] = gap, 2.0 * closing, square, cubic, 0.25 * aa
-    return base + first_quartic_fall(work)
+    return first_quartic_fall(work)
+
+
+@inner_kernel
+def too_late(i, j, limit, x0, v0, a0, t0, late, radius):
+    """Whether two balls under equal loads surely do not meet before ``limit``: spares most pairs a square root.
+
+    From |x + v t|^2 = R^2 follows 2 |x.v| t >= x.x - R^2.
+    """
+    last = i if t0[i] >= t0[j] else j
+    since_i, since_j = since(i, t0[last], late[last], t0, late), since(j, t0[last], late[last], t0, late)
+    gap = -((radius[i] + radius[j]) ** 2)
+    closing = 0.0
+    for k in range(x0.shape[1]):
+        if a0[i, k] != a0[j, k]:
+            return False
+        x = x0[j, k] + since_j * (v0[j, k] + 0.5 * since_j * a0[j, k])
+        x -= x0[i, k] + since_i * (v0[i, k] + 0.5 * since_i * a0[i, k])
+        gap += x * x
+        closing += x * (v0[j, k] - v0[i, k] + (since_j - since_i) * a0[i, k])
+    return closing >= 0.0 or gap > SURELY * 2.0 * -closing * (limit - t0[last])
+
+
+@inner_kernel
+def meet(i, j, limit, kind, x0, v0, a0, t0, late, radius, normal, offset, work):
+    """Time [s] from the later anchor to the next contact of two bodies, inf if not before the time ``limit``."""
+    if kind[i] == BALL and kind[j] == BALL:
+        if too_late(i, j, limit, x0, v0, a0, t0, late, radius):
+            return math.inf
+        return meet_ball(i, j, x0, v0, a0, t0, late, radius, offset, work)
+    if kind[j] == PLANE:
+        return meet_plane(i, j, x0, v0, a0, t0, late, radius, normal, offset)
+    return meet_plane(j, i, x0, v0, a0, t0, late, radius, normal, offset)
 
 
 @kernel
-def next_meeting(i, kind, skipped, x0, v0, a0, t0, radius, normal, offset, work, best):
-    """Partner of body i's next contact (-1: none), its time in ``best[0]``; the lowest index where times tie."""
-    best[0] = math.inf
+def next_meeting(i, kind, skipped, x0, v0, a0, t0, late, radius, normal, offset, work, best):
+    """Partner of body i's next contact (-1: none); the lowest index where times tie.
+
+    ``best`` (2,) is its time and what rounding took from it, exact as their sum.
+    """
+    best[0], best[1] = math.inf, 0.0
     partner = -1
-    for j in range(x0.shape[0]):
-        if j == i or skipped[i, j] != 0:
-            continue
-        if kind[i] == BALL and kind[j] == BALL:
-            t = meet_ball(i, j, x0, v0, a0, t0, radius, offset, work)
-        elif kind[j] == PLANE:
-            t = meet_plane(i, j, x0, v0, a0, t0, radius, normal, offset)
-        else:
-            t = meet_plane(j, i, x0, v0, a0, t0, radius, normal, offset)
-        if t < best[0]:
-            best[0] = t
-            partner = j
+    for distance in range(1, x0.shape[0]):
+        for side in range(2):  # near indices first: they are often near in space, and then spare the others
+            j = i - distance if side == 0 else i + distance
+            if j < 0 or j >= x0.shape[0] or skipped[i, j] != 0:
+                continue
+            last = i if t0[i] >= t0[j] else j
+            tau = late[last] + meet(i, j, best[0], kind, x0, v0, a0, t0, late, radius, normal, offset, work)
+            t = t0[last] + tau
+            if t < best[0] or (t == best[0] and j < partner):
+                best[0] = t
+                # what the sum lost (Knuth's two-sum)
+                part = t - t0[last]
+                best[1] = (t0[last] - (t - part)) + (tau - part) if t < math.inf else 0.0
+                partner = j
     return partner
 
 
+@inner_kernel
+def gap_between(i, j, t, kind, x0, v0, a0, t0, late, radius, normal, offset):
+    """Gap [m] of two balls, or of a ball and a plane, at time t."""
+    if kind[j] == PLANE or kind[i] == PLANE:
+        ball, plane = (i, j) if kind[j] == PLANE else (j, i)
+        return plane_gap(ball, plane, t, 0.0, x0, v0, a0, t0, late, radius, normal, offset)[0]
+    since_i, since_j = since(i, t, 0.0, t0, late), since(j, t, 0.0, t0, late)
+    square = 0.0
+    for k in range(x0.shape[1]):
+        x = x0[j, k] + since_j * (v0[j, k] + 0.5 * since_j * a0[j, k])
+        x -= x0[i, k] + since_i * (v0[i, k] + 0.5 * since_i * a0[i, k])
+        square += x * x
+    return math.sqrt(square) - radius[i] - radius[j]
+
+
 @kernel
-def touching(i, t, kind, x0, v0, a0, t0, radius, normal, offset, found):
-    """Number of balls and planes that touch body i at time t; their indices in ``found``."""
+def touching(i, t, depth, kind, x0, v0, a0, t0, late, radius, normal, offset, found):
+    """Number of balls and planes whose gap to body i at time t is below round-off.
+
+    Their indices go into ``found``. With ``depth`` -1 only those are counted that are in overlap by more than that.
+    """
     count = 0
     for j in range(x0.shape[0]):
         if j == i or (kind[j] == PLANE and kind[i] == PLANE) or kind[i] > PLANE or kind[j] > PLANE:
             continue
-        if kind[j] == PLANE:
-            gap, _rate, _acceleration = plane_gap(i, j, t, x0, v0, a0, t0, radius, normal, offset)
-        elif kind[i] == PLANE:
-            gap, _rate, _acceleration = plane_gap(j, i, t, x0, v0, a0, t0, radius, normal, offset)
-        else:
-            square = 0.0
-            for k in range(x0.shape[1]):
-                x = x0[j, k] + (t - t0[j]) * (v0[j, k] + 0.5 * (t - t0[j]) * a0[j, k])
-                x -= x0[i, k] + (t - t0[i]) * (v0[i, k] + 0.5 * (t - t0[i]) * a0[i, k])
-                square += x * x
-            gap = math.sqrt(square) - radius[i] - radius[j]
-        if gap <= touch_length(i, j, t, x0, v0, radius, offset):
+        gap = gap_between(i, j, t, kind, x0, v0, a0, t0, late, radius, normal, offset)
+        if gap > radius[i] + radius[j]:
+            continue  # far: no need for the exact bound
+        if gap <= depth * touch_length(i, j, t, x0, v0, radius, offset):
             found[count] = j
             count += 1
     return count

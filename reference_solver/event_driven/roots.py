@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, kernel
 
-#: A discriminant below this share of its two terms is round-off: nobody can tell a graze from a miss there.
-GRAZE = 4.0 * 2.220446049250313e-16
+#: A discriminant below this share of its two terms, or a closing speed below this share of the speeds that it is the
+#: difference of, is round-off: nobody can tell a graze from a miss there. 16 units in the last place.
+GRAZE = 16.0 * 2.220446049250313e-16
 
 
-@inner_kernel
+@kernel
 def first_fall(gap, rate, acceleration):
     """First t >= 0 at which gap + rate t + acceleration t^2 / 2 falls through zero; inf if never (O3).
 
