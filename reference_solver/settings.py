@@ -54,7 +54,7 @@ class Settings:
     relaxation: float | None = 1.0
     position_correction: PositionCorrection = "split"
     beta: float = 0.2
-    slop: float = 0.0005
+    slop: float = 1e-5
     warm_starting: bool = True
     solver: Solver = "scalar"
     margin: float = 0.01
@@ -85,7 +85,7 @@ class Settings:
             relaxation=1.0,  # plain Gauss-Seidel; over-relaxed scalar rows make stacks topple
             position_correction="split",
             beta=0.2,  # Catto's fraction: overlap decays with a time constant of 5 steps, without overshoot
-            slop=0.0005,  # m; half a millimetre on metre-sized bodies: below any visible overlap, above round-off
+            slop=1e-5,  # m; g h^2 at h = 1 ms: below what a step can resolve, far above round-off
             warm_starting=True,
             margin=0.01,  # a corner lifted by an unfinished solve stays a contact; 5 mm on a metre-sized box
         )

@@ -65,7 +65,11 @@ def test_sliding_disc_rolls_at_two_thirds_of_its_speed_at_any_step(build, dt_sca
     from reference_solver import Settings
 
     simulation = build.simulation(
-        [build.floor(), build.disc(0.0, 0.5, (3.0, 0.0, 0.0))], Settings.reference(build.dt * dt_scale), (0.0, -G), 0.0, 0.2
+        [build.floor(), build.disc(0.0, 0.5, (3.0, 0.0, 0.0))],
+        Settings.reference(build.dt * dt_scale),
+        (0.0, -G),
+        0.0,
+        0.2,
     )
     simulation.advance(int(240 / dt_scale))
     vx, vy, omega = simulation.twist[1]

@@ -29,7 +29,9 @@ def test_worked_example_rebounds_at_4_8_with_impulse_5_4(build, settings):
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("profile", [Settings.classical, Settings.reference])
 def test_rebound_ratio_is_e_at_any_speed_phase_and_gravity(build, profile, dt):
-    for e, v, phase, g in itertools.product((0.2, 0.5, 0.8, 0.95, 1.0), (1e-3, 0.1, 1.0, 6.0, 50.0, 1e3), (0.0, 0.3, 0.7), (0.0, 9.81)):
+    for e, v, phase, g in itertools.product(
+        (0.2, 0.5, 0.8, 0.95, 1.0), (1e-3, 0.1, 1.0, 6.0, 50.0, 1e3), (0.0, 0.3, 0.7), (0.0, 9.81)
+    ):
         bodies = [build.floor(), build.disc(0.0, 0.5 + phase * v * dt, (0.0, -v, 0.0))]
         record = build.simulation(bodies, profile(dt), (0.0, -g), e).record(3)
         speed = record.twist[:, 1, 1]
@@ -52,7 +54,9 @@ def test_inelastic_impact_leaves_no_speed_and_no_overlap(build, settings):
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("e", [0.2, 0.5, 0.8, 1.0])
 def test_flat_box_rebounds_by_e_without_spin(build, reference, e, friction):
-    simulation = build.simulation([build.floor(), build.box(0.0, 0.5, (0.0, -3.0, 0.0))], reference, (0.0, -9.81), e, friction)
+    simulation = build.simulation(
+        [build.floor(), build.box(0.0, 0.5, (0.0, -3.0, 0.0))], reference, (0.0, -9.81), e, friction
+    )
     simulation.advance(1)
     assert simulation.twist[1] == pytest.approx([0.0, 3.0 * e, 0.0], abs=1e-12)
 
@@ -66,7 +70,9 @@ def test_oblique_disc_sticks_or_slips_as_coulomb_says(build, settings, vt, spin,
     """Scene S-A7: with k = I/(m R^2) = 1/2 a disc sticks iff |u| k/(1 + k) <= mu (1 + e) v_n, u = v_t + omega R."""
     vn, radius, k = 2.0, 0.5, 0.5
     vt, spin = side * vt, side * spin
-    simulation = build.simulation([build.floor(), build.disc(0.0, radius, (vt, -vn, spin))], settings, (0.0, 0.0), e, mu)
+    simulation = build.simulation(
+        [build.floor(), build.disc(0.0, radius, (vt, -vn, spin))], settings, (0.0, 0.0), e, mu
+    )
     simulation.advance(1)
     u = vt + spin * radius
     if abs(u) * k / (1.0 + k) <= mu * (1.0 + e) * vn:

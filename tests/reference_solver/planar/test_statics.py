@@ -120,7 +120,9 @@ def test_baumgarte_injects_beta_delta_over_dt_and_split_impulse_nothing(build, c
         speeds[correction] = simulation.twist[1, 1]
         moved = simulation.pose[1, 1] - 0.5 + overlap
         assert moved == pytest.approx(0.0 if correction == "none" else beta * overlap, rel=1e-12, abs=1e-15)
-    assert speeds == pytest.approx({"baumgarte": beta * overlap / build.dt, "split": 0.0, "none": 0.0}, rel=1e-12, abs=0.0)
+    assert speeds == pytest.approx(
+        {"baumgarte": beta * overlap / build.dt, "split": 0.0, "none": 0.0}, rel=1e-12, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.5, 0.9])

@@ -1,0 +1,50 @@
+"""Machine code is kept per state of the sources, and a missing cache costs time only."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from reference_solver import compilation
+
+
+def run(code, **environment):
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | environment, check=True
+    ).stdout.strip()
+
+
+def test_the_cache_folder_is_named_after_the_sources():
+    assert compilation.CACHE_FOLDER is None or compilation.source_hash() in compilation.CACHE_FOLDER.name
+
+
+def test_the_hash_covers_every_solver_source(tmp_path, monkeypatch):
+    (tmp_path / "planar").mkdir()
+    source = tmp_path / "planar" / "rows.py"
+    source.write_text("x = 1")
+    monkeypatch.setattr(compilation, "__file__", str(tmp_path / "compilation.py"))
+    before = compilation.source_hash()
+    source.write_text("x = 2")
+    assert compilation.source_hash() != before
+
+
+def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    code = "import reference_solver, reference_solver.compilation as c; print(c.CACHE_FOLDER)"
+    assert run(code, NUMBA_CACHE_DIR=str(blocked)) == "None"
+
+
+def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
+    code = (
+        "from numba.core import config; before = config.CACHE_DIR; import reference_solver.planar;"
+        "print(config.CACHE_DIR == before)"
+    )
+    assert run(code, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1") == "True"
+
+
+@pytest.mark.parametrize("module", ["adapters", "validation", "reports"])
+def test_the_solver_imports_nothing_of_the_rest(module):
+    code = f"import sys, reference_solver.planar; print(any(name.split('.')[0] == {module!r} for name in sys.modules))"
+    assert run(code, NUMBA_DISABLE_JIT="1") == "False"
