@@ -1,8 +1,8 @@
 """Block solve: all points of one manifold together, then over-relaxed (E12, E13).
 
-Within the block the points are solved one after the other, each exactly with its friction (`coulomb_impulse`),
-until they agree. Three or four points of one plane are redundant: their impulses are not unique, but the wrench
-on the bodies, and with it every velocity, is.
+Most blocks of three or four points stick: `stick` solves them at once. Otherwise the points are solved one after
+the other, each exactly with its friction (`coulomb_impulse`), until they agree. Three or four points of one plane
+are redundant: their impulses are not unique, but the wrench on the bodies, and with it every velocity, is.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
 from reference_solver.spatial.one_contact import coulomb_impulse, into_disc
 from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.spatial.sticking import stick
 from reference_solver.spatial.vector import Vector, add, cross, length, row, sub
 
 #: Inner sweeps of one block at most; later outer sweeps go on where this ends.
@@ -31,7 +32,8 @@ def sweep_blocks(bodies: Bodies, manifolds: Manifolds, options: Options, relaxat
         for p in range(manifolds.points[m]):
             for k in range(3):
                 manifolds.before[m, p, k] = manifolds.impulse[m, p, k]
-        solve_block(manifolds, m, v, w)
+        if not (manifolds.rigid[m] and stick(manifolds, m, v, w)):
+            solve_block(manifolds, m, v, w)
         apply_block(bodies, manifolds, m, options, relaxation)
 
 

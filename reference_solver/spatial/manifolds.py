@@ -145,9 +145,7 @@ def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> Non
         for o in range(memory.points[old]):
             if memory.feature[old, o] == manifolds.feature[m, p]:
                 for k in range(3):
-                    manifolds.impulse[m, p, k] = dot(
-                        row(manifolds.frame[m], k, 0), row(memory.impulse[old], o, 0)
-                    )
+                    manifolds.impulse[m, p, k] = dot(row(manifolds.frame[m], k, 0), row(memory.impulse[old], o, 0))
                 manifolds.impulse[m, p, 2] = max(manifolds.impulse[m, p, 2], 0.0)
 
 

@@ -68,9 +68,7 @@ def _pair(
 
 
 @inner_kernel
-def half_space_sphere(
-    bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
-) -> tuple[int, Vector]:
+def half_space_sphere(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int) -> tuple[int, Vector]:
     """Half-space f and sphere s: one point under the centre."""
     normal = times(bodies.axes, f, row(bodies.geometry, f, 0))
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
@@ -83,9 +81,7 @@ def half_space_sphere(
 
 
 @inner_kernel
-def half_space_box(
-    bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
-) -> tuple[int, Vector]:
+def half_space_box(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int) -> tuple[int, Vector]:
     """Half-space f and box s: corners of the face that looks most against the normal; the deepest is among them.
 
     The feature is the number of the corner: bit k is set where it lies at +half_extent along body axis k.
@@ -119,9 +115,7 @@ def half_space_box(
 
 
 @inner_kernel
-def sphere_sphere(
-    bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
-) -> tuple[int, Vector]:
+def sphere_sphere(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int) -> tuple[int, Vector]:
     """Spheres f and s: one point on the line of centres; concentric spheres separate along z."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     distance = length(between)
@@ -139,9 +133,7 @@ def sphere_sphere(
 
 
 @inner_kernel
-def box_sphere(
-    bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int
-) -> tuple[int, Vector]:
+def box_sphere(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifolds, m: int) -> tuple[int, Vector]:
     """Box f and sphere s: nearest point of the box, or its nearest face if the centre is inside."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     local = times_transposed(bodies.axes, f, between)

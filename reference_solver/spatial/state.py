@@ -73,6 +73,11 @@ MANIFOLD = np.dtype(
         ("target", "f8", POINTS),  # b_n [m/s]
         ("impulse", "f8", (POINTS, 3)),  # accumulated impulse on B, frame [N s]
         ("before", "f8", (POINTS, 3)),  # the same before a block was solved
+        ("rigid", "i8"),  # 1 where the points fix all six relative velocities: `sticking` applies
+        ("spread", "f8", 3),  # second moments of the points xx, xy, yy, frame [m^2]
+        ("factor", "f8", (6, 6)),  # Cholesky factor of the relative twist per wrench at the centre, frame
+        ("wrench", "f8", 6),  # force and moment at the centre being solved for, frame [N s, N m s]
+        ("share", "f8", (POINTS, 3)),  # how the points would share it, frame [N s]
         ("push", "f8", POINTS),  # accumulated pseudo-impulse along n
         ("push_target", "f8", POINTS),  # pseudo-velocity to reach [m/s]
         ("speed", "f8", POINTS),  # reference speed of the residual [m/s]

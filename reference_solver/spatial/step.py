@@ -14,12 +14,11 @@ from reference_solver.spatial.motion import accelerate, displace, move
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
 from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Buffer, Detection, Manifolds, Memory
+from reference_solver.spatial.sticking import prepare_wrenches
 
 
 @inner_kernel
-def step(
-    bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, options: Options, tally: Array
-) -> bool:
+def step(bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, options: Options, tally: Array) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
     found = detect(bodies, detection, room, options)
     if found < 0:
@@ -30,6 +29,7 @@ def step(
     accelerate(bodies, options)
     pushed = False
     if found > 0:
+        prepare_wrenches(bodies, manifolds, options)
         warm_start(bodies, manifolds, options)
         solve_velocities(bodies, manifolds, options, tally)
         # Pushes belong to the poses at which contacts were found, and so come before bodies move.
