@@ -63,9 +63,9 @@ class Scaling:
     iteration_rows: int
 
 
-#: 4, 7, 13, 24 and 44 rows are 10, 28, 91, 300 and 990 boxes: thirds of a decade and half decades.
+#: 4, 7, 10, 13, 24 and 44 rows are 10, 28, 55, 91, 300 and 990 boxes.
 SCALING: dict[Suite, Scaling] = {
-    "quick": Scaling((1, 10, 30, 100), (1, 4, 7, 13), (1, 10, 100), 4),
+    "quick": Scaling((1, 10, 20, 40), (1, 4, 7, 10), (1, 10, 100), 4),
     "full": Scaling((1, 3, 10, 30, 100, 300, 1000), (1, 2, 4, 7, 13, 24, 44), (1, 3, 10, 30, 100), 7),
 }
 
