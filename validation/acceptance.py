@@ -9,12 +9,13 @@ from pathlib import Path
 from validation.canonical import Check
 from validation.cells import Slot, slot_from_dict
 from validation.findings import Key, listed, reason_for, row_key, write_list
+from validation.plan import in_quick_suite
 from validation.rows import Row
 from validation.verdicts import is_marginal
 
 
 def accept(rows: Iterable[Row], engines: Iterable[str], folder: Path | None = None) -> tuple[dict[str, int], list[Row]]:
-    """List what fails in ``rows``, keeping listed rows of slots that did not run.
+    """List what fails in ``rows`` of the quick suite, keeping listed rows of slots that did not run.
 
     Returns
     -------
@@ -28,15 +29,17 @@ def accept(rows: Iterable[Row], engines: Iterable[str], folder: Path | None = No
         if row.engine not in chosen:
             continue
         slot = slot_from_dict(row.slot)
-        key = row_key(slot, "*" if row.outcome == "unsupported" else row.metric)
+        key = row_key(slot, row.metric)
         seen[row.engine].add(key)
+        if not in_quick_suite(slot):
+            continue
         status = _status(row)
         if status is None:
             continue
         reason = reason_for(row.engine, key)
         if reason is not None:
             entries[row.engine][key] = (status, reason.id)
-        elif row.physics == "fail" or status == "unsupported":
+        elif row.physics == "fail":
             unexplained.append(row)
     for engine in chosen:
         kept = {k: (f.status, f.reason.id) for k, f in (listed(engine) or {}).items() if k not in seen[engine]}
@@ -45,9 +48,7 @@ def accept(rows: Iterable[Row], engines: Iterable[str], folder: Path | None = No
 
 
 def _status(row: Row) -> str | None:
-    """``known``, ``marginal``, ``unsupported`` or None (nothing to list)."""
-    if row.outcome == "unsupported":
-        return "unsupported"
+    """``known``, ``marginal`` or None (nothing to list)."""
     if row.outcome == "diverged":
         return "known"
     if row.value is None or row.physics is None or row.standing == "explained":

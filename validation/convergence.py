@@ -159,28 +159,30 @@ def richardson(dts: Sequence[float], values: Sequence[float]) -> tuple[float, fl
     return order, f1 + correction, SAFETY * abs(correction)
 
 
-def errors_by_step(observations: Iterable[Observation]) -> dict[tuple[str, int, str, str], dict[float, float]]:
-    """Declared error per (scene, dimension, engine, profile) and step, where all of its variations ran.
+#: Scene, dimension, engine, profile.
+Series = tuple[str, int, str, str]
 
-    Cells count at the profile's own iterations; a step with a cell that crashed or diverged has no error.
+
+def declared_errors(observations: Iterable[Observation]) -> dict[Series, dict[tuple[float, int | None], float]]:
+    """Declared error per series and (step, iterations; None: the profile's own), where all variations ran.
+
+    A step with a cell that crashed or diverged has no error.
     """
-    cells: dict[tuple[str, int, str, str], dict[float, dict[Slot, Observation]]] = defaultdict(
-        lambda: defaultdict(dict)
-    )
+    cells: dict[Series, dict[tuple[float, int | None], dict[Slot, Observation]]]
+    cells = defaultdict(lambda: defaultdict(dict))
     for observation in observations:
         slot = observation.slot
-        if slot.ulp == 0 and slot.iterations is None and _is_variation(slot):
-            key = (slot.scene, slot.dimension, slot.engine, slot.profile)
-            cells[key][slot.dt].setdefault(slot, observation)
-    found: dict[tuple[str, int, str, str], dict[float, float]] = {}
-    for key, steps in cells.items():
-        for dt in sorted(steps, reverse=True):
-            members = list(steps[dt].values())
-            if len(members) == len(PRIMARY[key[0]].variations(dt)):
-                error = float(accuracy(members)["error"])
+        if slot.ulp == 0 and _is_variation(slot):
+            series = (slot.scene, slot.dimension, slot.engine, slot.profile)
+            cells[series][slot.dt, slot.iterations].setdefault(slot, observation)
+    found: dict[Series, dict[tuple[float, int | None], float]] = defaultdict(dict)
+    for series, settings in cells.items():
+        for (dt, iterations), members in settings.items():
+            if len(members) == len(PRIMARY[series[0]].variations(dt)):
+                error = float(accuracy(list(members.values()))["error"])
                 if math.isfinite(error):
-                    found.setdefault(key, {})[dt] = error
-    return found
+                    found[series][dt, iterations] = error
+    return dict(found)
 
 
 def _is_variation(slot: Slot) -> bool:
@@ -195,11 +197,11 @@ def _is_variation(slot: Slot) -> bool:
 def convergence(observations: Iterable[Observation]) -> list[Convergence]:
     """Error against dt for every engine and profile, with order and verdict."""
     out = []
-    for key, errors in errors_by_step(observations).items():
-        dts = tuple(sorted(errors, reverse=True))
-        series = tuple(errors[dt] for dt in dts)
-        order, limit, because = limit_of(dts, series)
-        out.append(Convergence(*key, dts, series, order, limit, because))
+    for series, errors in declared_errors(observations).items():
+        dts = tuple(sorted((dt for dt, iterations in errors if iterations is None), reverse=True))
+        own = tuple(errors[dt, None] for dt in dts)
+        if dts:
+            out.append(Convergence(*series, dts, own, *limit_of(dts, own)))
     return out
 
 

@@ -20,6 +20,7 @@ from adapters.registry import find
 from validation.canonical import CanonicalScene
 from validation.cells import Slot
 from validation.posed import resolve
+from validation.scenes import CATALOGUE
 
 Suite = Literal["quick", "full"]
 QUICK_DT = 1.0 / 240.0
@@ -131,6 +132,17 @@ REPRESENTATIVE: dict[str, Mapping[str, float]] = {
     "stack": {"n": 10},
     "incline": {"ratio": 1.1},
 }
+
+
+def in_quick_suite(slot: Slot) -> bool:
+    """Whether the quick suite runs this slot: its FAILs are listed row by row."""
+    if slot.dt != QUICK_DT or slot.ulp or slot.scene not in CATALOGUE:
+        return False
+    canonical = CATALOGUE[slot.scene]
+    return any(
+        slot.params == _minimal(canonical, variation.params) and slot.iterations in variation.iterations
+        for variation in variations(slot.scene, "quick")
+    ) or (slot.iterations is None and not slot.params)
 
 
 def is_representative(scene: str, params: Mapping[str, float]) -> bool:

@@ -13,7 +13,7 @@ from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot
 from validation.deviations import covering
-from validation.findings import listed, row_key
+from validation.findings import finding_of, listed, reason_for, row_key
 from validation.posed import resolve
 from validation.studies import STUDIES, StudyResult
 from validation.verdicts import Physics, Standing, Verdict, judge, predicted
@@ -106,9 +106,9 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
     value, why = observation.metrics.get(check.metric, (None, ""))
     if observation.outcome in (Outcome.OK, Outcome.INVALID):
         laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
-        known = listed(slot.engine)
-        finding = (known or {}).get(row_key(slot, check.metric))
-        verdict = judge(value, check, predicted(laws, scene, slot), finding, known is not None)
+        has_list = listed(slot.engine) is not None
+        finding = finding_of(slot, check.metric)
+        verdict = judge(value, check, predicted(laws, scene, slot), finding, has_list)
         if observation.outcome is Outcome.INVALID:
             verdict = Verdict(None, None, observation.reason)
     else:
@@ -118,18 +118,17 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
 
 
 def _verdict_of_outcome(observation: Observation, check: Check) -> Verdict:
-    """Diverged is a FAIL; unsupported must be on the list; the rest has no physics."""
+    """Diverged is a FAIL; unsupported must be a known one; the rest has no physics."""
     slot = observation.slot
-    known = listed(slot.engine)
-    finding = (known or {}).get(row_key(slot, check.metric))
+    has_list = listed(slot.engine) is not None
     if observation.outcome is Outcome.DIVERGED:
-        standing = Standing.KNOWN if finding else (Standing.NEW if known is not None else None)
+        finding = finding_of(slot, check.metric)
+        standing = Standing.KNOWN if finding else (Standing.NEW if has_list else None)
         reason = f"{observation.reason}; {finding.reason.text}" if finding else observation.reason
         return Verdict(Physics.FAIL, standing, reason)
-    if observation.outcome is Outcome.UNSUPPORTED and known is not None:
-        listed_so = (known or {}).get(row_key(slot, "*"))
-        standing = Standing.KNOWN if listed_so or finding else Standing.NEW
-        return Verdict(None, standing, observation.reason)
+    if observation.outcome is Outcome.UNSUPPORTED and has_list:
+        expected = reason_for(slot.engine, row_key(slot, check.metric), unsupported=True)
+        return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
 
 
@@ -179,9 +178,8 @@ def _assemble(
 def _study_row(run: str, result: StudyResult) -> Row:
     """Judge a study like an observation; its row lists its cells."""
     slot, check = result.slot, result.check
-    known = listed(slot.engine)
-    finding = (known or {}).get(row_key(slot, check.metric))
-    verdict = judge(result.value, check, (), finding, known is not None)
+    has_list = listed(slot.engine) is not None
+    verdict = judge(result.value, check, (), finding_of(slot, check.metric), has_list)
     reason = "; ".join(text for text in (result.reason, verdict.reason) if text)
     row = _assemble(run, result.observation, slot, {}, check, result.value, verdict, reason)
     return Row(**{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0})

@@ -91,7 +91,7 @@ def judge(
     if finding is not None and finding.status == "marginal":
         return Verdict(physics, Standing.KNOWN, f"marginal: {finding.reason.text}")
     if physics is Physics.PASS:
-        if finding is not None:
+        if finding is not None and finding.status == "known":
             return Verdict(physics, Standing.DRIFTED, f"passes, but is listed: {finding.reason.text}")
         return Verdict(physics, None)
     predictions = list(predictions)

@@ -57,7 +57,12 @@ def test_mujoco_tuned_reflects_the_velocity_to_2e_minus_5(e):
 
 
 def test_the_worked_example_holds_on_every_engine_that_can_bounce():
-    for engine, profile in (("chipmunk", "tuned"), ("bullet", "tuned"), ("mujoco", "tuned"), ("reference", "classical")):
+    for engine, profile in (
+        ("chipmunk", "tuned"),
+        ("bullet", "tuned"),
+        ("mujoco", "tuned"),
+        ("reference", "classical"),
+    ):
         found = measure("impact", engine, profile, 1 / 240, e=0.8, v=6.0, mass=0.5)
         assert found["rebound_speed"] == pytest.approx(4.8, abs=1e-9)
         assert found["impulse"] == pytest.approx(5.4, abs=1e-9)

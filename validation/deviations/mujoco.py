@@ -48,6 +48,8 @@ PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
 SPREAD_FACTOR = 10.0
 #: A metric that moves by more than this share of its scale is not predicted.
 BLURRED = 1e-4
+#: Two paths of a box are still told apart from anything else if they differ by less than this share of the scale.
+EITHER = 1e-2
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
 #: Corners of a box on a face.
@@ -299,7 +301,10 @@ def _incline_law(profile: str, metric: str) -> Law:
         spread = max(abs(other - value) for other in others)
         scale = math.hypot(*box.load) * (scene.duration if metric == "creep" else 1.0)
         floor = error if metric == "creep" else 2.0 * error / window
-        return (value, SPREAD_FACTOR * spread + floor) if spread <= BLURRED * scale else None
+        if spread > BLURRED * scale:
+            # On the edge between two paths (one hop more or less): the engine takes either.
+            return (value, 2.0 * spread + floor) if spread <= EITHER * scale else None
+        return value, SPREAD_FACTOR * spread + floor
 
     return law
 

@@ -1,7 +1,7 @@
 """Known findings: FAIL rows that are listed with a reason, and cells that are known to be unsupported.
 
-``<engine>.csv`` lists one row per line (status only, no values); ``reasons.toml`` holds the reasons, each with the
-pattern of rows it speaks about and a source. An engine without a list is *unlisted*: its FAILs have no standing and
+``<engine>.csv`` lists the FAIL rows of the quick suite, one per line (status only, no values); ``reasons.toml`` holds the
+reasons, each with the pattern of rows it speaks about and a source, and the patterns of cells that are unsupported. An engine without a list is *unlisted*: its FAILs have no standing and
 do not fail the command.
 """
 
@@ -17,6 +17,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from validation.cells import Slot, format_dt
+from validation.plan import in_quick_suite
 
 COLUMNS = ("profile", "scene", "dimension", "params", "dt", "iterations", "metric", "status", "reason")
 Key = tuple[str, ...]
@@ -35,6 +36,7 @@ class Reason:
     metric: str
     dimension: str = "*"
     params: str = "*"
+    unsupported: bool = False
 
     def covers(self, engine: str, key: Key) -> bool:
         """Whether this reason speaks about the row with ``key`` (see `row_key`) of ``engine``."""
@@ -52,7 +54,11 @@ class Reason:
 
 @dataclass(frozen=True)
 class Finding:
-    """A listed row: ``known`` (fails), ``marginal`` (may do either) or ``unsupported``."""
+    """A known row: ``known`` (listed, fails), ``marginal`` (listed, may do either) or ``pattern``.
+
+    ``pattern`` is a row outside the quick suite, which is not listed one by one: a FAIL is known if a written reason
+    covers it, a PASS is nothing special.
+    """
 
     status: str
     reason: Reason
@@ -83,9 +89,22 @@ def listed(engine: str) -> dict[Key, Finding] | None:
     return {tuple(row[c] for c in COLUMNS[:7]): Finding(row["status"], known[row["reason"]]) for row in rows}
 
 
-def reason_for(engine: str, key: Key) -> Reason | None:
-    """First reason that covers a row."""
-    return next((reason for reason in reasons().values() if reason.covers(engine, key)), None)
+def reason_for(engine: str, key: Key, unsupported: bool = False) -> Reason | None:
+    """First reason that covers a row (of a FAIL, or of an unsupported cell)."""
+    chosen = (reason for reason in reasons().values() if reason.unsupported == unsupported)
+    return next((reason for reason in chosen if reason.covers(engine, key)), None)
+
+
+def finding_of(slot: Slot, metric: str) -> Finding | None:
+    """What is known about a row: its entry in the list, or for slots outside the quick suite a reason's pattern."""
+    known = listed(slot.engine)
+    if known is None:
+        return None
+    key = row_key(slot, metric)
+    if key in known or in_quick_suite(slot):
+        return known.get(key)
+    reason = reason_for(slot.engine, key)
+    return Finding("pattern", reason) if reason else None
 
 
 def write_list(engine: str, entries: Iterable[tuple[Key, str, str]], folder: Path | None = None) -> Path:
