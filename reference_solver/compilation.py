@@ -12,12 +12,16 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
-from numba.core import config
+from numba.core import config as numba_config
 
 F = TypeVar("F", bound=Callable[..., object])
+
+# numba's type hints know neither its configuration's attributes nor all options of njit.
+config: Any = numba_config
+njit: Any = numba.njit
 
 
 def source_hash() -> str:
@@ -58,7 +62,7 @@ def _compiled(function: F, *, inner: bool) -> F:
     if CACHE_FOLDER is not None:
         config.CACHE_DIR = str(CACHE_FOLDER)
     try:
-        result: F = numba.njit(
+        result: F = njit(
             function,
             cache=CACHE_FOLDER is not None,
             error_model="numpy",  # no hidden zero-division branches; zero denominators are excluded by validation

@@ -172,8 +172,8 @@ class Model:
     dimension: int
     bodies: Sequence[Body]
     gravity: tuple[float, ...]
-    restitution: Array
-    friction: Array
+    restitution: Any  # (n, n) float64 once built
+    friction: Any
 
     def __post_init__(self) -> None:
         if self.dimension not in (2, 3):

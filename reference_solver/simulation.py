@@ -91,7 +91,7 @@ class Simulation:
         self._steps += steps
         count = len(frames.pose)
         return Record(
-            t=(first + stride * np.arange(count + 1)) * self.settings.dt,
+            t=np.multiply(first + stride * np.arange(count + 1), self.settings.dt, dtype=np.float64),
             pose=np.concatenate([start_pose[None], frames.pose]),
             twist=np.concatenate([start_twist[None], frames.twist]),
             offset=np.concatenate([[0], frames.offset]),

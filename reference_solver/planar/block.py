@@ -28,11 +28,11 @@ from reference_solver.planar.state import MANIFOLDS, Bodies, Options, Rows
 @inner_kernel
 def prepare_blocks(bodies: Bodies, rows: Rows) -> None:
     """Matrix W of every two-point manifold (E12)."""
-    for m in range(rows.count[MANIFOLDS]):
+    for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         if rows.manifold[m + 1] - first != 2:
             continue
-        a, b = rows.index[first, A], rows.index[first, B]
+        a, b = rows.integer[first, A], rows.integer[first, B]
         mass = bodies.real[a, INVERSE_MASS] + bodies.real[b, INVERSE_MASS]
         for i in range(4):
             for j in range(4):
@@ -46,7 +46,7 @@ def prepare_blocks(bodies: Bodies, rows: Rows) -> None:
 @inner_kernel
 def sweep_blocks(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
     """One sweep over all manifolds in canonical order."""
-    for m in range(rows.count[MANIFOLDS]):
+    for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         points = rows.manifold[m + 1] - first
         for i in range(points):
@@ -144,7 +144,7 @@ def press_normals(w: Array, p: Array, u: Array) -> None:
 def sweep_block_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows, two points of a manifold together (E12, E16)."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]
-    for m in range(rows.count[MANIFOLDS]):
+    for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         points = rows.manifold[m + 1] - first
         for i in range(points):

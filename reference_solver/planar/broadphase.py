@@ -47,11 +47,11 @@ def add_candidate(bodies: Bodies, pairs: Pairs, rows: Rows, i: int, j: int) -> b
     """Store the pair if it may touch; False if there is no room."""
     if not may_touch(bodies, pairs, i, j):
         return True
-    count = rows.count[CANDIDATES]
+    count = rows.counts[CANDIDATES]
     if count == len(pairs.candidate):
         return False
     pairs.candidate[count] = min(i, j) * len(bodies.kind) + max(i, j)
-    rows.count[CANDIDATES] = count + 1
+    rows.counts[CANDIDATES] = count + 1
     return True
 
 
@@ -59,7 +59,7 @@ def add_candidate(bodies: Bodies, pairs: Pairs, rows: Rows, i: int, j: int) -> b
 def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill `Pairs.candidate` in ascending order; False if there is no room."""
     bound_bodies(bodies, pairs, options)
-    rows.count[CANDIDATES] = 0
+    rows.counts[CANDIDATES] = 0
     n = len(bodies.kind)
     if options.broadphase:
         return sweep_candidates(bodies, pairs, rows)
@@ -86,7 +86,7 @@ def sweep_candidates(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
                 break
             if not add_candidate(bodies, pairs, rows, i, j):
                 return False
-    sort_candidates(pairs, rows.count[CANDIDATES])
+    sort_candidates(pairs, rows.counts[CANDIDATES])
     return True
 
 

@@ -27,7 +27,7 @@ SIZE = 7
 EXTENT = 10
 BODY_REALS = 11
 
-# Rows.index, integers.
+# Rows.integer, integers.
 #: Bodies, A < B.
 A, B = 0, 1
 #: Which features touch.

@@ -27,7 +27,7 @@ from reference_solver.planar.state import Bodies, Options, Rows
 @inner_kernel
 def normal_velocity(twist: Array, rows: Rows, c: int) -> float:
     """u_n of row c (E2) [m/s]; ``twist`` may hold velocities or pseudo-velocities."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     along = rows.real[c, NX] * (twist[b, 0] - twist[a, 0]) + rows.real[c, NY] * (twist[b, 1] - twist[a, 1])
     return along + rows.real[c, BN] * twist[b, 2] - rows.real[c, AN] * twist[a, 2]
 
@@ -35,7 +35,7 @@ def normal_velocity(twist: Array, rows: Rows, c: int) -> float:
 @inner_kernel
 def tangent_velocity(twist: Array, rows: Rows, c: int) -> float:
     """u_t of row c (E2) [m/s]."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     along = rows.real[c, NX] * (twist[b, 1] - twist[a, 1]) - rows.real[c, NY] * (twist[b, 0] - twist[a, 0])
     return along + rows.real[c, BT] * twist[b, 2] - rows.real[c, AT] * twist[a, 2]
 
@@ -43,7 +43,7 @@ def tangent_velocity(twist: Array, rows: Rows, c: int) -> float:
 @inner_kernel
 def apply_normal(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> None:
     """Add normal impulse p of row c to B and its opposite to A (E4)."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     px, py = p * rows.real[c, NX], p * rows.real[c, NY]
     twist[a, 0] -= bodies.real[a, INVERSE_MASS] * px
     twist[a, 1] -= bodies.real[a, INVERSE_MASS] * py
@@ -56,7 +56,7 @@ def apply_normal(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> 
 @inner_kernel
 def apply_tangent(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> None:
     """Add tangential impulse p of row c to B and its opposite to A (E4)."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     px, py = -p * rows.real[c, NY], p * rows.real[c, NX]
     twist[a, 0] -= bodies.real[a, INVERSE_MASS] * px
     twist[a, 1] -= bodies.real[a, INVERSE_MASS] * py
@@ -85,7 +85,7 @@ def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
 @inner_kernel
 def load_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> float:
     """Largest relative speed that the loads of one step can give the two points of row c [m/s]."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     speed = acceleration_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     speed += acceleration_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
     return options.dt * speed
@@ -94,7 +94,7 @@ def load_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> float:
 @inner_kernel
 def is_resting(bodies: Bodies, rows: Rows, c: int, options: Options) -> bool:
     """The points of row c meet no faster than the loads of one step explain; needs geometry only."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     ax, ay, bx, by = rows.real[c, ARM_A], rows.real[c, ARM_A + 1], rows.real[c, ARM_B], rows.real[c, ARM_B + 1]
     ux = (bodies.twist[b, 0] - bodies.twist[b, 2] * by) - (bodies.twist[a, 0] - bodies.twist[a, 2] * ay)
     uy = (bodies.twist[b, 1] + bodies.twist[b, 2] * bx) - (bodies.twist[a, 1] + bodies.twist[a, 2] * ax)

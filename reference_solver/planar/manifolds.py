@@ -35,7 +35,7 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
         return False
     n = len(bodies.kind)
     contacts, manifolds = 0, 0
-    for k in range(rows.count[CANDIDATES]):
+    for k in range(rows.counts[CANDIDATES]):
         if contacts + 2 > len(rows.real):
             return False
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
@@ -47,7 +47,7 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
             manifolds += 1
             contacts += found
     rows.manifold[manifolds] = contacts
-    rows.count[CONTACTS], rows.count[MANIFOLDS] = contacts, manifolds
+    rows.counts[CONTACTS], rows.counts[MANIFOLDS] = contacts, manifolds
     recall(bodies, rows, options)
     return True
 
@@ -61,12 +61,12 @@ def drop_approaching(bodies: Bodies, rows: Rows, first: int, found: int, options
     kept = 0
     for i in range(found):
         c = first + i
-        a, b = rows.index[c, A], rows.index[c, B]
+        a, b = rows.integer[c, A], rows.integer[c, B]
         touching = TOUCHING * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
         if rows.real[c, GAP] <= touching or is_resting(bodies, rows, c, options):
             if kept < i:
                 for k in range(ROW_INTEGERS):
-                    rows.index[first + kept, k] = rows.index[c, k]
+                    rows.integer[first + kept, k] = rows.integer[c, k]
                 for k in range(ROW_REALS):
                     rows.real[first + kept, k] = rows.real[c, k]
             kept += 1
@@ -76,19 +76,19 @@ def drop_approaching(bodies: Bodies, rows: Rows, first: int, found: int, options
 @inner_kernel
 def row_key(bodies: Bodies, rows: Rows, c: int) -> int:
     """(a, b, feature) as one integer that sorts like the triple."""
-    return (rows.index[c, A] * len(bodies.kind) + rows.index[c, B]) * FEATURES + rows.index[c, FEATURE]
+    return (rows.integer[c, A] * len(bodies.kind) + rows.integer[c, B]) * FEATURES + rows.integer[c, FEATURE]
 
 
 @inner_kernel
 def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
     """Give each row the impulse of the same feature one step before: a merge of two sorted key lists."""
     old = 0
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN] = rows.real[c, PT] = 0.0
         key = row_key(bodies, rows, c)
-        while old < rows.count[REMEMBERED] and rows.old_key[old] < key:
+        while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
             old += 1
-        if options.warm_starting and old < rows.count[REMEMBERED] and rows.old_key[old] == key:
+        if options.warm_starting and old < rows.counts[REMEMBERED] and rows.old_key[old] == key:
             rows.real[c, PN] = rows.old_impulse[old, 0]
             rows.real[c, PT] = rows.old_impulse[old, 1]
 
@@ -96,9 +96,9 @@ def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
 @inner_kernel
 def remember(bodies: Bodies, rows: Rows) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
-    for c in range(rows.count[CONTACTS]):
-        kept = 0.0 if rows.index[c, IMPACT] else 1.0
+    for c in range(rows.counts[CONTACTS]):
+        kept = 0.0 if rows.integer[c, IMPACT] else 1.0
         rows.old_key[c] = row_key(bodies, rows, c)
         rows.old_impulse[c, 0] = kept * rows.real[c, PN]
         rows.old_impulse[c, 1] = kept * rows.real[c, PT]
-    rows.count[REMEMBERED] = rows.count[CONTACTS]
+    rows.counts[REMEMBERED] = rows.counts[CONTACTS]

@@ -33,15 +33,15 @@ def write_point(
     gap: float,
 ) -> None:
     """Store one point given from first to second: normal (nx, ny), arms (fx, fy) of first, (sx, sy) of second."""
-    rows.index[c, FEATURE] = feature
+    rows.integer[c, FEATURE] = feature
     rows.real[c, GAP] = gap
     if f < s:
-        rows.index[c, A], rows.index[c, B] = f, s
+        rows.integer[c, A], rows.integer[c, B] = f, s
         rows.real[c, NX], rows.real[c, NY] = nx, ny
         rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = fx, fy
         rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = sx, sy
     else:
-        rows.index[c, A], rows.index[c, B] = s, f
+        rows.integer[c, A], rows.integer[c, B] = s, f
         rows.real[c, NX], rows.real[c, NY] = -nx, -ny
         rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = sx, sy
         rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = fx, fy

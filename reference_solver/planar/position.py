@@ -23,9 +23,9 @@ PUSH_SWEEPS = 1000
 def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
     """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest."""
     largest = 0.0
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         rows.real[c, PUSH] = 0.0
-        extent = min(bodies.real[rows.index[c, A], EXTENT], bodies.real[rows.index[c, B], EXTENT])
+        extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
         # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
         after = rows.real[c, GAP] + options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
         excess = -after - options.slop
@@ -41,7 +41,7 @@ def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
 def missing_push(bodies: Bodies, rows: Rows) -> float:
     """Largest shortfall of a pseudo-velocity [m/s]."""
     worst = 0.0
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         worst = max(worst, rows.real[c, PUSH_TARGET] - normal_velocity(bodies.pseudo, rows, c))
     return worst
 

@@ -16,7 +16,7 @@ IMPULSE_SHARE = 0.1
 def natural_map(bodies: Bodies, rows: Rows, options: Options) -> float:
     """Largest scaled natural-map residual over all rows, dimensionless."""
     worst = 0.0
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         normal_impulse = rows.real[c, PN]
         step = (normal_velocity(bodies.twist, rows, c) - rows.real[c, TARGET]) * rows.real[c, NORMAL_MASS]
         defect = abs(normal_impulse - max(normal_impulse - step, 0.0))

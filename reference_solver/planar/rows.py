@@ -56,9 +56,9 @@ COORDINATE_NOISE = 2e-15
 @inner_kernel
 def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
     """Fill all rows from the poses and velocities at the start of the step, before forces act."""
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         prepare_masses(bodies, rows, c)
-        a, b = rows.index[c, A], rows.index[c, B]
+        a, b = rows.integer[c, A], rows.integer[c, B]
         for k in range(2):
             rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
         rows.real[c, FRICTION] = pairs.friction[a, b]
@@ -70,7 +70,7 @@ def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
 @inner_kernel
 def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
     """Levers (E2) and effective masses (E3)."""
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     nx, ny = rows.real[c, NX], rows.real[c, NY]
     an = rows.real[c, ARM_A] * ny - rows.real[c, ARM_A + 1] * nx
     bn = rows.real[c, ARM_B] * ny - rows.real[c, ARM_B + 1] * nx
@@ -91,7 +91,7 @@ def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Option
     A gap may be closed within the step, not more; an overlap asks for nothing. A gap within round-off counts as
     touching: divided by dt it would be noise that the solver had to answer in every step.
     """
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     u, gap = rows.real[c, APPROACH], rows.real[c, GAP]
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     noise = ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
@@ -112,14 +112,14 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
     A contact whose bodies part or meet faster than the loads of one step explain is an impact: the impulse of the
     step before does not guess this step's, nor this one the next (E9).
     """
-    a, b = rows.index[c, A], rows.index[c, B]
+    a, b = rows.integer[c, A], rows.integer[c, B]
     push = load_speed(bodies, rows, c, options)
     approach, slip = rows.real[c, APPROACH], tangent_velocity(bodies.twist, rows, c)
     meeting = math.sqrt(approach * approach + slip * slip)
     moving = speed_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
     rows.real[c, SPEED] = max(meeting, push, SPEED_SHARE * moving)
-    rows.index[c, IMPACT] = 1 if abs(approach) > push else 0
+    rows.integer[c, IMPACT] = 1 if abs(approach) > push else 0
     if approach > push:
         rows.real[c, PN] = rows.real[c, PT] = 0.0
 
@@ -127,7 +127,7 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
 @inner_kernel
 def warm_start(bodies: Bodies, rows: Rows, options: Options) -> None:
     """Apply the remembered impulses, the tangential ones inside the cone of the row's friction (E9)."""
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         apply_normal(bodies, bodies.twist, rows, c, rows.real[c, PN])
         if options.friction:
             bound = rows.real[c, FRICTION] * rows.real[c, PN]

@@ -11,7 +11,7 @@ from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
 @inner_kernel
 def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
     """One sweep over all rows in canonical order, at each point the normal row and then the friction row."""
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         u = normal_velocity(bodies.twist, rows, c)
         old = rows.real[c, PN]
         new = max(old - relaxation * (u - rows.real[c, TARGET]) * rows.real[c, NORMAL_MASS], 0.0)
@@ -29,7 +29,7 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float) 
 @inner_kernel
 def sweep_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows of position correction (E16)."""
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         u = normal_velocity(bodies.pseudo, rows, c)
         old = rows.real[c, PUSH]
         new = max(old - relaxation * (u - rows.real[c, PUSH_TARGET]) * rows.real[c, NORMAL_MASS], 0.0)

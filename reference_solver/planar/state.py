@@ -42,7 +42,7 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 #: Features per pair: bound of the feature numbers in narrowphase.py, to pack (a, b, feature) into one key.
 FEATURES = 64
 
-#: Entries of `Rows.count`.
+#: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
 
 
@@ -69,8 +69,8 @@ class Pairs(NamedTuple):
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
-    count: Indices  # (4,): see CONTACTS .. CANDIDATES
-    index: Indices  # (c, ROW_INTEGERS)
+    counts: Indices  # (4,): see CONTACTS .. CANDIDATES
+    integer: Indices  # (c, ROW_INTEGERS)
     real: Array  # (c, ROW_REALS)
     manifold: Indices  # (m + 1,): first row of each manifold
     block: Array  # (m, 4, 4): W of a two-point manifold, rows n1, t1, n2, t2 (E12)
@@ -100,12 +100,12 @@ class Options(NamedTuple):
 
 
 class Buffer(NamedTuple):
-    """Samples of a run; `index` and `real` of length 0 where contacts are not recorded."""
+    """Samples of a run; `integer` and `real` of length 0 where contacts are not recorded."""
 
     pose: Array  # (s, n, 3)
     twist: Array  # (s, n, 3)
     offset: Indices  # (s + 1,)
-    index: Indices  # (k, 3): body A, body B, feature
+    integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 
 
@@ -157,8 +157,8 @@ def allocate_pairs(model: Model, capacity: int) -> Pairs:
 def allocate_rows(capacity: int) -> Rows:
     """Return room for ``capacity`` contact points."""
     return Rows(
-        count=np.zeros(4, np.int64),
-        index=np.zeros((capacity, ROW_INTEGERS), np.int64),
+        counts=np.zeros(4, np.int64),
+        integer=np.zeros((capacity, ROW_INTEGERS), np.int64),
         real=np.zeros((capacity, ROW_REALS)),
         manifold=np.zeros(capacity + 1, np.int64),
         block=np.zeros((capacity, 4, 4)),
@@ -171,7 +171,7 @@ def allocate_rows(capacity: int) -> Rows:
 def grown(rows: Rows) -> Rows:
     """Return twice the room, with what is remembered of the step before; the current step must be redone."""
     bigger = allocate_rows(2 * len(rows.real))
-    bigger.count[:] = rows.count
+    bigger.counts[:] = rows.counts
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse
     return bigger

@@ -29,7 +29,7 @@ def accelerate(bodies: Bodies, options: Options) -> None:
 
 @inner_kernel
 def move(bodies: Bodies, twist: Array, dt: float) -> None:
-    """x += h v for everything that is not fixed (E17)."""
+    """Advance x += h v for everything that is not fixed (E17)."""
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] != FIXED:
             for k in range(3):
@@ -44,16 +44,16 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, tally: Arra
     """One step; False, with bodies untouched, if an array is too small."""
     if not detect(bodies, pairs, rows, options):
         return False
-    if rows.count[CONTACTS] > 0:
+    if rows.counts[CONTACTS] > 0:
         prepare(bodies, pairs, rows, options)
         if options.solver == BLOCK:
             prepare_blocks(bodies, rows)
     accelerate(bodies, options)
-    if rows.count[CONTACTS] > 0:
+    if rows.counts[CONTACTS] > 0:
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, options, tally)
     move(bodies, bodies.twist, options.dt)
-    if rows.count[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
+    if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move(bodies, bodies.pseudo, options.dt)
     remember(bodies, rows)
     return True
@@ -98,19 +98,19 @@ def sample(bodies: Bodies, rows: Rows, buffer: Buffer, s: int) -> None:
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:
         copy_contacts(rows, buffer, start)
-        buffer.offset[s + 1] = start + rows.count[CONTACTS]
+        buffer.offset[s + 1] = start + rows.counts[CONTACTS]
 
 
 @kernel
 def copy_contacts(rows: Rows, buffer: Buffer, start: int) -> None:
     """Contacts of the last step, from index ``start`` on."""
-    for c in range(rows.count[CONTACTS]):
+    for c in range(rows.counts[CONTACTS]):
         k = start + c
         nx, ny, pn, pt = rows.real[c, NX], rows.real[c, NY], rows.real[c, PN], rows.real[c, PT]
-        buffer.index[k, 0], buffer.index[k, 1], buffer.index[k, 2] = (
-            rows.index[c, A],
-            rows.index[c, B],
-            rows.index[c, FEATURE],
+        buffer.integer[k, 0], buffer.integer[k, 1], buffer.integer[k, 2] = (
+            rows.integer[c, A],
+            rows.integer[c, B],
+            rows.integer[c, FEATURE],
         )
         buffer.real[k, 0], buffer.real[k, 1] = rows.real[c, POINT], rows.real[c, POINT + 1]
         buffer.real[k, 2], buffer.real[k, 3] = nx, ny

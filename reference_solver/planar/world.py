@@ -67,7 +67,7 @@ class World:
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
-        count = int(self._rows.count[CONTACTS])
+        count = int(self._rows.counts[CONTACTS])
         buffer = self._buffer(0, count)
         copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
@@ -86,14 +86,14 @@ class World:
 
     def _grow(self) -> None:
         """Double whatever detection found too small; the step that stopped has not begun."""
-        if self._rows.count[CANDIDATES] >= len(self._pairs.candidate):
+        if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
         else:
             self._rows = grown(self._rows)
 
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:
-    index, real = buffer.index[:count], buffer.real[:count]
+    index, real = buffer.integer[:count], buffer.real[:count]
     body_a, body_b, feature = (index[:, k].copy() for k in range(3))
     return Contacts(
         body_a, body_b, feature, real[:, 0:2].copy(), real[:, 2:4].copy(), real[:, 4:6].copy(), real[:, 6].copy()

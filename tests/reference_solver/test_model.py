@@ -100,5 +100,5 @@ def test_nearly_unit_quaternions_and_normals_are_normalised():
 @pytest.mark.parametrize("steps", [-1, 1.5, True])
 def test_step_counts_are_checked(steps):
     simulation = Simulation(Model(2, [FLOOR, BALL], (0.0, 0.0), 0.0, 0.0), Settings.classical(0.01))
-    with pytest.raises(ValueError, match="^steps: "):
+    with pytest.raises(ValueError, match=r"^steps: "):
         simulation.advance(steps)

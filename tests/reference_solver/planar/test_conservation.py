@@ -45,7 +45,6 @@ def test_free_collisions_keep_momentum(build, settings, shapes, restitution):
 @pytest.mark.parametrize("shapes", ["disc", "box", "mixed"])
 def test_free_collisions_keep_angular_momentum(build, reference, shapes):
     """Without position correction, which moves bodies at their velocities and so shifts the sum of x × m v."""
-    from dataclasses import replace
 
     simulation = build.simulation(
         crowd(build, 11, shapes), replace(reference, position_correction="none"), (0.0, 0.0), 0.5, 0.4
