@@ -95,7 +95,7 @@ def closing_wall(speed: float = 0.01, hits: int = 200) -> Iterator[Gate]:
     """(v - V) L is constant where a wall closes in with speed V on an elastic ball (O18)."""
     bodies = [wall(1.0, 0.0), disc(1.0, 1.0, vx=1.0, radius=0.25), wall(-1.0, 0.0, -4.0, (-speed, 0.0))]
     oracle = flying(bodies, 1.0)
-    constants = []
+    constants: list[float] = []
     while len(constants) < hits:
         known = len(oracle.events)
         oracle.advance(oracle.next_event())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,12 +58,13 @@ class Geometry:
             found += [j for j, gap in deepest.items() if gap < -self.box.touch(j if i == self.box.box else i, t)]
         return found
 
-    def around(self, i: int, t: float) -> list[Contact]:
-        """All contacts of body i at time t, sorted by key."""
+    def around(self, i: int, t: float, known: Collection[tuple[int, int]] = ()) -> list[Contact]:
+        """Contacts of body i at time t, sorted by key; without those of the ``known`` pairs of bodies."""
         count = touching(i, t, 1.0, self.bodies.kind, *self.arrays(), self._found)
         partners = [int(j) for j in self._found[:count] if self.bodies.free[i] or self.bodies.free[j]]
         if self.box is not None:
             partners += self.box.partners() if i == self.box.box else [self.box.box]
+        partners = [j for j in partners if (min(i, j), max(i, j)) not in known]
         found = [contact for j in partners for contact in self.between(i, j, t)]
         return sorted(found, key=lambda contact: contact.key)
 

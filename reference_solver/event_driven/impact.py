@@ -73,6 +73,8 @@ class Impacts:
         bodies, flight = self.bodies, self.flight
         friction = [float(bodies.friction[c.a, c.b]) for c in contacts]
         rough = any(friction)
+        if len(contacts) == 1 and not rough and bodies.box not in (contacts[0].a, contacts[0].b):
+            return [self._central(contacts[0])]
         if rough and bodies.spatial():
             return self._rough_spatial(contacts, friction[0], t)
         rows = Rows(bodies, contacts, tangential=rough)
@@ -101,6 +103,18 @@ class Impacts:
                 reference = max(self.fastest[c.a], self.fastest[c.b])
                 resting[k] = 0.0 < -e[k] * approach[k] < REST_SPEED * reference
         return np.where(resting, 0.0, e), resting
+
+    def _central(self, c: Contact) -> Struck:
+        """Smooth impact of two balls, or of a ball and a plane: S-A2, the case that long runs consist of."""
+        v, inverse_a, inverse_b = self.flight.v0, self.bodies.inverse_mass[c.a], self.bodies.inverse_mass[c.b]
+        approach = float(c.normal @ (v[c.b] - v[c.a]))
+        e, resting = self._restitution((c,), np.array([approach]))
+        size = float((1.0 + e[0]) * max(-approach, 0.0) / (inverse_a + inverse_b))
+        impulse = size * c.normal
+        v[c.a] -= inverse_a * impulse
+        v[c.b] += inverse_b * impulse
+        work = 0.5 * size * (1.0 - float(e[0])) * approach
+        return Struck(c, impulse, approach, work, 1, bool(resting[0]))
 
     def _apply(self, rows: Rows, impulse: Array) -> None:
         linear, angular = rows.response(impulse)

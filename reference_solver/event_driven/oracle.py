@@ -211,8 +211,9 @@ class EventDriven:
         approach = self._approach(a, b)
         for k in (a, b):
             self.flight.anchor(k, t, late)
-        self._close(a, b, t, approach)
-        contacts = self._contacts(a, b, t, late)
+        pair = self._geometry.between(a, b, t, always=True)
+        self._close(pair, t, approach)
+        contacts = [self._fastest(pair)] if self.law == "N-SEQ" else self._touching(pair, t, late)
         struck = self._impacts.resolve(contacts, t)
         self.events += [self._event(s, t) for s in struck if s.approach < 0.0 or s.impulse.any()]
         changed = {k for c in contacts for k in (c.a, c.b) if self.bodies.free[k]}
@@ -231,10 +232,11 @@ class EventDriven:
         rate = float(n @ (self.flight.velocity(ball, base) - self.flight.v0[plane]))
         return math.sqrt(max(rate * rate - 2.0 * float(n @ self.flight.a0[ball]) * gap, 0.0))
 
-    def _close(self, a: int, b: int, t: float, approach: float | None) -> None:
+    def _close(self, pair: list[Contact], t: float, approach: float | None) -> None:
         """Put the pair into contact exactly: the gap left is round-off of the root, and is not carried on."""
         f, bodies = self.flight, self.bodies
-        contact = min(self._geometry.between(a, b, t, always=True), key=lambda c: c.gap)
+        contact = min(pair, key=lambda c: c.gap)
+        a, b = contact.a, contact.b
         if abs(contact.gap) > ASTRAY * self._touch(a, b):
             raise OracleError(t, f"bodies {a} and {b} meet with a gap of {contact.gap:.3g} m")
         share = contact.gap / (bodies.inverse_mass[a] + bodies.inverse_mass[b])
@@ -245,13 +247,11 @@ class EventDriven:
             n = bodies.normal[plane]
             f.v0[ball] -= (approach + float(n @ (f.v0[ball] - f.v0[plane]))) * n
 
-    def _contacts(self, a: int, b: int, t: float, late: float) -> list[Contact]:
-        """Return what the law looks at together."""
-        pair = self._geometry.between(a, b, t, always=True)
-        if self.law == "N-SEQ":
-            return [self._fastest(pair)]
+    def _touching(self, pair: list[Contact], t: float, late: float) -> list[Contact]:
+        """All contacts that are connected with a pair of bodies at this instant, which are anchored to it."""
         found = {c.key: c for c in pair}
-        waiting, seen = [a, b], {a, b}
+        waiting = [pair[0].a, pair[0].b]
+        seen = set(waiting)
         while waiting:
             i = waiting.pop()
             if not self.bodies.free[i]:

@@ -122,31 +122,9 @@ def meet_ball(i, j, x0, v0, a0, t0, late, radius, offset, work):
 
 
 @inner_kernel
-def too_late(i, j, limit, x0, v0, a0, t0, late, radius):
-    """Whether two balls under equal loads surely do not meet before ``limit``: spares most pairs a square root.
-
-    From |x + v t|^2 = R^2 follows 2 |x.v| t >= x.x - R^2.
-    """
-    last = i if t0[i] >= t0[j] else j
-    since_i, since_j = since(i, t0[last], late[last], t0, late), since(j, t0[last], late[last], t0, late)
-    gap = -((radius[i] + radius[j]) ** 2)
-    closing = 0.0
-    for k in range(x0.shape[1]):
-        if a0[i, k] != a0[j, k]:
-            return False
-        x = x0[j, k] + since_j * (v0[j, k] + 0.5 * since_j * a0[j, k])
-        x -= x0[i, k] + since_i * (v0[i, k] + 0.5 * since_i * a0[i, k])
-        gap += x * x
-        closing += x * (v0[j, k] - v0[i, k] + (since_j - since_i) * a0[i, k])
-    return closing >= 0.0 or gap > SURELY * 2.0 * -closing * (limit - t0[last])
-
-
-@inner_kernel
-def meet(i, j, limit, kind, x0, v0, a0, t0, late, radius, normal, offset, work):
-    """Time [s] from the later anchor to the next contact of two bodies, inf if not before the time ``limit``."""
+def meet(i, j, kind, x0, v0, a0, t0, late, radius, normal, offset, work):
+    """Time [s] from the later anchor to the next contact of two bodies; inf if never."""
     if kind[i] == BALL and kind[j] == BALL:
-        if too_late(i, j, limit, x0, v0, a0, t0, late, radius):
-            return math.inf
         return meet_ball(i, j, x0, v0, a0, t0, late, radius, offset, work)
     if kind[j] == PLANE:
         return meet_plane(i, j, x0, v0, a0, t0, late, radius, normal, offset)
@@ -157,7 +135,8 @@ def meet(i, j, limit, kind, x0, v0, a0, t0, late, radius, normal, offset, work):
 def next_meeting(i, kind, skipped, x0, v0, a0, t0, late, radius, normal, offset, work, best):
     """Partner of body i's next contact (-1: none); the lowest index where times tie.
 
-    ``best`` (2,) is its time and what rounding took from it, exact as their sum.
+    ``best`` (2,) is its time and what rounding took from it, exact as their sum. Most balls are passed over without
+    a square root, or even a call: from |x + v t|^2 = R^2 follows 2 |x.v| t >= x.x - R^2.
     """
     best[0], best[1] = math.inf, 0.0
     partner = -1
@@ -167,12 +146,23 @@ def next_meeting(i, kind, skipped, x0, v0, a0, t0, late, radius, normal, offset,
             if j < 0 or j >= x0.shape[0] or skipped[i, j] != 0:
                 continue
             last = i if t0[i] >= t0[j] else j
-            tau = late[last] + meet(i, j, best[0], kind, x0, v0, a0, t0, late, radius, normal, offset, work)
+            if kind[i] == BALL and kind[j] == BALL:
+                since_i = (t0[last] - t0[i]) + (late[last] - late[i])
+                since_j = (t0[last] - t0[j]) + (late[last] - late[j])
+                gap, closing, alike = -((radius[i] + radius[j]) ** 2), 0.0, True
+                for k in range(x0.shape[1]):
+                    alike = alike and a0[i, k] == a0[j, k]
+                    x = x0[j, k] + since_j * (v0[j, k] + 0.5 * since_j * a0[j, k])
+                    x -= x0[i, k] + since_i * (v0[i, k] + 0.5 * since_i * a0[i, k])
+                    gap += x * x
+                    closing += x * (v0[j, k] - v0[i, k] + (since_j - since_i) * a0[i, k])
+                if alike and (closing >= 0.0 or gap > SURELY * 2.0 * -closing * (best[0] - t0[last])):
+                    continue
+            tau = late[last] + meet(i, j, kind, x0, v0, a0, t0, late, radius, normal, offset, work)
             t = t0[last] + tau
             if t < best[0] or (t == best[0] and j < partner):
                 best[0] = t
-                # what the sum lost (Knuth's two-sum)
-                part = t - t0[last]
+                part = t - t0[last]  # what the sum lost (Knuth's two-sum)
                 best[1] = (t0[last] - (t - part)) + (tau - part) if t < math.inf else 0.0
                 partner = j
     return partner
@@ -203,9 +193,14 @@ def touching(i, t, depth, kind, x0, v0, a0, t0, late, radius, normal, offset, fo
     for j in range(x0.shape[0]):
         if j == i or (kind[j] == PLANE and kind[i] == PLANE) or kind[i] > PLANE or kind[j] > PLANE:
             continue
+        if kind[i] == BALL and kind[j] == BALL:
+            # far by one coordinate alone: no call
+            since_i, since_j = t - t0[i], t - t0[j]
+            x = x0[j, 0] + since_j * (v0[j, 0] + 0.5 * since_j * a0[j, 0])
+            x -= x0[i, 0] + since_i * (v0[i, 0] + 0.5 * since_i * a0[i, 0])
+            if abs(x) > 2.0 * (radius[i] + radius[j]):
+                continue
         gap = gap_between(i, j, t, kind, x0, v0, a0, t0, late, radius, normal, offset)
-        if gap > radius[i] + radius[j]:
-            continue  # far: no need for the exact bound
         if gap <= depth * touch_length(i, j, t, x0, v0, radius, offset):
             found[count] = j
             count += 1

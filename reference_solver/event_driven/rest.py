@@ -90,9 +90,11 @@ class Rest:
         """Free bodies that are connected with the changed ones by contacts at rest along their normal."""
         group, waiting = set(changed), list(changed)
         contacts: dict[Key, Contact] = {}
+        known: set[tuple[int, int]] = set()
         while waiting:
-            for c in self.geometry.around(waiting.pop(), t):
-                if c.key in contacts or not self._still(c, t):
+            for c in self.geometry.around(waiting.pop(), t, known):
+                known.add((c.a, c.b))
+                if not self._still(c, t):
                     continue
                 contacts[c.key] = c
                 for i in (c.a, c.b):
