@@ -40,7 +40,7 @@ def adapter_hash(engine: str) -> str:
     own = [Path(spec.origin)] if spec and spec.origin else []
     modules = {e.module.rsplit(".", 1)[-1] for e in entry_points(group=GROUP)}
     mine = entry.module.rsplit(".", 1)[-1]
-    # bullet.py and bullet_law.py belong to one engine; what belongs to none is shared.
+    # An adapter and the law file beside it belong to one engine; what belongs to none is shared.
     owner = {path: next((m for m in modules if path.stem in (m, f"{m}_law")), None) for path in _sources("adapters")}
     shared = [path for path, name in owner.items() if name is None or name == mine]
     solver = _sources("reference_solver") if entry.module == "adapters.reference" else []

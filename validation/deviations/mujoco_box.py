@@ -26,9 +26,9 @@ from adapters.mujoco_law import ContactLaw
 Row = tuple[tuple[float, float, float], float, float]
 Triple = tuple[float, float, float]
 #: Newton steps and halvings of a step: three unknowns and at most sixteen rows settle in a handful.
-NEWTON_STEPS, HALVINGS = 60, 40
+NEWTON_STEPS, HALVINGS = 60, 8
 #: A gradient this small against the forces in it is round-off.
-SOLVED = 1e-14
+SOLVED = 1e-13
 
 
 @dataclass(frozen=True)

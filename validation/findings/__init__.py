@@ -1,8 +1,8 @@
 """Known findings: FAIL rows that are listed with a reason, and cells that are known to be unsupported.
 
-``<engine>.csv`` lists the FAIL rows of the quick suite, one per line (status only, no values); ``reasons.toml`` holds the
-reasons, each with the pattern of rows it speaks about and a source, and the patterns of cells that are unsupported. An engine without a list is *unlisted*: its FAILs have no standing and
-do not fail the command.
+``<engine>.csv`` lists the FAIL rows of the quick suite, one per line (status only, no values); ``reasons.toml`` holds
+the reasons, each with the pattern of rows it speaks about and a source, and the patterns of cells that are
+unsupported. An engine without a list is *unlisted*: its FAILs have no standing and do not fail the command.
 """
 
 from __future__ import annotations
