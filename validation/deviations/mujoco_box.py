@@ -26,9 +26,11 @@ from adapters.mujoco_law import ContactLaw
 Row = tuple[tuple[float, float, float], float, float]
 Triple = tuple[float, float, float]
 #: Newton steps and halvings of a step: three unknowns and at most sixteen rows settle in a handful.
-NEWTON_STEPS, HALVINGS = 60, 8
+NEWTON_STEPS, HALVINGS = 60, 40
 #: A gradient this small against the forces in it is round-off.
 SOLVED = 1e-13
+#: A step that lowers the cost by less than this share cannot be judged by the cost: it is the last one.
+UNSEEN = 1e-15
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,8 @@ class BoxOnFace:
             if max(abs(g) for g in gradient) <= SOLVED * scale:
                 break
             step = _solve3(hessian, gradient)
+            if _dot(step, gradient) <= UNSEEN * cost:
+                return _along(a, step, -1.0)
             for halving in range(HALVINGS):
                 trial = _along(a, step, -(0.5**halving))
                 new = self._model(parts, free, trial)
