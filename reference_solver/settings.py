@@ -38,8 +38,8 @@ class Settings:
     warm_starting
         Start from the impulses of the step before, matched by feature.
     margin
-        Contacts at rest are kept while their gap is below this fraction of the smaller half width of the pair;
-        they may close it, not more (E8). Bodies that bounce meet without any margin.
+        Pairs with e = 0 are in contact while their gap is below this fraction of the smaller half width; they may
+        close it, not more (E8). Pairs with e > 0 are in contact only where they touch.
 
     Raises
     ------

@@ -89,13 +89,3 @@ def load_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> float:
     speed = acceleration_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     speed += acceleration_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
     return options.dt * speed
-
-
-@inner_kernel
-def is_resting(bodies: Bodies, rows: Rows, c: int, options: Options) -> bool:
-    """The points of row c meet no faster than the loads of one step explain; needs geometry only."""
-    a, b = rows.integer[c, A], rows.integer[c, B]
-    ax, ay, bx, by = rows.real[c, ARM_A], rows.real[c, ARM_A + 1], rows.real[c, ARM_B], rows.real[c, ARM_B + 1]
-    ux = (bodies.twist[b, 0] - bodies.twist[b, 2] * by) - (bodies.twist[a, 0] - bodies.twist[a, 2] * ay)
-    uy = (bodies.twist[b, 1] + bodies.twist[b, 2] * bx) - (bodies.twist[a, 1] + bodies.twist[a, 2] * ax)
-    return -(rows.real[c, NX] * ux + rows.real[c, NY] * uy) <= load_speed(bodies, rows, c, options)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import find_candidates
-from reference_solver.planar.columns import EXTENT, FEATURE, GAP, IMPACT, PN, PT, ROW_INTEGERS, ROW_REALS, A, B
-from reference_solver.planar.kinematics import is_resting
+from reference_solver.planar.columns import FEATURE, IMPACT, PN, PT, A, B
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import (
     CANDIDATES,
@@ -39,9 +38,9 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
         if contacts + 2 > len(rows.real):
             return False
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
-        found = collide(bodies, a, b, options.margin, rows, contacts)
-        if options.restitution and pairs.restitution[a, b] > 0.0:
-            found = drop_approaching(bodies, rows, contacts, found, options)
+        # What flies towards a rebound must not be slowed down before it gets there (E8).
+        bounces = options.restitution and pairs.restitution[a, b] > 0.0
+        found = collide(bodies, a, b, TOUCHING if bounces else options.margin, rows, contacts)
         if found > 0:
             rows.manifold[manifolds] = contacts
             manifolds += 1
@@ -50,27 +49,6 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     rows.counts[CONTACTS], rows.counts[MANIFOLDS] = contacts, manifolds
     recall(bodies, rows, options)
     return True
-
-
-@inner_kernel
-def drop_approaching(bodies: Bodies, rows: Rows, first: int, found: int, options: Options) -> int:
-    """Of the points of a pair with restitution, keep those that touch or rest; return how many.
-
-    A point that flies towards its impact must not be slowed down before it gets there (E8).
-    """
-    kept = 0
-    for i in range(found):
-        c = first + i
-        a, b = rows.integer[c, A], rows.integer[c, B]
-        touching = TOUCHING * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
-        if rows.real[c, GAP] <= touching or is_resting(bodies, rows, c, options):
-            if kept < i:
-                for k in range(ROW_INTEGERS):
-                    rows.integer[first + kept, k] = rows.integer[c, k]
-                for k in range(ROW_REALS):
-                    rows.real[first + kept, k] = rows.real[c, k]
-            kept += 1
-    return kept
 
 
 @inner_kernel

@@ -131,3 +131,21 @@ def test_apexes_never_rise_at_e_1(build, settings):
     v = math.sqrt(2 * 9.81 * start)
     assert height.max() <= start + v * build.dt
     assert height[-480:].max() >= start - 2.0 * v * build.dt
+
+
+@pytest.mark.parametrize("e", [0.5, 0.8])
+def test_a_bouncing_disc_comes_to_rest_when_the_geometric_series_ends(build, settings, e):
+    """t = sqrt(2 h / g) (1 + e)/(1 - e), mean over 16 phases of the first impact.
+
+    Each of N = ln(v / 2 g dt)/ln(1/e) bounces is found up to a step late, and the tail below 2 g dt lasts 4 dt/(1 - e).
+    """
+    g, errors = 9.81, []
+    for i in range(16):
+        height = 1.0 + 0.01 * i
+        simulation = build.simulation([build.floor(), build.disc(0.0, 0.5 + height)], settings, (0.0, -g), e)
+        record = simulation.record(1200)
+        moving = np.flatnonzero(np.abs(record.twist[:, 1, 1]) > 0.01 * g * build.dt)
+        errors.append(record.t[moving[-1]] - math.sqrt(2.0 * height / g) * (1.0 + e) / (1.0 - e))
+        assert np.abs(record.twist[-1]).max() <= 1e-12
+    bounces = math.log(math.sqrt(2.0 * g) / (2.0 * g * build.dt)) / math.log(1.0 / e)
+    assert abs(np.mean(errors)) <= (bounces + 4.0 / (1.0 - e)) * build.dt
