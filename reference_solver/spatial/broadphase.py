@@ -47,11 +47,11 @@ def add_candidate(bodies: Bodies, detection: Detection, i: int, j: int) -> bool:
     """Store the pair if it may touch; False if there is no room."""
     if not may_touch(bodies, i, j):
         return True
-    count = detection.count[CANDIDATES]
+    count = detection.found[CANDIDATES]
     if count == len(detection.candidate):
         return False
     detection.candidate[count] = min(i, j) * len(bodies) + max(i, j)
-    detection.count[CANDIDATES] = count + 1
+    detection.found[CANDIDATES] = count + 1
     return True
 
 
@@ -59,7 +59,7 @@ def add_candidate(bodies: Bodies, detection: Detection, i: int, j: int) -> bool:
 def find_candidates(bodies: Bodies, detection: Detection, options: Options) -> bool:
     """Fill `Detection.candidate` in ascending order; False if there is no room."""
     bound_bodies(bodies, options)
-    detection.count[CANDIDATES] = 0
+    detection.found[CANDIDATES] = 0
     if options.broadphase:
         return sweep_candidates(bodies, detection)
     n = len(bodies)
@@ -87,7 +87,7 @@ def sweep_candidates(bodies: Bodies, detection: Detection) -> bool:
                 break
             if not add_candidate(bodies, detection, i, j):
                 return False
-    sort_keys(detection.candidate, detection.count[CANDIDATES])
+    sort_keys(detection.candidate, detection.found[CANDIDATES])
     return True
 
 

@@ -93,13 +93,3 @@ def load_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Op
     at_a = acceleration_at(bodies, a, row(manifolds.arm_a[m], p, 0))
     at_b = acceleration_at(bodies, b, row(manifolds.arm_b[m], p, 0))
     return options.dt * (at_a + at_b)
-
-
-@inner_kernel
-def is_resting(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> bool:
-    """The bodies meet at point p no faster than the loads of one step explain; needs geometry only."""
-    a, b = manifolds.body_a[m], manifolds.body_b[m]
-    at_a = point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0))
-    at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
-    approach = -dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
-    return approach <= load_speed(bodies, manifolds, m, p, options)

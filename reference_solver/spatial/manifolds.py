@@ -6,7 +6,6 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.manifolds import TOUCHING
 from reference_solver.planar.state import Options
 from reference_solver.spatial.broadphase import find_candidates
-from reference_solver.spatial.kinematics import is_resting
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import (
     CANDIDATES,
@@ -31,41 +30,20 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
         return -1
     n = len(bodies)
     m = 0
-    for k in range(detection.count[CANDIDATES]):
+    for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
-        found = collide(
-            bodies, detection, detection.candidate[k] // n, detection.candidate[k] % n, options.margin, manifolds, m
-        )
-        if options.restitution and detection.restitution[manifolds.body_a[m], manifolds.body_b[m]] > 0.0:
-            found = drop_approaching(bodies, manifolds, m, options)
+        a, b = detection.candidate[k] // n, detection.candidate[k] % n
+        # What flies towards a rebound must not be slowed down before it gets there (E8).
+        bounces = options.restitution and detection.restitution[a, b] > 0.0
+        found = collide(bodies, detection, a, b, TOUCHING if bounces else options.margin, manifolds, m)
         if found > 0:
             sort_points(manifolds, m)
             set_frame(manifolds, m)
             set_world_points(bodies, manifolds, m)
             m += 1
-    detection.count[MANIFOLDS] = m
+    detection.found[MANIFOLDS] = m
     return m
-
-
-@inner_kernel
-def drop_approaching(bodies: Bodies, manifolds: Manifolds, m: int, options: Options) -> int:
-    """Of the points of a pair with restitution, keep those that touch or rest; return how many.
-
-    A point that flies towards its impact must not be slowed down before it gets there (E8).
-    """
-    touching = TOUCHING * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-    kept = 0
-    for p in range(manifolds.points[m]):
-        if manifolds.gap[m, p] <= touching or is_resting(bodies, manifolds, m, p, options):
-            manifolds.feature[m, kept] = manifolds.feature[m, p]
-            manifolds.gap[m, kept] = manifolds.gap[m, p]
-            for d in range(3):
-                manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
-                manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
-            kept += 1
-    manifolds.points[m] = kept
-    return kept
 
 
 @inner_kernel
@@ -83,7 +61,7 @@ def sort_points(manifolds: Manifolds, m: int) -> None:
 
 
 @inner_kernel
-def swap(values, j):  # type: ignore[no-untyped-def]
+def swap(values, j):
     """Exchange entries j and j - 1."""
     values[j], values[j - 1] = values[j - 1], values[j]
 
@@ -132,9 +110,9 @@ def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: M
             for k in range(3):
                 manifolds.impulse[m, p, k] = 0.0
         pair = manifolds.body_a[m] * n + manifolds.body_b[m]
-        while old < detection.count[REMEMBERED] and memory.pair[old] < pair:
+        while old < detection.found[REMEMBERED] and memory.pair[old] < pair:
             old += 1
-        if options.warm_starting and old < detection.count[REMEMBERED] and memory.pair[old] == pair:
+        if options.warm_starting and old < detection.found[REMEMBERED] and memory.pair[old] == pair:
             recall_points(manifolds, m, memory, old)
 
 
@@ -161,7 +139,7 @@ def remember(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory:
             kept = 0.0 if manifolds.impact[m, p] else 1.0
             for d in range(3):
                 memory.impulse[m, p, d] = kept * world_component(manifolds, m, p, d)
-    detection.count[REMEMBERED] = len(manifolds)
+    detection.found[REMEMBERED] = len(manifolds)
 
 
 @inner_kernel

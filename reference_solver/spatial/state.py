@@ -10,7 +10,7 @@ Every manifold has room for four points.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ FIXED, FREE, PRESCRIBED = 0, 1, 2
 #: Points per manifold: a plane support needs no more than four to carry any load.
 POINTS = 4
 
-#: Entries of `Detection.count`.
+#: Entries of `Detection.found`.
 CANDIDATES, REMEMBERED, MANIFOLDS = 0, 1, 2
 
 
@@ -102,25 +102,26 @@ MEMORY = np.dtype(
     align=True,
 )
 
-Bodies = np.recarray  # of BODY
-Manifolds = np.recarray  # of MANIFOLD
-Memory = np.recarray  # of MEMORY
+# numpy's record arrays of the types above. Their fields are attributes that a type checker cannot know.
+Bodies: TypeAlias = Any
+Manifolds: TypeAlias = Any
+Memory: TypeAlias = Any
 
 
 class Buffer(NamedTuple):
-    """Samples of a run; `index` and `real` of length 0 where contacts are not recorded."""
+    """Samples of a run; `names` and `real` of length 0 where contacts are not recorded."""
 
     pose: Array  # (s, n, 7)
     twist: Array  # (s, n, 6)
     offset: Indices  # (s + 1,)
-    index: Indices  # (k, 3): body A, body B, feature
+    names: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
 
 
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
-    count: Indices  # (3,): see CANDIDATES .. MANIFOLDS
+    found: Indices  # (3,): see CANDIDATES .. MANIFOLDS
     restitution: Array  # (n, n)
     friction: Array  # (n, n)
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
@@ -137,7 +138,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     moments = np.array([body.inertia if body.motion == "free" else (np.inf,) * 3 for body in model.bodies])
     acceleration = np.array([body.force for body in model.bodies], dtype=np.float64) / mass[:, None]
     acceleration[free] += model.gravity
-    bodies = np.zeros(n, BODY).view(np.recarray)
+    bodies: Bodies = np.zeros(n, BODY).view(np.recarray)
     bodies.pose = [body.pose for body in model.bodies]
     bodies.twist = [body.twist for body in model.bodies]
     bodies.acceleration = acceleration
@@ -171,7 +172,7 @@ def _geometry(body: Body) -> tuple[float, ...]:
 def allocate_detection(model: Model, capacity: int) -> Detection:
     """Return the pair tables, and room for ``capacity`` candidates."""
     return Detection(
-        count=np.zeros(3, np.int64),
+        found=np.zeros(3, np.int64),
         restitution=model.restitution.copy(),
         friction=model.friction.copy(),
         order=np.arange(len(model.bodies)),

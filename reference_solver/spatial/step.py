@@ -66,7 +66,7 @@ def run_steps(
         if not step(bodies, detection, room, memory, options, tally):
             return k
         if sampled:
-            sample(bodies, room[: detection.count[MANIFOLDS]], buffer, (k + 1) // stride - 1)
+            sample(bodies, room[: detection.found[MANIFOLDS]], buffer, (k + 1) // stride - 1)
     return steps
 
 
@@ -90,8 +90,8 @@ def copy_contacts(manifolds: Manifolds, buffer: Buffer, start: int) -> int:
     k = start
     for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
-            buffer.index[k, 0], buffer.index[k, 1] = manifolds.body_a[m], manifolds.body_b[m]
-            buffer.index[k, 2] = manifolds.feature[m, p]
+            buffer.names[k, 0], buffer.names[k, 1] = manifolds.body_a[m], manifolds.body_b[m]
+            buffer.names[k, 2] = manifolds.feature[m, p]
             for d in range(3):
                 buffer.real[k, d] = manifolds.point[m, p, d]
                 buffer.real[k, 3 + d] = manifolds.frame[m, 2, d]

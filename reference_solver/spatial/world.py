@@ -79,7 +79,7 @@ class World:
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
         buffer = self._buffer(0, self._most_points)
-        return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.count[MANIFOLDS]], buffer, 0))
+        return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
 
     @property
     def _most_points(self) -> int:
@@ -91,7 +91,7 @@ class World:
             pose=np.zeros((samples, n, 7)),
             twist=np.zeros((samples, n, 6)),
             offset=np.zeros(samples + 1, np.int64),
-            index=np.zeros((room, 3), np.int64),
+            names=np.zeros((room, 3), np.int64),
             real=np.zeros((room, 10)),
         )
 
@@ -104,7 +104,7 @@ class World:
 
     def _grow(self) -> None:
         """Double whatever detection found too small; the step that stopped has not begun."""
-        if self._detection.count[CANDIDATES] >= len(self._detection.candidate):
+        if self._detection.found[CANDIDATES] >= len(self._detection.candidate):
             room = np.zeros(2 * len(self._detection.candidate), np.int64)
             self._detection = self._detection._replace(candidate=room)
             return
@@ -115,7 +115,7 @@ class World:
 
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:
-    index, real = buffer.index[:count], buffer.real[:count]
-    body_a, body_b, feature = (index[:, k].copy() for k in range(3))
+    names, real = buffer.names[:count], buffer.real[:count]
+    body_a, body_b, feature = (names[:, k].copy() for k in range(3))
     point, normal, impulse = (real[:, k : k + 3].copy() for k in (0, 3, 6))
     return Contacts(body_a, body_b, feature, point, normal, impulse, real[:, 9].copy())
