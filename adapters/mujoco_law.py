@@ -64,7 +64,7 @@ class Impedance:
 
 
 def softness_of(cone: str, condim: int, mu: float) -> float:
-    """s of the module's text: 1, or that of a pyramid."""
+    """Factor s of the regulariser: 1, or that of a pyramid."""
     if cone != "pyramidal" or condim == 1:
         return 1.0
     mu = max(mu, SMALLEST_FRICTION)

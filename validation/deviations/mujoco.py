@@ -300,7 +300,10 @@ def _incline_law(profile: str, metric: str) -> Law:
         value, *others = (float(path[-1, column] - path[middle, column]) / window for path in paths)
         spread = max(abs(other - value) for other in others)
         scale = math.hypot(*box.load) * (scene.duration if metric == "creep" else 1.0)
-        floor = error if metric == "creep" else 2.0 * error / window
+        # A force is a difference over R, (1 - d)/d of an inertia: its round-off is d/(1 - d) of a number's own.
+        d = box.law.impedance.deep
+        round_off = EPS * d / (1.0 - d) * scale
+        floor = round_off + (error if metric == "creep" else 2.0 * error / window)
         if spread > BLURRED * scale:
             # On the edge between two paths (one hop more or less): the engine takes either.
             return (value, 2.0 * spread + floor) if spread <= EITHER * scale else None
