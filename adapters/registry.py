@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
-from adapters.engine import Engine, EngineError
+from adapters.engine import Engine, EngineError, EngineFacts
 
 GROUP = "contact_crosscheck.engines"
 #: Order in which our own engines are shown; others follow by name.
@@ -61,6 +61,15 @@ def find(name: str) -> Found:
         return Found(name, None, "", f"{missing}; pip install 'contact-crosscheck[{name}]' ({package})")
     except (Exception, SystemExit) as error:  # a third-party plugin may raise anything; only its rows may suffer
         return Found(name, None, "", f"{type(error).__name__}: {error}".splitlines()[0])
+
+
+def facts(name: str) -> EngineFacts | None:
+    """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
+    entry = _entries().get(name)
+    try:
+        return entry.load().facts if entry else None
+    except (Exception, SystemExit):  # as in `find`: a broken plugin costs its own part only
+        return None
 
 
 def load(name: str) -> Engine:

@@ -18,10 +18,10 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from reports.page import conclusions, verdicts
+from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
-from reports.page.styling import engine_style, symbol
+from reports.page.styling import engine_style, symbol, symbols
 from reports.speed import duration
 from reports.wording import number
 from validation.cells import format_dt
@@ -29,7 +29,7 @@ from validation.cells import format_dt
 __all__ = ["Bench", "Source", "load_source", "render"]
 
 #: Order matters: the first defines what the others use.
-SCRIPTS = ("page.js",)
+SCRIPTS = ("page.js", "replay.js", "explorer.js")
 
 
 def render(source: Source) -> str:
@@ -44,11 +44,18 @@ def render(source: Source) -> str:
             policy=policy(style, script),
             style=style,
             script=script,
+            symbols=symbols(source.columns),
             facts=facts(source),
             sentences=conclusions.sentences(source),
             matrix=verdicts.matrix(source),
             findings=conclusions.findings(source),
+            choices=choosing.choices(source),
             scenes=scene_sections(source),
+            replays=replay.replays(source),
+            explorer=explorer.explorer(source),
+            speed=cost.speed(source),
+            sheet=fairness.fairness(source),
+            take=takeaway.takeaway(source),
             said=verdicts.SAID,
             meanings=verdicts.MEANINGS,
             marks_used=_marks_used(source),

@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from reports.palette import colours_of, dash_of, shape_of
 
-WIDTH, HEIGHT = 400, 270
+WIDTH, HEIGHT = 330, 250
 #: Values at or below this are drawn on it and labelled "0": round-off has no place on a logarithmic axis.
 FLOOR = 1e-17
 _CONFIG: dict[str, Any] = {

@@ -5,6 +5,7 @@ Every sentence is computed from the rows; nothing in it is known in advance.
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -84,16 +85,17 @@ def departures(source: Source) -> str:
         return "No departure lies where a law of an engine predicts it."
     total = sum(len(group) for group in groups.values())
     parts = []
-    for (engine, profile), group in sorted(groups.items(), key=lambda item: -len(item[1]))[:4]:
+    for (engine, profile), group in sorted(groups.items(), key=lambda item: -len(item[1]))[:3]:
         scenes = joined(dict.fromkeys(row["scene"] for row in group))
         because = Counter(_law_text(row["reason"]) for row in group).most_common(1)[0][0]
-        parts.append(f"{engine}/{profile} on {scenes} ({len(group)} rows: {because})")
-    return f"{total} failing rows lie where a law of their engine predicts them: {'; '.join(parts)}."
+        parts.append(f"{engine}/{profile} on {scenes} ({len(group)}: {because})")
+    more = f"; and {len(groups) - 3} more" if len(groups) > 3 else ""
+    return f"{total} failing values lie where a law of their engine predicts them: {'; '.join(parts)}{more}."
 
 
 def _law_text(reason: str) -> str:
     """First clause of a law's reason, without the prediction of one row."""
-    return reason.partition(" (predicted")[0].partition(", and")[0].partition(";")[0].strip()
+    return re.split(r" \(predicted|, |; ", reason)[0].strip()
 
 
 def wrongs(source: Source) -> str:
@@ -176,5 +178,6 @@ def _finding(key: tuple[Any, ...], rows: Sequence[Plain]) -> FindingFamily:
     text += f"tolerance {number(worst['tolerance'], 2)} {worst['unit'] if worst['unit'] != '1' else ''}".strip()
     href = "#" + slug(scene, dimension, "check", family)
     return FindingFamily(
-        engine, profile, scene, dimension, family, len(rows), href, text, worst["because"], worst["reason"], reproduce(worst["slot"])
+        engine, profile, scene, dimension, family, len(rows), href, text, worst["because"], worst["reason"],
+        reproduce(worst["slot"]),
     )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from reports.page.charts import FLOOR, HEIGHT, WIDTH, lines, log_scale, power_axis, styled, svg
+from reports.page.charts import FLOOR, HEIGHT, WIDTH, dashes, lines, log_scale, power_axis, styled, svg
 from reports.speed import duration
 from reports.wording import number
 from validation.bench.primary import PRIMARY
@@ -133,3 +133,33 @@ def _point_text(row: Mapping[Hashable, Any]) -> str:
         f"{row['engine']}/{row['profile']}, dt {format_dt(row['dt'])} s, {own}: error {_error_text(row['error'])}, "
         f"{duration(row['cost'])} per simulated second ({duration(row['cost_low'])} to {duration(row['cost_high'])})"
     )
+
+
+def motion(table: pd.DataFrame, truth: pd.DataFrame | None, what: str, title: str) -> Figure:
+    """One coordinate over time for every engine; the truth is a broad grey line. Without truth the axis is a power."""
+    x = alt.X("t:Q", axis=alt.Axis(title="time [s]"), scale=alt.Scale(nice=False))
+    if truth is None:
+        scale, ticks = log_scale(list(table["value"]), 2.0)
+        y = alt.Y("value:Q", scale=scale, axis=power_axis(what, ticks))
+    else:
+        y = alt.Y("value:Q", axis=alt.Axis(title=what), scale=alt.Scale(zero=False))
+    style = styled(table)
+    own = alt.Chart(thinned(table)).mark_line(strokeWidth=1.6, opacity=0.9, aria=False).encode(
+        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"]
+    )  # fmt: skip
+    layers = [own]
+    if truth is not None:
+        ghost = alt.Chart(truth).mark_line(strokeWidth=7, opacity=0.18, color="currentColor", aria=False)
+        layers = [ghost.encode(x=x, y=y), own]
+    chart = alt.layer(*layers).properties(width=620, height=HEIGHT)
+    caption = "Broad grey line: the exact motion." if truth is not None else "At 1e-6 m and below: at rest."
+    return Figure("fig-" + title, title, caption, svg(chart, title))
+
+
+def thinned(table: pd.DataFrame, most: int = 150) -> pd.DataFrame:
+    """At most ``most`` samples of each series, evenly; a picture 600 pixels wide shows no more."""
+    parts = []
+    for _, group in table.groupby(["engine", "profile"], sort=False):
+        stride = max(1, -(-len(group) // most))
+        parts.append(group.iloc[::stride])
+    return pd.concat(parts)

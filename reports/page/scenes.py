@@ -34,7 +34,7 @@ class SceneSection:
     drawing: str
     primary: Primary | None
     verdicts: list[SceneVerdicts]
-    figures: list[Figure]
+    figures: list[list[Figure]]
     convergence: list[Convergence]
     extrapolations: list[Extrapolation]
 
@@ -56,12 +56,13 @@ def _section(
 ) -> SceneSection:
     canonical = resolve(scene)
     dimensions = [dimension for name, dimension in source.lines if name == scene]
-    found: list[Figure | None] = []
+    rows = []
     for dimension in dimensions:
-        found.append(figures.error_against_step(orders, scene, dimension))
+        found = [figures.error_against_step(orders, scene, dimension)]
         if source.bench is not None:
             found.append(figures.work_precision(source.bench.tables["work_points"], scene, dimension))
         found.append(_iterations(errors, scene, dimension))
+        rows.append([figure for figure in found if figure is not None])
     return SceneSection(
         scene,
         slug("scene", scene),
@@ -69,7 +70,7 @@ def _section(
         *split_figure(canonical.figure),
         PRIMARY.get(scene),
         [scene_verdicts(source, scene, dimension) for dimension in dimensions],
-        [figure for figure in found if figure is not None],
+        [row for row in rows if row],
         [entry for entry in orders if entry.scene == scene],
         [entry for entry in limits if entry.scene == scene],
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from markupsafe import Markup
 
 from reports.page.verdicts import slug
@@ -22,11 +24,19 @@ def engine_style(engines: list[str]) -> str:
     return "".join(f".e-{slug(name)}{{--engine:{colour}}}" for name, colour in colours_of(engines).items())
 
 
-def symbol(engines: list[str], engine: str, profile: str) -> Markup:
-    """Point and line of an engine and profile, as they look in the charts."""
-    colour, dash = colours_of(engines)[engine], " ".join(map(str, dash_of(profile)))
-    pattern = f' stroke-dasharray="{dash}"' if dash else ""
-    return Markup(
-        f'<svg class="symbol" width="26" height="16" viewBox="-5 0 26 16" aria-hidden="true" fill="{colour}">'
-        f'<path d="M-5 8h26" stroke="{colour}" stroke-width="1.4"{pattern}/>{_SHAPES[shape_of(profile)]}</svg>'
-    )
+def symbols(columns: Sequence[tuple[str, str]]) -> Markup:
+    """Point and line of every engine and profile, as they look in the charts, defined once for `symbol`."""
+    colours = colours_of(list(dict.fromkeys(engine for engine, _ in columns)))
+    defined = []
+    for engine, profile in columns:
+        dash = " ".join(map(str, dash_of(profile)))
+        pattern = f' stroke-dasharray="{dash}"' if dash else ""
+        line = f'<path d="M-5 8h26" stroke="{colours[engine]}" stroke-width="1.4"{pattern}/>'
+        head = f'<symbol id="{slug("sym", engine, profile)}" viewBox="-5 0 26 16" fill="{colours[engine]}">'
+        defined.append(f"{head}{line}{_SHAPES[shape_of(profile)]}</symbol>")
+    return Markup(f'<svg width="0" height="0" class="defs" aria-hidden="true">{"".join(defined)}</svg>')
+
+
+def symbol(engine: str, profile: str) -> Markup:
+    """One of `symbols`."""
+    return Markup(f'<svg class="symbol" aria-hidden="true"><use href="#{slug("sym", engine, profile)}"/></svg>')

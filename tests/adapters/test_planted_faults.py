@@ -4,34 +4,9 @@ import pytest
 
 from adapters.conformance import CHECKS
 from adapters.needs import Needs
+from adapters.planted_faults import CAUGHT_BY
 from adapters.receipts import receipts
 
-#: Fault -> what catches it: a receipt by its quantity, or a conformance check.
-CAUGHT_BY = {
-    "restitution ignored": "receipt restitution",
-    "friction applied twice": "receipt friction",
-    "gravity sign": "receipt gravity",
-    "half against full extents": "receipt size",
-    "state sampled one step late": "receipt sampling",
-    "world shared between builds": "check fresh",
-    "disc inertia given to a sphere": "receipt inertia",
-    "hidden damping of 4 %": "receipt linear_damping",
-    "angle sign": "receipt turn",
-    "mass ignored": "receipt mass",
-    "impulse of the wrong body": "check impulse",
-    "torque sign": "receipt turn",
-    "step of its own": "receipt step",
-    "spin damped": "receipt angular_damping",
-    "principal axes swapped": "receipt inertia",
-    "start not as the scene says": "check states",
-    "bodies in another order": "check states",
-    "normal points from the second body": "check contacts",
-    "bodies not in order of the scene": "check contacts",
-    "unknown settings ignored": "check refusals",
-    "setting without a reason": "check profiles",
-    "refusal of several lines": "check refusals",
-    "nothing read back": "check readback",
-}
 #: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
 EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81)
 DT = 1 / 60

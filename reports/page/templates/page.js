@@ -43,3 +43,117 @@ function openTarget() {
 }
 addEventListener("hashchange", openTarget);
 if (location.hash) openTarget();
+
+/* Taking away: every table as CSV, every plot as SVG and PNG. */
+function save(name, content, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+function button(text, label, action) {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.className = "save";
+  made.textContent = text;
+  made.setAttribute("aria-label", label);
+  made.addEventListener("click", action);
+  return made;
+}
+const fileName = (text) => (text || "table").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "");
+function csvOf(table) {
+  const quoted = (cell) => {
+    const text = cell.textContent.replace(/\s+/g, " ").replace(/ copy$/, "").trim();
+    return /[",\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
+  };
+  return $$("tr", table).map((row) => [...row.cells].map(quoted).join(",")).join("\n") + "\n";
+}
+for (const region of $$(".scroll")) {
+  const table = region.querySelector("table"), label = region.getAttribute("aria-label");
+  region.after(button("CSV", "Save as CSV: " + label, () => save(fileName(label) + ".csv", csvOf(table), "text/csv")));
+}
+function standalone(svg) {
+  const copy = svg.cloneNode(true), style = getComputedStyle(document.body);
+  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+  copy.setAttribute("color", style.color);
+  copy.setAttribute("font-family", style.fontFamily);
+  const paper = document.createElementNS("http://www.w3.org/2000/svg", "rect");
+  paper.setAttribute("width", "100%");
+  paper.setAttribute("height", "100%");
+  paper.setAttribute("fill", style.backgroundColor);
+  copy.prepend(paper);
+  return new XMLSerializer().serializeToString(copy);
+}
+function savePng(svg, name) {
+  const picture = new Image();
+  picture.addEventListener("load", () => {
+    const canvas = document.createElement("canvas");
+    canvas.width = 2 * picture.width;
+    canvas.height = 2 * picture.height;
+    canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
+    canvas.toBlob((blob) => save(name, blob));
+  });
+  picture.src = "data:image/svg+xml;charset=utf-8," + encodeURIComponent(standalone(svg));
+}
+for (const figure of $$("figure.plot")) {
+  const svg = figure.querySelector("svg"), title = svg.getAttribute("aria-label"), name = fileName(title);
+  const box = document.createElement("span");
+  box.className = "saves";
+  box.append(
+    button("SVG", "Save as SVG: " + title, () => save(name + ".svg", standalone(svg), "image/svg+xml")),
+    button("PNG", "Save as PNG: " + title, () => savePng(svg, name + ".png")),
+  );
+  figure.append(box);
+}
+
+/* A field of a table of errors gives its command. */
+document.addEventListener("click", async (event) => {
+  const cell = event.target.closest?.(".grid tbody td");
+  const line = cell?.parentElement;
+  if (!line || cell.cellIndex < 3 || !cell.textContent) return;
+  const head = line.closest("table").tHead.rows[0].cells[cell.cellIndex].textContent.split("/");
+  const command = line.dataset.run.replace("--engine @", "--engine " + head[0]).replace("--profile @", "--profile " + head[1]);
+  let said = command;
+  try { await navigator.clipboard.writeText(command); said = "copied: " + command; } catch { /* shown instead */ }
+  showHint(said, event.clientX, event.clientY);
+});
+
+/* All rows as JSON, from the CSV that is inside the page. */
+const asJson = document.getElementById("as-json");
+if (asJson && "DecompressionStream" in window) {
+  asJson.hidden = false;
+  asJson.querySelector("button").addEventListener("click", async () => {
+    const link = document.querySelector("a[download='rows.csv.gz']");
+    const [names, ...lines] = parseCsv(await inflate(link.href.split(",")[1], "gzip").then((buffer) => new TextDecoder().decode(buffer)));
+    const number = /^-?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
+    const text = new Set(["run", "cells", "state_hash", "engine_version"]);
+    const rows = lines.map((line) => Object.fromEntries(names.map((name, k) => {
+      const value = line[k];
+      return [name, value === "" ? null : !text.has(name) && number.test(value) ? Number(value) : value];
+    })));
+    save("rows.json", JSON.stringify(rows, null, 1), "application/json");
+  });
+}
+function parseCsv(text) {
+  const rows = [[]];
+  let field = "", quoted = false;
+  for (let i = 0; i < text.length; i++) {
+    const c = text[i];
+    if (quoted) {
+      if (c === '"' && text[i + 1] === '"') { field += c; i++; }
+      else if (c === '"') quoted = false;
+      else field += c;
+    } else if (c === '"') quoted = true;
+    else if (c === ",") { rows.at(-1).push(field); field = ""; }
+    else if (c === "\n") { rows.at(-1).push(field); field = ""; rows.push([]); }
+    else field += c;
+  }
+  rows.pop();
+  return rows;
+}
+async function inflate(base64, format) {
+  const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format));
+  return new Response(stream).arrayBuffer();
+}

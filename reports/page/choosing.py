@@ -1,0 +1,231 @@
+"""Which engine for what: who passes every check of a scene, from which step on, at what cost; and what cures whom."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reports.page.conclusions import joined
+from reports.page.source import Plain, Source
+from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
+from reports.speed import duration
+from reports.wording import mark_of, number
+from validation.cells import Observation, format_dt
+from validation.tracks import SHOWN
+
+#: Scene, dimension.
+Line = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One engine and profile on one scene: the steps that ran, which of them pass every check, and the cost."""
+
+    engine: str
+    profile: str
+    steps: list[tuple[str, bool]]
+    largest: str
+    cost: float
+    cost_text: str
+    failing: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Candidates of a scene, those that pass first and the cheapest of them on top, with the answer in a sentence."""
+
+    scene: str
+    dimension: int
+    anchor: str
+    answer: str
+    candidates: list[Candidate]
+
+    @property
+    def good(self) -> list[Candidate]:
+        """Candidates that pass every check, the cheapest first."""
+        return [candidate for candidate in self.candidates if candidate.largest]
+
+
+def choices(source: Source) -> list[Choice]:
+    """One choice per scene and dimension."""
+    rows = [*source.rows, *(source.bench.rows if source.bench else ())]
+    grouped: dict[tuple[Any, ...], list[Plain]] = defaultdict(list)
+    for row in rows:
+        if row["iterations"] is None and row["outcome"] not in ("unsupported", "not_installed"):
+            grouped[row["scene"], row["dimension"], row["engine"], row["profile"], row["dt"]].append(row)
+    costs = _costs(source)
+    found = [_choice(source, line, grouped, costs) for line in source.lines]
+    return [choice for choice in found if choice is not None]
+
+
+def _costs(source: Source) -> dict[tuple[Any, ...], float]:
+    """Cost [s/s] by scene, dimension, engine, profile, step, at the profile's own iterations."""
+    if source.bench is None:
+        return {}
+    points = source.bench.tables["work_points"].to_dict("records")
+    own = [p for p in points if p["iterations"] is None or p["iterations"] != p["iterations"]]
+    return {(p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): p["cost"] for p in own}
+
+
+def _choice(
+    source: Source,
+    line: Line,
+    grouped: Mapping[tuple[Any, ...], Sequence[Plain]],
+    costs: Mapping[tuple[Any, ...], float],
+) -> Choice | None:
+    candidates = []
+    for column in source.columns:
+        steps = {key[4]: rows for key, rows in grouped.items() if key[:4] == (*line, *column)}
+        if steps:
+            candidates.append(_candidate(line, column, steps, costs))
+    if not candidates:
+        return None
+    candidates.sort(key=lambda c: (c.largest == "", math.inf if math.isnan(c.cost) else c.cost))
+    return Choice(*line, slug("choose", *line), _answer(candidates, source.bench is not None), candidates)
+
+
+def _candidate(
+    line: Line,
+    column: tuple[str, str],
+    steps: Mapping[float, Sequence[Plain]],
+    costs: Mapping[tuple[Any, ...], float],
+) -> Candidate:
+    passing = {dt: all(mark_of(r) in ("pass", "none") for r in rows) for dt, rows in steps.items()}
+    order = sorted(passing, reverse=True)
+    # A step counts only if every smaller one passes as well: what passes once by luck is no recommendation.
+    safe = [dt for k, dt in enumerate(order) if all(passing[finer] for finer in order[k:])]
+    cost = costs.get((*line, *column, safe[0]), math.nan) if safe else math.nan
+    bad = [row for rows in steps.values() for row in rows if mark_of(row) not in ("pass", "none")]
+    worst = max(bad, key=lambda row: (ratio_of(row) or 0.0, severity(row)), default=None)
+    families = dict.fromkeys(family_of(row["metric"]) for row in bad)
+    failing = ""
+    if worst is not None:
+        ratio = ratio_of(worst)
+        failing = joined(families) + (f" (worst: {number(ratio, 2)} tolerances)" if ratio else "")
+    return Candidate(
+        *column,
+        [(format_dt(dt), passing[dt]) for dt in order],
+        format_dt(safe[0]) if safe else "",
+        cost,
+        "" if math.isnan(cost) else duration(cost),
+        failing,
+    )
+
+
+def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
+    good = [c for c in candidates if c.largest]
+    if not good:
+        return "No engine passes every check at any step that ran."
+    priced = [c for c in good if c.cost_text]
+    names = joined(f"{c.engine}/{c.profile} (from dt = {c.largest} s)" for c in good)
+    if not priced:
+        missing = "" if timed else "; run crosscheck bench for their cost"
+        return f"{names} {'pass' if len(good) > 1 else 'passes'} every check{missing}."
+    best = priced[0]
+    also = [f"{c.engine}/{c.profile} at {c.largest} s ({c.cost_text})" for c in priced[1:4]]
+    said = f"Use {best.engine}/{best.profile} at dt = {best.largest} s: the cheapest that passes every check, "
+    said += f"{best.cost_text} of CPU per simulated second."
+    return said + (f" Next: {joined(also)}." if also else "")
+
+
+@dataclass(frozen=True)
+class Change:
+    """A setting that differs between two profiles of one engine."""
+
+    name: str
+    before: str
+    after: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Cure:
+    """An engine as shipped on one scene, and the profile that does better, with what it changes."""
+
+    scene: str
+    dimension: int
+    engine: str
+    profile: str
+    before: Mark
+    after: Mark
+    check: str
+    before_text: str
+    after_text: str
+    changes: list[Change]
+
+
+def cures(source: Source, shipped: str = "default", better: str = "tuned") -> list[Cure]:
+    """Engines that fail as shipped and whose other profile is nearer to the truth in the same worst check."""
+    found = []
+    for scene, dimension in source.lines:
+        for engine in source.engines:
+            cure = _cure(source, scene, dimension, engine, shipped, better)
+            if cure is not None:
+                found.append(cure)
+    return found
+
+
+def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str, better: str) -> Cure | None:
+    every = source.of(scene=scene, dimension=dimension, engine=engine)
+    before = [row for row in every if row["profile"] == shipped and row["physics"]]
+    after = {(str(row["params"]), row["dt"], row["iterations"], row["metric"]): row
+             for row in every if row["profile"] == better and row["physics"]}  # fmt: skip
+    failing = [row for row in before if row["physics"] == "fail" and row["iterations"] is None]
+    pairs = [(row, after.get((str(row["params"]), row["dt"], None, row["metric"]))) for row in failing]
+    known = [(a, b) for a, b in pairs if b is not None]
+    if not known:
+        return None
+    # The default cell of the scene is the one that people know, and its first check the plainest; else the worst.
+    plain = [pair for pair in known if not pair[0]["slot"]["params"]]
+    worst, same = plain[0] if plain else max(known, key=lambda pair: ratio_of(pair[0]) or 0.0)
+    if (ratio_of(same) or 0.0) >= (ratio_of(worst) or 0.0):
+        return None
+    where = " ".join(f"{name}={value:g}" for name, value in worst["slot"]["params"].items())
+    return Cure(
+        scene, dimension, engine, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
+        f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
+        _changes(source.observations, scene, dimension, engine, shipped, better),
+    )  # fmt: skip
+
+
+def _value(row: Plain) -> str:
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    return f"{number(row['value'], 4)}{unit} (truth {number(row['truth'], 4)}, tolerance {number(row['tolerance'], 2)})"
+
+
+def settings_of(
+    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
+) -> list[Mapping[str, Any]]:
+    """Settings of a profile on a scene, as its representative cell (else its first one) got them."""
+    own = [
+        o for o in observations
+        if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
+        and o.settings and o.slot.iterations is None
+    ]  # fmt: skip
+    shown = [o for o in own if o.slot.params == SHOWN.get(scene, ())]
+    return list((shown or own)[0].settings) if own else []
+
+
+def _changes(
+    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
+) -> list[Change]:
+    old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
+    new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
+    changes = []
+    for name, setting in new.items():
+        if name not in old or old[name]["value"] != setting["value"]:
+            was = setting_text(old[name]["value"]) if name in old else "as shipped"
+            changes.append(Change(name, was, setting_text(setting["value"]), setting["because"]))
+    return changes
+
+
+def setting_text(value: Any) -> str:
+    """A setting's value as people write it."""
+    if isinstance(value, bool) or value is None:
+        return str(value)
+    if isinstance(value, list | tuple):
+        return " ".join(setting_text(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

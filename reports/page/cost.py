@@ -1,0 +1,247 @@
+"""Speed: cost at equal error, error at equal cost, scaling, the binding's own cost, and how all of it was timed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import altair as alt
+import pandas as pd
+
+from reports.page.charts import dashes, log_scale, power_axis, styled, svg
+from reports.page.figures import Figure
+from reports.page.source import Bench, Source
+from reports.page.verdicts import slug
+from reports.speed import duration
+from reports.wording import number, reproduce
+from validation.bench.primary import PRIMARY
+from validation.cells import format_dt
+
+Plain = Mapping[Hashable, Any]
+
+
+@dataclass(frozen=True)
+class LevelCell:
+    """What an engine needs for one error (or reaches for one cost)."""
+
+    text: str
+    detail: str
+    best: bool
+    title: str
+
+
+@dataclass(frozen=True)
+class LevelTable:
+    """One scene and dimension: engines x levels."""
+
+    anchor: str
+    scene: str
+    dimension: int
+    name: str
+    levels: list[str]
+    rows: list[tuple[str, str, list[LevelCell]]]
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Everything of the section."""
+
+    run: str
+    cheapest: list[tuple[str, str, list[LevelCell]]]
+    cheapest_levels: list[str]
+    at_error: list[LevelTable]
+    at_cost: list[LevelTable]
+    multiples: list[Figure]
+    scaling: list[Figure]
+    fits: Sequence[Plain]
+    overhead: Sequence[Plain]
+    protocol: list[tuple[str, str]]
+    voided: list[str]
+
+
+def speed(source: Source) -> Speed | None:
+    """None without a bench run."""
+    bench = source.bench
+    if bench is None:
+        return None
+    tables = bench.tables
+    at_error = _level_tables(tables["time_at_equal_error"], "cost", 1e-6)
+    return Speed(
+        bench.run.id,
+        *_cheapest(tables["time_at_equal_error"]),
+        at_error,
+        _level_tables(tables["error_at_equal_time"], "error", 0.0),
+        _multiples(bench),
+        _scaling_figures(tables["scaling"]),
+        tables["scaling_fits"].to_dict("records"),
+        _overhead(tables["overhead"]),
+        _protocol(bench),
+        _voided(tables["timings"]),
+    )
+
+
+def level_text(level: float) -> str:
+    """``1e-3``."""
+    return f"{level:.0e}".replace("e-0", "e-").replace("e+00", "")
+
+
+def _cheapest(table: pd.DataFrame) -> tuple[list[tuple[str, str, list[LevelCell]]], list[str]]:
+    """Per scene and dimension the cheapest engine of each error level."""
+    if len(table) == 0:
+        return [], []
+    levels = sorted(set(table["level"]), reverse=True)
+    out = []
+    for (scene, dimension), group in table.groupby(["scene", "dimension"], sort=False):
+        cells = []
+        for level in levels:
+            found = group[(group["level"] == level) & (group["rank"] == 1)]
+            cells.append(
+                _cheapest_cell(found.iloc[0].to_dict()) if len(found) else LevelCell("none reaches it", "", False, "")
+            )
+        out.append((f"{scene} {dimension}-D", PRIMARY[str(scene)].name, cells))
+    return out, [level_text(level) for level in levels]
+
+
+def _cheapest_cell(row: Plain) -> LevelCell:
+    return LevelCell(
+        f"{row['engine']}/{row['profile']}", f"{duration(row['cost'])}, {_setting(row)}", True, reproduce(row["slot"])
+    )
+
+
+def _setting(row: Plain) -> str:
+    own = "" if row["iterations"] is None or pd.isna(row["iterations"]) else f" × {row['iterations']:.0f} it."
+    return f"dt {format_dt(row['dt'])}{own}"
+
+
+def _level_tables(table: pd.DataFrame, column: str, smallest: float) -> list[LevelTable]:
+    out: list[LevelTable] = []
+    if len(table) == 0:
+        return out
+    for (scene, dimension), group in table.groupby(["scene", "dimension"], sort=False):
+        levels = [level for level in sorted(set(group["level"]), reverse=column == "cost") if level >= smallest]
+        rows = []
+        for (engine, profile), own in group.groupby(["engine", "profile"], sort=False):
+            by_level = {row["level"]: row for row in own.to_dict("records")}
+            rows.append((str(engine), str(profile), [_level_cell(by_level[level], column) for level in levels]))
+        names = [level_text(level) if column == "cost" else duration(level) for level in levels]
+        anchor = slug("level", column, scene, dimension)
+        out.append(LevelTable(anchor, str(scene), int(str(dimension)), PRIMARY[str(scene)].name, names, rows))
+    return out
+
+
+def _level_cell(row: Plain, column: str) -> LevelCell:
+    value = float(row[column])
+    if not math.isfinite(value):
+        return LevelCell("–", "", False, str(row["reason"]))
+    factor = float(row["times_cheapest" if column == "cost" else "times_best"])
+    text = duration(value) if column == "cost" else number(value, 2)
+    times = "" if factor <= 1.0 or not math.isfinite(factor) else f", ×{factor:.3g}"
+    return LevelCell(text, _setting(row) + times, row["rank"] == 1, reproduce(row["slot"]))
+
+
+def _multiples(bench: Bench) -> list[Figure]:
+    """Small work-precision panels: the best settings of every profile, one panel per scene and dimension."""
+    points = bench.tables["work_points"]
+    if len(points) == 0:
+        return []
+    used = points[points["cost"].notna() & points["error"].notna() & points["on_front"]].copy()
+    used["shown"] = used["error"].clip(lower=1e-17)
+    figures = []
+    for (scene, dimension), table in used.groupby(["scene", "dimension"], sort=False):
+        figures.append(_multiple(str(scene), int(str(dimension)), table))
+    return figures
+
+
+def _multiple(scene: str, dimension: int, table: pd.DataFrame) -> Figure:
+    primary, style = PRIMARY[scene], styled(table)
+    x_scale, x_ticks = log_scale(list(table["cost"]), 1.6)
+    y_scale, y_ticks = log_scale(list(table["shown"]), 3.0)
+    x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", x_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", y_ticks))
+    table = table.assign(label=[
+        f"{r['engine']}/{r['profile']}, {_setting(r)}: error {number(r['error'], 2)}, {duration(r['cost'])}"
+        for r in table.to_dict("records")
+    ])[["cost", "shown", "engine", "profile", "label"]]  # fmt: skip
+    thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7, aria=False)
+    points = alt.Chart(table).mark_point(filled=True, size=40)
+    chart = alt.layer(
+        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"]),
+        points.encode(x=x, y=y, description="label:N", **style),
+    ).properties(width=215, height=180)
+    title = f"{scene} {dimension}-D"
+    return Figure(f"fig-multiple-{title}", title, "", svg(chart, f"Work and precision, {title}"))
+
+
+def _scaling_figures(table: pd.DataFrame) -> list[Figure]:
+    """Cost of a step against bodies or iterations."""
+    out: list[Figure] = []
+    if len(table) == 0:
+        return out
+    used = table[(table["void"] == "") & table["per_step"].notna()]
+    for (purpose, scene, dimension), group in used.groupby(["purpose", "scene", "dimension"], sort=False):
+        out.append(_scaling_figure(str(purpose), str(scene), int(str(dimension)), group))
+    return out
+
+
+def _scaling_figure(purpose: str, scene: str, dimension: int, group: pd.DataFrame) -> Figure:
+    rows = [
+        {
+            "engine": r["engine"], "profile": r["profile"], "x": r["x"], "y": r["per_step"],
+            "label": f"{r['engine']}/{r['profile']}, {r['x']:g} {purpose}: {duration(r['per_step'])} per step, "
+            f"error {number(None if pd.isna(r['error']) else r['error'], 2)}",
+        }
+        for r in group.to_dict("records")
+    ]  # fmt: skip
+    data = pd.DataFrame(rows)
+    style = styled(data)
+    x_scale, x_ticks = log_scale(list(data["x"]), 1.3)
+    y_scale, y_ticks = log_scale(list(data["y"]), 1.5)
+    x = alt.X("x:Q", scale=x_scale, axis=power_axis(purpose, x_ticks))
+    y = alt.Y("y:Q", scale=y_scale, axis=power_axis("CPU time per step [s]", y_ticks))
+    thin = alt.Chart(data).mark_line(strokeWidth=1.2, opacity=0.75, aria=False)
+    points = alt.Chart(data).mark_point(filled=True, size=40)
+    chart = alt.layer(
+        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(data), detail=["engine:N", "profile:N"]),
+        points.encode(x=x, y=y, description="label:N", **style),
+    ).properties(width=330, height=220)
+    title = f"{scene} {dimension}-D, cost against {purpose}"
+    return Figure(f"fig-scaling-{title}", title, "", svg(chart, title))
+
+
+def _overhead(table: pd.DataFrame) -> Sequence[Plain]:
+    """One row per engine, profile and dimension: empty and flight, plain and with every state read."""
+    rows: dict[tuple[Any, ...], dict[Hashable, Any]] = {}
+    for r in table.to_dict("records"):
+        key = (r["engine"], r["profile"], r["dimension"])
+        row = rows.setdefault(key, {"engine": r["engine"], "profile": r["profile"], "dimension": r["dimension"]})
+        value = duration(r["per_step"]) if math.isfinite(r["per_step"]) else "–"
+        row[f"{r['scene']}{'_sampled' if r['sampled'] else ''}"] = value
+    return list(rows.values())
+
+
+def _protocol(bench: Bench) -> list[tuple[str, str]]:
+    """The protocol as it was kept, one line each; nested tables flattened."""
+    return [
+        (name.replace("_", " "), _said(value))
+        for name, value in bench.protocol.items()
+        if value not in (None, "", [], {})
+    ]
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "; ".join(f"{k}: {_said(v)}" for k, v in value.items())
+    if isinstance(value, list):
+        return "; ".join(_said(item) for item in value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _voided(timings: pd.DataFrame) -> list[str]:
+    """Timings that were taken and must not be used, with the reason."""
+    if len(timings) == 0:
+        return []
+    void = timings[timings["void"] != ""].to_dict("records")
+    said = (f"{r['engine']}/{r['profile']} {r['scene']} {r['dimension']}-D ({r['purpose']}): {r['void']}" for r in void)
+    return list(dict.fromkeys(said))

@@ -1,0 +1,181 @@
+"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; effective against asked restitution."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import altair as alt
+import pandas as pd
+
+from reports.page.charts import styled, svg
+from reports.page.figures import Figure
+from reports.page.source import Plain, Source
+from reports.palette import colours_of, shape_of
+from reports.wording import number
+from validation.posed import resolve
+from validation.tolerances import APEXES
+
+#: Materials that people know, with the coefficient that is usually quoted for them.
+PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
+FAINT = (0.9, 0.5)
+
+
+@dataclass(frozen=True)
+class Effective:
+    """Restitution that an engine and profile realise where a scene asks for ``asked``."""
+
+    engine: str
+    profile: str
+    asked: float
+    low: float
+    high: float
+    speeds: str
+
+
+@dataclass(frozen=True)
+class Explorer:
+    """Data of the slider, its picture without JavaScript, the map and the table of effective restitution."""
+
+    data: dict[str, Any]
+    figure: Figure
+    maps: list[Figure]
+    effective: list[Effective]
+    answers: list[str]
+
+
+def explorer(source: Source) -> Explorer | None:
+    """None if the run has no bounce and no impact."""
+    heights, rebounds = _heights(source), _rebounds(source)
+    if not heights and not rebounds:
+        return None
+    colours = colours_of(source.engines)
+    series = [
+        {
+            "name": f"{engine}/{profile}", "colour": colours[engine], "shape": shape_of(profile),
+            "heights": {f"{e:g}": values for e, values in sorted(heights.get((engine, profile), {}).items())},
+        }
+        for engine, profile in source.columns if heights.get((engine, profile))
+    ]  # fmt: skip
+    measured = sorted({float(e) for entry in series for e in entry["heights"]})
+    data = {"presets": PRESETS, "faint": FAINT, "apexes": APEXES, "measured": measured, "series": series}
+    return Explorer(
+        data, _picture(heights, 0.8), _maps(rebounds), _effective(rebounds, source.columns), _answers(rebounds)
+    )
+
+
+def _heights(source: Source) -> dict[tuple[str, str], dict[float, list[float]]]:
+    """Mean apex heights over drop heights, h_n/h0 for n = 1.., by engine and profile and restitution (planar first)."""
+    sums: dict[tuple[str, str], dict[float, dict[int, list[float]]]] = defaultdict(lambda: defaultdict(dict))
+    rows = [r for r in source.of(scene="bounce") if r["metric"].startswith("apex[") and r["value"] is not None]
+    for row in sorted(rows, key=lambda r: r["dimension"]):
+        place = sums[row["engine"], row["profile"]][row["params"]["e"]]
+        n = int(row["metric"][5:-1])
+        if row["iterations"] is None and row["dimension"] == min(r["dimension"] for r in rows):
+            place.setdefault(n, []).append(row["value"] / row["params"]["height"])
+    found: dict[tuple[str, str], dict[float, list[float]]] = defaultdict(dict)
+    for column, by_e in sums.items():
+        for e, by_n in by_e.items():
+            if by_n:
+                found[column][e] = [round(sum(by_n[n]) / len(by_n[n]), 5) for n in sorted(by_n)]
+    return found
+
+
+def _rebounds(source: Source) -> list[Plain]:
+    """Rebound ratios of the impact scene: a zero-gravity scene, so that the ratio is the restitution."""
+    rows = source.of(scene="impact", metric="rebound_ratio")
+    return [row for row in rows if row["value"] is not None and row["iterations"] is None]
+
+
+def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]], e: float) -> Figure:
+    """The explorer as a still: law, faint curves, and points of engines at one restitution."""
+    n = range(0, 9)
+    law = pd.DataFrame([{"n": k, "h": c ** (2 * k), "e": c} for c in (e, *FAINT) for k in n])
+    rows = [
+        {
+            "n": k + 1, "h": h, "engine": engine, "profile": profile,
+            "label": f"{engine}/{profile}: h{k + 1} = {h:.4g} h0",
+        }
+        for (engine, profile), by_e in heights.items() for k, h in enumerate(by_e.get(e, ()))
+    ]  # fmt: skip
+    x = alt.X("n:Q", axis=alt.Axis(title="bounce n", tickMinStep=1, format="d"), scale=alt.Scale(domain=[0, 8]))
+    y = alt.Y("h:Q", axis=alt.Axis(title="apex height h_n / h0"), scale=alt.Scale(domain=[0, 1]))
+    curves = alt.Chart(law).mark_line(color="currentColor", point=False, aria=False)
+    opacity = alt.condition(f"datum.e == {e}", alt.value(0.8), alt.value(0.22))
+    layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity)]
+    if rows:
+        table = pd.DataFrame(rows)
+        points = alt.Chart(table).mark_point(filled=True, size=60)
+        layers.append(points.encode(x=x, y=y, description="label:N", **styled(table)))
+    title = f"Apex heights for e = {e:g}"
+    picture = svg(alt.layer(*layers).properties(width=620, height=320), title)
+    return Figure(
+        "fig-explorer", title, "Line: h_n = e^(2n) h0. Faint: e = 0.9 and e = 0.5. Points: measured.", picture
+    )
+
+
+def _maps(rebounds: Sequence[Plain]) -> list[Figure]:
+    """Effective against asked restitution, one panel per approach speed (planar, else spatial)."""
+    if not rebounds:
+        return []
+    dimension = min(row["dimension"] for row in rebounds)
+    speeds = sorted({row["params"]["v"] for row in rebounds})
+    return [_map([r for r in rebounds if r["params"]["v"] == v and r["dimension"] == dimension], v) for v in speeds]
+
+
+def _map(rows: Sequence[Plain], speed: float) -> Figure:
+    table = pd.DataFrame(
+        {
+            "engine": row["engine"], "profile": row["profile"], "asked": row["params"]["e"], "got": row["value"],
+            "label": f"{row['engine']}/{row['profile']}: asked {row['params']['e']:g}, got {number(row['value'], 4)}",
+        }
+        for row in rows
+    )  # fmt: skip
+    x = alt.X("asked:Q", axis=alt.Axis(title="restitution asked for", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
+              scale=alt.Scale(domain=[-0.03, 1.03], nice=False))  # fmt: skip
+    top = max(1.03, float(table["got"].max()) * 1.05)
+    y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured"), scale=alt.Scale(domain=[-0.03, top], nice=False))
+    ideal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
+    line = ideal.mark_line(color="currentColor", opacity=0.18, strokeWidth=7, aria=False).encode(x=x, y=y)
+    style = styled(table)
+    thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7, aria=False)
+    points = alt.Chart(table).mark_point(filled=True, size=48, opacity=0.9)
+    chart = alt.layer(
+        line,
+        thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"]),
+        points.encode(x=x, y=y, description="label:N", **style),
+    ).properties(width=220, height=210)
+    title = f"Impact at {speed:g} m/s"
+    return Figure(f"fig-map-{speed:g}", title, "", svg(chart, f"Effective against requested restitution, {title}"))
+
+
+def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) -> list[Effective]:
+    """Range of measured restitution over speeds and dimensions, per engine, profile and asked value."""
+    found = []
+    for engine, profile in columns:
+        own = [row for row in rebounds if (row["engine"], row["profile"]) == (engine, profile)]
+        for e in sorted({row["params"]["e"] for row in own}):
+            values = [(row["value"], row["params"]["v"]) for row in own if row["params"]["e"] == e]
+            speeds = ", ".join(f"{v:g}" for v in sorted({speed for _, speed in values}))
+            found.append(Effective(engine, profile, e, min(values)[0], max(values)[0], speeds))
+    return found
+
+
+def _answers(rebounds: Sequence[Plain]) -> list[str]:
+    """For each engine as shipped that misses: how wrong its restitution is at the scene's own values, and the cure."""
+    defaults = {p.name: p.default for p in resolve("impact").parameters}
+    said = []
+    own = [r for r in rebounds if all(r["params"][k] == defaults[k] for k in ("e", "v"))]
+    for engine in dict.fromkeys(row["engine"] for row in own):
+        values = {row["profile"]: row["value"] for row in own if row["engine"] == engine}
+        shipped, asked = values.get("default"), defaults["e"]
+        if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
+            continue
+        better = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}
+        best = min(better, key=lambda p: abs(better[p] - asked), default=None)
+        cure = "" if best is None else f"; profile {best} gives {number(better[best], 4)}"
+        said.append(f"{engine} as shipped rebounds with {number(shipped, 3)} where {asked:g} is asked{cure}.")
+    return said

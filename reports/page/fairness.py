@@ -1,0 +1,225 @@
+"""Fairness sheet: everything a maintainer needs to check, or to contest, how an engine was treated."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from adapters import registry
+from adapters.engine import EngineFacts
+from adapters.planted_faults import CAUGHT_BY
+from reports.page.choosing import Cure, cures, setting_text
+from reports.page.conclusions import FindingFamily, findings
+from reports.page.source import Source
+from reports.page.verdicts import slug
+from reports.wording import number
+from validation.cells import Observation
+from validation.deviations import deviations_of
+from validation.findings import listed, reasons
+
+#: The engine that is ours; its failures are shown first.
+OURS = "reference"
+
+
+@dataclass(frozen=True)
+class SettingLine:
+    """One setting of a profile; ``where`` names the scenes if the value depends on what a scene needs."""
+
+    name: str
+    value: str
+    where: str
+    because: str
+    source: str
+
+
+@dataclass(frozen=True)
+class ReceiptLine:
+    """One quantity of a profile, at the cell whose measurement is farthest from what is declared."""
+
+    quantity: str
+    asked: str
+    declared: str
+    measured: str
+    holds: str
+    differs: bool
+    because: str
+
+
+@dataclass(frozen=True)
+class ProfileSheet:
+    """A profile's settings, receipts, and what had to be changed in the start state."""
+
+    name: str
+    settings: list[SettingLine]
+    receipts: list[ReceiptLine]
+    changes: list[str]
+
+
+@dataclass(frozen=True)
+class Law:
+    """Deviation laws of one mechanism."""
+
+    profiles: str
+    where: str
+    because: str
+    source: str
+    explained: int
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One reason of the list of known findings, with how many rows of this run carry it."""
+
+    id: str
+    text: str
+    source: str
+    where: str
+    count: int
+
+
+@dataclass(frozen=True)
+class EngineSheet:
+    """Everything about one engine."""
+
+    name: str
+    anchor: str
+    facts: EngineFacts | None
+    versions: str
+    profiles: list[ProfileSheet]
+    laws: list[Law]
+    listed: list[Listed]
+    has_list: bool
+    unsupported: list[tuple[str, str, int]]
+
+
+@dataclass(frozen=True)
+class Fairness:
+    """The whole sheet."""
+
+    ours: list[tuple[str, int, list[FindingFamily]]]
+    cures: list[Cure]
+    engines: list[EngineSheet]
+    planted: Mapping[str, str]
+
+
+def fairness(source: Source) -> Fairness:
+    """Compute the sheet."""
+    own = [(mark, sum(f.count for f in fs), fs) for mark, _, every in findings(source)
+           if (fs := [f for f in every if f.engine == OURS])]  # fmt: skip
+    return Fairness(own, _once(cures(source)), [_sheet(source, name) for name in source.engines], CAUGHT_BY)
+
+
+def _once(every: Iterable[Cure]) -> list[Cure]:
+    """One cure per engine and scene: what cures the plane cures space."""
+    first: dict[tuple[str, str], Cure] = {}
+    for cure in every:
+        first.setdefault((cure.engine, cure.scene), cure)
+    return list(first.values())
+
+
+def _sheet(source: Source, engine: str) -> EngineSheet:
+    own = [o for o in source.observations if o.slot.engine == engine]
+    profiles = list(dict.fromkeys(o.slot.profile for o in own))
+    sheets = [_profile(name, [o for o in own if o.slot.profile == name]) for name in profiles]
+    versions = ", ".join(dict.fromkeys(o.engine_version for o in own if o.engine_version))
+    return EngineSheet(
+        engine, slug("fairness", engine), registry.facts(engine), versions, sheets, _laws(source, engine),
+        _listed(source, engine), listed(engine) is not None, _unsupported(own),
+    )  # fmt: skip
+
+
+def _profile(name: str, observations: Sequence[Observation]) -> ProfileSheet:
+    changes = dict.fromkeys(text for o in observations for text in o.initial_change)
+    return ProfileSheet(name, _settings(observations), _receipts(observations), list(changes))
+
+
+def _settings(observations: Sequence[Observation]) -> list[SettingLine]:
+    """One line per setting and value; iteration counts asked for by a sweep are no part of a profile."""
+    found: dict[str, dict[tuple[str, str, str], dict[str, None]]] = defaultdict(lambda: defaultdict(dict))
+    for o in observations:
+        if o.slot.iterations is None:
+            for s in o.settings:
+                key = (setting_text(s["value"]), s["because"], s["source"])
+                found[s["name"]][key][f"{o.slot.scene} {o.slot.dimension}-D"] = None
+    everywhere = {where for values in found.values() for scenes in values.values() for where in scenes}
+    lines = []
+    for name, values in found.items():
+        merged: dict[tuple[str, str], list[str]] = defaultdict(list)
+        for (value, because, origin), scenes in values.items():
+            covered = scenes.keys() >= everywhere
+            merged[because, origin].append(value if covered else f"{value} ({_where(scenes)})")
+        for (because, origin), texts in merged.items():
+            shown = "; ".join(texts[:4]) + (f"; and {len(texts) - 4} more" if len(texts) > 4 else "")
+            lines.append(SettingLine(name, shown, "", because, origin))
+    return lines
+
+
+def _where(scenes: Iterable[str]) -> str:
+    """``impact, stack 3-D``: the dimension only where a scene is not meant in both."""
+    dimensions: dict[str, list[str]] = defaultdict(list)
+    for text in scenes:
+        name, _, dimension = text.rpartition(" ")
+        dimensions[name].append(dimension)
+    return ", ".join(name if len(own) > 1 else f"{name} {own[0]}" for name, own in dimensions.items())
+
+
+def _receipts(observations: Sequence[Observation]) -> list[ReceiptLine]:
+    """Per quantity the receipt that comes closest to leaving its band, or is farthest outside."""
+    groups: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    for o in observations:
+        for slip in o.receipts:
+            groups[slip["quantity"]].append(slip)
+    lines = []
+    for quantity, slips in groups.items():
+        measured = [s for s in slips if isinstance(s["measured"], float | int) and s["measured"] == s["measured"]]
+        held = sum(bool(s["holds"]) for s in slips)
+        if not measured:
+            lines.append(
+                ReceiptLine(quantity, "–", "–", "not measured", f"{held}/{len(slips)}", False, slips[0]["because"])
+            )
+            continue
+        worst = max(
+            measured, key=lambda s: (not s["holds"], abs(s["measured"] - s["declared"]) / (s["band"] or 1e-300))
+        )
+        lines.append(ReceiptLine(
+            quantity, number(worst["asked"], 4), f"{number(worst['declared'], 4)} ± {number(worst['band'], 2)}",
+            number(worst["measured"], 6), f"{held}/{len(slips)}", worst["declared"] != worst["asked"], worst["because"],
+        ))  # fmt: skip
+    return lines
+
+
+def _laws(source: Source, engine: str) -> list[Law]:
+    """Laws by mechanism: profiles, scenes and metrics they speak about, and rows of this run they explain."""
+    groups: dict[tuple[str, str], dict[str, dict[str, None]]] = defaultdict(lambda: {"profiles": {}, "where": {}})
+    for law in deviations_of(engine):
+        group = groups[law.because, law.source]
+        group["profiles"] |= dict.fromkeys(law.profiles)
+        group["where"][f"{law.scene}/{law.metric.replace('[[]', '[')}"] = None
+    explained = [row["reason"] for row in source.of(engine=engine, standing="explained")]
+    return [
+        Law(", ".join(g["profiles"]), ", ".join(g["where"]), because, origin, sum(because in r for r in explained))
+        for (because, origin), g in groups.items()
+    ]
+
+
+def _listed(source: Source, engine: str) -> list[Listed]:
+    """Reasons that speak about this engine; the wildcard of an engine is everybody's."""
+    rows = [row["reason"] for row in source.of(engine=engine) if row["standing"] == "known"]
+    found = []
+    for reason in reasons().values():
+        if reason.engine in (engine, "*"):
+            where = f"{reason.profile} on {reason.scene}/{reason.metric}"
+            count = sum(reason.text in text for text in rows)
+            found.append(Listed(reason.id, reason.text, reason.source, where, count))
+    return found
+
+
+def _unsupported(observations: Iterable[Observation]) -> list[tuple[str, str, int]]:
+    """What the engine cannot be asked, with its reason."""
+    counts: dict[tuple[str, str], int] = defaultdict(int)
+    for o in observations:
+        if o.outcome.value in ("unsupported", "not_installed"):
+            counts[f"{o.slot.profile} on {o.slot.scene} {o.slot.dimension}-D", o.reason] += 1
+    return [(where, reason, n) for (where, reason), n in counts.items()]

@@ -1,0 +1,206 @@
+"""Replays: recordings of all engines on one scene, packed for the page's player, with the truth as a ghost.
+
+    header (JSON): times, bodies, series          one block of 16-bit integers, differenced along time, deflated
+
+The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
+`validation.tracks` were computed from the full trajectory when the cell ran.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from reports.page import figures
+from reports.page.figures import Figure
+from reports.page.source import Source
+from reports.page.verdicts import slug
+from reports.palette import colours_of, dash_of
+from reports.wording import params_text, reproduce
+from validation.cells import Slot, format_dt
+from validation.posed import resolve
+from validation.tracks import Recording
+
+#: Levels of a length over the largest extent of the scene: half a pixel of a screen 8000 pixels wide.
+LENGTHS = 16000
+#: Levels of a contact's point and impulse: an arrow is read to a hundredth at best.
+ARROWS = 250
+#: Levels of an angle per radian, and of a quaternion's component.
+ANGLES = 4000
+#: What an engine threw further than this many times the exact motion's extent is not followed by the camera.
+FOLLOWED = 3.0
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One scene and dimension, for the player and, without JavaScript, as a figure and a table."""
+
+    id: str
+    title: str
+    settings: str
+    data: dict[str, Any]
+    figure: Figure | None
+    departures: list[tuple[str, str, float | None, str, str]]
+
+
+def replays(source: Source) -> list[Replay]:
+    """All scenes that were recorded, in the order of the run."""
+    groups: dict[tuple[str, int], list[tuple[Slot, Recording]]] = defaultdict(list)
+    for slot, recording in source.replays:
+        groups[slot.scene, slot.dimension].append((slot, recording))
+    order = [line for line in source.lines if line in groups]
+    return [_replay(source, *line, groups[line]) for line in order]
+
+
+def _replay(source: Source, name: str, dimension: int, members: Sequence[tuple[Slot, Recording]]) -> Replay:
+    slot = members[0][0]
+    canonical = resolve(name)
+    scene = canonical.scene(dimension, dict(slot.params))
+    track = canonical.track(scene)
+    t = max((recording.t for _, recording in members), key=len)
+    exact = None if track is None else np.array([track.position(float(s)) for s in t])
+    tracked = None if track is None else scene.index(track.body)
+    title = f"{name} {dimension}-D"
+    return Replay(
+        slug("replay", name, dimension),
+        title,
+        f"{params_text(scene.params)}, dt = {format_dt(slot.dt)} s",
+        _data(source, scene, members, t, exact, tracked),
+        _figure(title, scene, members, exact, tracked),
+        [(s.engine, s.profile, r.departure, r.finish, reproduce(s.as_dict())) for s, r in members],
+    )  # fmt: skip
+
+
+def _data(
+    source: Source,
+    scene: Scene,
+    members: Sequence[tuple[Slot, Recording]],
+    t: NDArray[np.float64],
+    exact: NDArray[np.float64] | None,
+    tracked: int | None,
+) -> dict[str, Any]:
+    colours, d = colours_of(source.engines), scene.dimension
+    free = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+    low, high = _view(scene, members, exact, tracked, free)
+    unit = float(max(high - low)) / LENGTHS
+    strongest = max((float(np.abs(r.impulse).max()) for _, r in members if len(r.impulse)), default=1.0)
+    blocks: list[NDArray[np.int16]] = []
+    series = []
+    for slot, recording in members:
+        blocks += [_pose_levels(recording.pose[:, free], d, unit), *_arrow_levels(recording, unit, strongest)]
+        series.append({
+            "name": f"{slot.engine}/{slot.profile}", "colour": colours[slot.engine],
+            "dash": list(dash_of(slot.profile)), "frames": len(recording.t), "contacts": len(recording.frame),
+            "departure": recording.departure, "finish": recording.finish,
+        })  # fmt: skip
+    if exact is not None:
+        blocks.append(_differenced(np.round(exact / unit)))
+    raw = np.concatenate([block.ravel() for block in blocks]).astype("<i2").tobytes()
+    return {
+        "dimension": d, "t": [round(float(s), 6) for s in t], "bodies": [_body(scene, i) for i in free],
+        "fixed": [_body(scene, i) for i in range(len(scene.bodies)) if i not in free],
+        "tracked": None if tracked is None else free.index(tracked), "low": _plain(low), "high": _plain(high),
+        "unit": unit, "angle": 1.0 / ANGLES, "arrow": strongest / ARROWS, "gravity": list(scene.gravity),
+        "static": exact is not None and bool(np.ptp(exact, axis=0).max() == 0.0), "series": series,
+        "packed": base64.b64encode(zlib.compress(raw, 9)).decode(),
+    }  # fmt: skip
+
+
+def _plain(values: NDArray[np.float64]) -> list[float]:
+    return [round(float(value), 6) for value in values]
+
+
+def _view(
+    scene: Scene,
+    members: Sequence[tuple[Slot, Recording]],
+    exact: NDArray[np.float64] | None,
+    tracked: int | None,
+    free: Sequence[int],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of what the camera shows: bodies at start, the exact motion, and engines as far as they are followed."""
+    d = scene.dimension
+    start = np.array([scene.bodies[i].pose[:d] for i in free])
+    reach = max(_reach(scene, i) for i in free)
+    known = start if exact is None else np.concatenate([start, exact])
+    low, high = known.min(0) - reach, known.max(0) + reach
+    room = FOLLOWED * (high - low)
+    for _, recording in members:
+        seen = recording.pose[:, free, :d].reshape(-1, d)
+        low = np.minimum(low, np.maximum(seen.min(0) - reach, low - room))
+        high = np.maximum(high, np.minimum(seen.max(0) + reach, high + room))
+    return low, high
+
+
+def _reach(scene: Scene, i: int) -> float:
+    shape = scene.bodies[i].shape
+    if isinstance(shape, Box):
+        return float(np.linalg.norm(shape.half_extents))
+    return shape.radius if isinstance(shape, Disc | Sphere) else 0.0
+
+
+def _body(scene: Scene, i: int) -> dict[str, Any]:
+    body = scene.bodies[i]
+    shape, d = body.shape, scene.dimension
+    plain: dict[str, Any] = {"name": body.name, "start": list(body.pose)}
+    if isinstance(shape, Box):
+        return plain | {"type": "box", "half": list(shape.half_extents)}
+    if isinstance(shape, HalfSpace):
+        return plain | {"type": "face", "normal": list(shape.normal), "offset": shape.offset}
+    return plain | {"type": "ball", "radius": shape.radius, "dimension": d}
+
+
+def _pose_levels(pose: NDArray[np.float64], dimension: int, unit: float) -> NDArray[np.int16]:
+    """Frames x bodies x components as integers, differenced along time."""
+    d = dimension
+    return _differenced(np.concatenate([np.round(pose[..., :d] / unit), np.round(pose[..., d:] * ANGLES)], axis=-1))
+
+
+def _differenced(levels: NDArray[np.float64]) -> NDArray[np.int16]:
+    """First frame, then changes; sums wrap around like the browser's 16-bit integers."""
+    clipped = np.clip(np.nan_to_num(levels), -32000, 32000).astype(np.int64)
+    return np.diff(clipped, axis=0, prepend=0).astype(np.int16)
+
+
+def _arrow_levels(recording: Recording, unit: float, strongest: float) -> list[NDArray[np.int16]]:
+    """Frames (differenced), points and impulses of all contacts."""
+    coarse = unit * LENGTHS / ARROWS
+    return [
+        np.diff(recording.frame, prepend=0).astype(np.int16),
+        np.clip(np.round(recording.point / coarse), -32000, 32000).astype(np.int16),
+        np.round(recording.impulse / strongest * ARROWS).astype(np.int16),
+    ]
+
+
+def _figure(
+    title: str,
+    scene: Scene,
+    members: Sequence[tuple[Slot, Recording]],
+    exact: NDArray[np.float64] | None,
+    tracked: int | None,
+) -> Figure | None:
+    """What the player shows, without JavaScript: the coordinate that travels most, or the distance from rest."""
+    if exact is None or tracked is None:
+        return None
+    d, axes = scene.dimension, ("x", "y") if scene.dimension == 2 else ("x", "y", "z")
+    travel = np.ptp(exact, axis=0)
+    moving = bool(travel.max() > 0.0)
+    along = int(np.argmax(travel))
+    parts = []
+    for slot, r in members:
+        seen = r.pose[:, tracked, :d]
+        value = seen[:, along] if moving else np.maximum(np.linalg.norm(seen - exact[: len(seen)], axis=1), 1e-6)
+        parts.append(pd.DataFrame({"t": r.t, "value": value, "engine": slot.engine, "profile": slot.profile}))
+    name = scene.bodies[tracked].name
+    longest = max((r.t for _, r in members), key=len)
+    truth = pd.DataFrame({"t": longest, "value": exact[:, along]}) if moving else None
+    what = f"{axes[along]} of {name} [m]" if moving else f"distance of {name} from rest [m]"
+    return figures.motion(pd.concat(parts), truth, what, f"{title}: {name} over time")
