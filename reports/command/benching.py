@@ -1,7 +1,8 @@
-"""``bench``: what an answer of a given error costs."""
+"""``bench`` and ``profile``: what an answer of a given error costs, and where the solver's own time goes."""
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import sys
@@ -18,13 +19,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from adapters.scene import SceneError
 from reports import speed
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import request_from, selection
+from reports.command.selection import parameter, request_from, selection
 from reports.progress import run_plan
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.primary import PRIMARY
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
-from validation.bench.units import Unit
+from validation.bench.units import Unit, prepared
+from validation.cells import Slot, parse_dt
 from validation.store import Run, Store, StoreError
 from validation.workers import TIMEOUT
 
@@ -146,3 +148,31 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
         f"{row[f'ratio_{k}']:.3g} [{row[f'ratio_low_{k}']:.3g}, {row[f'ratio_high_{k}']:.3g}]" for k in (1, 2)
     )
     return f"  {what} {row['params_text']} x{row['iterations']:g}: {first}, now {second}"
+
+
+@main.command("profile")
+@click.argument("scene")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
+@click.option("--profile", default="reference", show_default=True, help="Profile of the reference solver.")
+@click.option("--dim", default=2, show_default=True, type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
+@click.option("--dt", default="1/240", show_default=True, metavar="S", help="Step.")
+@click.option("--steps", default=2000, show_default=True, type=click.IntRange(1), help="Timed steps.")
+@AS_JSON
+def profile_(scene: str, param: tuple[str, ...], profile: str, dim: int, dt: str, steps: int, as_json: bool) -> None:
+    """Say where the time of the reference solver's steps goes: the median time of each stage of a step.
+
+    SCENE is a scene of the catalogue, or pyramid (--param rows=13).
+    """
+    from reference_solver.timeline import timeline
+
+    slot = Slot(scene, tuple(map(parameter, param)), dim, "reference", profile, parse_dt(dt))
+    engine, posed, settings, _ = prepared(slot)
+    simulation: Any = engine.build(posed, slot.dt, settings)
+    stages = timeline(simulation.solver, steps, warm_up=24)
+    total = sum(stages.values())
+    if as_json:
+        click.echo(json.dumps({"per_step_s": total, "stages_s": stages}, indent=1))
+        return
+    for name, seconds in stages.items():
+        click.echo(f"{name:<20} {speed.duration(seconds):>9}  {seconds / total:4.0%}")
+    click.echo(f"{'a step':<20} {speed.duration(total):>9}  median of {steps} steps")

@@ -15,7 +15,8 @@ from validation.posed import is_file
 from validation.scenes import matching
 
 
-def _parameter(text: str) -> tuple[str, float]:
+def parameter(text: str) -> tuple[str, float]:
+    """Read ``NAME=VALUE``."""
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise SceneError(f"param: {text!r} is not of the form NAME=VALUE")
@@ -44,7 +45,7 @@ def request_from(options: dict[str, Any]) -> Request:
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
-        params=dict(map(_parameter, options["param"])) or None,
+        params=dict(map(parameter, options["param"])) or None,
         suite="full" if options["full"] else "quick",
         ulps=tuple(options["ulp"]) or (0,),
         floors=options["full"] and not options["ulp"],

@@ -148,7 +148,7 @@ def scene_of(slot: Slot) -> Scene:
     if slot.scene == "flight":
         return _scene(slot, (ball("ball", slot.dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), {})
     if slot.scene == "pyramid":
-        return _scene(slot, (floor(slot.dimension), *_pyramid(slot.dimension, int(params["rows"]))), params)
+        return _scene(slot, (floor(slot.dimension), *_pyramid(slot.dimension, int(params.get("rows", 4)))), params)
     return resolve(slot.scene).scene(slot.dimension, params)
 
 
