@@ -17,8 +17,14 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" -c constraints.txt
 	@touch $@
 
+# The verdicts decide the exit status; time and report are made whatever they are.
 run: $(STAMP)
-	$(BIN)/crosscheck run --quick --out $(OUT)
+	@status=0; \
+	$(BIN)/crosscheck run --quick --out $(OUT) || status=$$?; \
+	test $$status -le 1 || exit $$status; \
+	$(BIN)/crosscheck bench --quick --out $(OUT) || exit 2; \
+	echo "report:"; $(BIN)/crosscheck report --out $(OUT) || exit 2; \
+	exit $$status
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto

@@ -50,7 +50,8 @@ def _load_run(folder: Path, run_id: str) -> Side:
         judged = [run for run in store.runs() if run.id not in {bench.id for bench in timed}]
         run = store.run(run_id) if run_id != "latest" or not judged else judged[-1]
         source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
-        table = [row for bench in source for row in ratios(store, bench).to_dict("records")]
+        tables = [ratios(store, bench) for bench in source]
+        table = [{str(k): v for k, v in row.items()} for t in tables for row in t.to_dict("records")]
         return Side([row.as_dict() for row in rows_of(run.id, store.observations(run))], table)
     finally:
         store.close()

@@ -164,10 +164,25 @@ def compare_speeds(before: Iterable[Plain], after: Iterable[Plain]) -> list[Chan
             continue
         slot = slot_from_dict(b[key]["slot"])
         size = b[key]["ratio"] / a[key]["ratio"]
-        said = [f"{row['ratio']:.3g} x {row['opponent']}" for row in (a[key], b[key])]
+        was, now = (f"{row['ratio']:.3g} x {row['opponent']}" for row in (a[key], b[key]))
         note = f"interval x{low:.3g} to x{high:.3g}, threshold x{PRACTICAL:g}; {b[key]['purpose']}"
-        identity = (slot.engine, slot.profile, slot.scene, slot.dimension, slot.params_text(), "time")
-        changes.append(Change(Kind.SPEED, size > 1.0, *identity, *said, size, b[key]["slot"], note))
+        changes.append(
+            Change(
+                Kind.SPEED,
+                size > 1.0,
+                slot.engine,
+                slot.profile,
+                slot.scene,
+                slot.dimension,
+                slot.params_text(),
+                "time",
+                was,
+                now,
+                size,
+                b[key]["slot"],
+                note,
+            )
+        )
     return sorted(changes, key=by_seriousness)
 
 

@@ -84,7 +84,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive."""
-    text = click.get_text_stream("stdin").read()
+    text = sys.stdin.read()
     cells = [_slot(line) for line in (text.splitlines() if batch else [text]) if line.strip()]
     if not cells:
         raise SceneError("slot: nothing on stdin")
