@@ -133,7 +133,7 @@ def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:
     """Say how far two bench runs agree; True if far enough."""
     both = agreement.agreement(agreement.ratios(store, earlier), agreement.ratios(store, run))
     if len(both) == 0:
-        console.print(f"against {earlier.id}: the two runs have no unit in common")
+        console.print(f"against {earlier.id}: the two runs have no unit of the same versions in common")
         return False
     share = float(both["agrees"].mean())
     for row in both[~both["agrees"]].to_dict("records"):

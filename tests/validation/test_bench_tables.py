@@ -208,6 +208,12 @@ def test_two_runs_of_the_same_agree_and_a_slow_down_of_a_tenth_does_not(store):
     assert not agreement(base, ratios(store, slower))["agrees"].any()
 
 
+def test_versions_that_differ_are_not_compared(store):
+    first, second = planted_lane(store, 1.5, "bench one"), planted_lane(store, 1.5, "bench two")
+    other = ratios(store, second).assign(opponent_version="2.0")
+    assert len(agreement(ratios(store, first), other)) == 0
+
+
 def test_a_sweep_asks_for_all_phases_at_every_step_and_count():
     sweep = Sweep(Request(["impact"], ["reference"], profiles=["classical"], dimensions=[2]), dts=STEPS, iterations=[1])
     slots = accuracy_slots(sweep)

@@ -22,8 +22,9 @@ from validation.store import Run, Store
 def ratios(store: Store, run: Run) -> pd.DataFrame:
     """Ratio of each unit's time to its opponent's in the same round: what survives a busy machine.
 
-    One row per unit, unsampled: `POINT`, ``purpose``, ``params``, ``opponent``, ``ratio`` (median over rounds),
-    ``ratio_low``, ``ratio_high`` (bootstrap interval), ``rounds``.
+    One row per unit, unsampled: `POINT`, ``purpose``, ``params``, ``engine_version``, ``opponent``,
+    ``opponent_version``, ``ratio`` (median over rounds), ``ratio_low``, ``ratio_high`` (bootstrap interval),
+    ``rounds``.
     """
     by_unit: dict[tuple[Any, ...], dict[int, Timing]] = defaultdict(dict)
     for timing in store.timings(run):
@@ -37,7 +38,9 @@ def ratios(store: Store, run: Run) -> pd.DataFrame:
             continue
         logs = [math.log(_rate(own[k]) / _rate(partner[k])) for k in rounds]
         found = spread(logs)
-        row = {"purpose": purpose, **identity(slot), "opponent": own[rounds[0]].opponent, "rounds": len(rounds)}
+        first, other = own[rounds[0]], partner[rounds[0]]
+        row = {"purpose": purpose, **identity(slot), "opponent": first.opponent, "rounds": len(rounds)}
+        row |= {"engine_version": first.engine_version, "opponent_version": other.engine_version}
         row |= {"ratio": math.exp(found.median), "ratio_low": math.exp(found.low), "ratio_high": math.exp(found.high)}
         rows.append(row)
     return table_of(rows)
@@ -57,16 +60,16 @@ def _rate(timing: Timing) -> float:
 def agreement(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
     """Ratios of two bench runs side by side: ``agrees`` where their intervals overlap.
 
-    Rows: units that both have; columns ``ratio``, ``ratio_low``, ``ratio_high`` with the endings ``_1`` and ``_2``.
+    Rows: units that both have, with the same versions of both engines; columns ``ratio``, ``ratio_low``, ``ratio_high`` with the endings ``_1`` and ``_2``.
     """
-    keys = ["purpose", *POINT, "params_text"]
+    keys = ["purpose", *POINT, "params_text", "engine_version", "opponent", "opponent_version"]
 
     def keyed(table: pd.DataFrame) -> pd.DataFrame:
         out = table.copy()
         out["params_text"] = [repr(sorted(params.items())) for params in out["params"]]
         out["iterations"] = out["iterations"].astype(float).fillna(0.0)
-        return out[[*keys, "opponent", "ratio", "ratio_low", "ratio_high"]]
+        return out[[*keys, "ratio", "ratio_low", "ratio_high"]]
 
-    both = keyed(first).merge(keyed(second), on=[*keys, "opponent"], suffixes=("_1", "_2"))
+    both = keyed(first).merge(keyed(second), on=keys, suffixes=("_1", "_2"))
     both["agrees"] = (both["ratio_low_1"] <= both["ratio_high_2"]) & (both["ratio_low_2"] <= both["ratio_high_1"])
     return both
