@@ -60,7 +60,8 @@ def _rate(timing: Timing) -> float:
 def agreement(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
     """Ratios of two bench runs side by side: ``agrees`` where their intervals overlap.
 
-    Rows: units that both have, with the same versions of both engines; columns ``ratio``, ``ratio_low``, ``ratio_high`` with the endings ``_1`` and ``_2``.
+    Rows: units that both have, with the same versions of both engines; columns ``ratio``, ``ratio_low``,
+    ``ratio_high`` with the endings ``_1`` and ``_2``.
     """
     keys = ["purpose", *POINT, "params_text", "engine_version", "opponent", "opponent_version"]
 
