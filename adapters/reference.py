@@ -47,7 +47,8 @@ REASONS = {
     "slop": "overlap that is left alone [m]",
     "warm_starting": "each contact starts from its impulse of the step before, matched by feature",
     "solver": "scalar: row after row, the textbook; block: the rows of a manifold together, which does not stall",
-    "margin": "touching counts as contact to this share of the smallest half width, nothing farther away does",
+    "margin": "pairs with e = 0 are contacts within this share of the smallest half width, closed by at most the gap; "
+    "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
 }
 
 
