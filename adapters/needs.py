@@ -74,8 +74,7 @@ def needs(scene: Scene) -> Needs:
         regime=_regime(bool(materials), restitution, loaded),
         slide=friction > 0.0 and (spin or _tangential(scene)),
         smallest_size=min((body.shape.smallest_size for body in free), default=1.0),
-        top_speed=max((math.hypot(*body.twist[:d]) for body in scene.bodies), default=0.0)
-        + gravity * scene.duration,
+        top_speed=max((math.hypot(*body.twist[:d]) for body in scene.bodies), default=0.0) + gravity * scene.duration,
         mass_ratio=max(masses) / min(masses),
         gravity=gravity,
     )
