@@ -22,9 +22,10 @@ MOST_WITH_FRICTION = 6
 #: Contacts that are enumerated without friction: two modes each, 4096 linear systems.
 MOST_WITHOUT = 12
 
-#: Wrong signs up to this share of the problem's own scale are round-off: 1e4 units in the last place, what a linear
-#: system of condition 1e4 loses.
-SIGN = 1e-12
+#: Wrong signs up to this share of the problem's own scale are round-off: 64 units in the last place; where nothing
+#: is found so, 1e5 of them, what a linear system of condition 1e4 loses. Sharp first: it decides on which side of
+#: the cone's edge a contact stands.
+SIGNS = (1.4e-14, 2e-11)
 #: Solutions whose velocities differ by less than this share of the scale are one: modes meet at their borders
 #: (sticking with the impulse on the cone, slipping at speed zero).
 SAME = 1e-9
@@ -85,8 +86,8 @@ def coulomb_solutions(
         raise ValueError(f"friction: {count} contacts, enumeration with friction ends at {MOST_WITH_FRICTION}")
     choices = [_modes(mu, sign) for mu, sign in zip(friction, sliding or (0.0,) * count, strict=True)]
     scale = np.repeat(1.0 / np.sqrt(np.diag(matrix)[::2]), 2)
-    found = _enumerate(scale[:, None] * matrix * scale, scale * free, choices, friction, sliding is not None)
-    return _unscaled(found, scale, 2)
+    w, q = scale[:, None] * matrix * scale, scale * free
+    return _unscaled(_found(w, q, choices, friction, sliding is not None), scale, _size(q), 2)
 
 
 def frictionless_solutions(matrix: Array, free: Array) -> list[ContactSolution]:
@@ -110,8 +111,9 @@ def frictionless_solutions(matrix: Array, free: Array) -> list[ContactSolution]:
     # as a problem with tangential rows that nothing acts on
     wide, q = np.zeros((2 * count, 2 * count)), np.zeros(2 * count)
     wide[::2, ::2], q[::2] = scale[:, None] * matrix * scale, scale * free
-    found = _enumerate(wide, q, [("separate", "slip")] * count, (0.0,) * count, False)
-    return _unscaled(((m, p.reshape(-1, 2)[:, 0], u.reshape(-1, 2)[:, 0]) for m, p, u in found), scale, 1)
+    found = _found(wide, q, [("separate", "slip")] * count, (0.0,) * count, False)
+    narrow = ((modes, p[::2], u[::2]) for modes, p, u in found)
+    return _unscaled(narrow, scale, _size(q), 1)
 
 
 def non_negative_least_squares(matrix: Array, right: Array) -> tuple[Array, float]:
@@ -156,22 +158,37 @@ def _modes(mu: float, sign: float) -> tuple[str, ...]:
     return ("separate", "stick", "slip+", "slip-")
 
 
-def _enumerate(
+def _found(
     w: Array, q: Array, choices: Sequence[tuple[str, ...]], friction: Sequence[float], continuous: bool
+) -> list[tuple[tuple[str, ...], Array, Array]]:
+    for sign in SIGNS:
+        found = list(_enumerate(w, q, choices, friction, continuous, sign))
+        if found:
+            break
+    return found
+
+
+def _enumerate(
+    w: Array, q: Array, choices: Sequence[tuple[str, ...]], friction: Sequence[float], continuous: bool, sign: float
 ) -> Iterator[tuple[tuple[str, ...], Array, Array]]:
     """Yield (modes, p, u) of every combination that contradicts none of the law's signs."""
-    size = max(float(np.abs(q).max(initial=0.0)), 1e-300)
+    size = _size(q)
     for modes in product(*choices):
         rows, generators = _closed(modes, friction, len(q))
         p = np.zeros(len(q))
         if rows:
-            weights = _weights(w[rows] @ generators, -q[rows], size)
+            weights = _weights(w[rows] @ generators, -q[rows], size, sign)
             if weights is None:
                 continue
             p = generators @ weights
         u = w @ p + q
-        if _signs_hold(modes, u, SIGN * max(size, float(np.abs(w @ p).max())), continuous, choices):
+        if _signs_hold(modes, u, sign * max(size, float(np.abs(w @ p).max())), continuous, choices):
             yield modes, p, u
+
+
+def _size(q: Array) -> float:
+    """Speed that signs and differences of a problem are measured against."""
+    return max(float(np.abs(q).max(initial=0.0)), 1e-300)
 
 
 def _closed(modes: Sequence[str], friction: Sequence[float], size: int) -> tuple[list[int], Array]:
@@ -193,14 +210,14 @@ def _closed(modes: Sequence[str], friction: Sequence[float], size: int) -> tuple
     return rows, generators
 
 
-def _weights(a: Array, b: Array, size: float) -> Array | None:
+def _weights(a: Array, b: Array, size: float, sign: float) -> Array | None:
     """Non-negative solution of the square system a x = b; None if there is none."""
     singular = np.linalg.svd(a, compute_uv=False)
     if singular[-1] > REDUNDANT * singular[0]:
         x = np.asarray(np.linalg.solve(a, b))
-        return np.maximum(x, 0.0) if x.min() >= -SIGN * max(size, float(np.abs(x).max())) else None
+        return np.maximum(x, 0.0) if x.min() >= -sign * max(size, float(np.abs(x).max())) else None
     nearest, residual = non_negative_least_squares(a, b)
-    return nearest if residual <= 1e3 * SIGN * size else None
+    return nearest if residual <= sign * size else None
 
 
 def _signs_hold(
@@ -217,12 +234,13 @@ def _signs_hold(
     return True
 
 
-def _unscaled(found: Iterable[tuple[tuple[str, ...], Array, Array]], scale: Array, width: int) -> list[ContactSolution]:
+def _unscaled(
+    found: Iterable[tuple[tuple[str, ...], Array, Array]], scale: Array, size: float, width: int
+) -> list[ContactSolution]:
     kept: list[ContactSolution] = []
     seen: list[Array] = []
     for modes, p, u in found:
-        size = max((float(np.abs(other).max()) for other in [*seen, u]), default=0.0)
-        if all(np.abs(u - other).max() > SAME * size for other in seen):
+        if all(np.abs(u - other).max() > SAME * max(size, float(np.abs(u).max())) for other in seen):
             seen.append(u)
             kept.append(ContactSolution(modes, (scale * p).reshape(-1, width), (u / scale).reshape(-1, width)))
     return kept

@@ -14,9 +14,6 @@ from reference_solver.model import Array
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
-#: A turning box is followed for this many turns; what it has not met by then it is said not to meet.
-TURNS = 1000.0
-
 
 class BoxGaps:
     """Distances of the box from the other bodies along its flight."""
@@ -110,8 +107,25 @@ class BoxGaps:
         def step(tau: float) -> float:
             return first_fall(max(gap(tau), 0.0), rate(tau), -curvature)
 
-        begin = first_fall(0.0, first_rate, -curvature) if start == 0.0 else 0.0
-        return base + first_touch(gap, step, touch, max(begin, 0.0), TURNS * 2.0 * math.pi / abs(spin))
+        begin = 0.0
+        if start == 0.0:
+            # it leaves with this acceleration, which changes by at most omega^3 |r|: the gap is open until then
+            lift = a - spin * spin * float(n @ self.levers(base)[corner])
+            begin = max(first_fall(0.0, first_rate, -curvature), 1.5 * lift / (abs(spin) ** 3 * lever))
+        return base + first_touch(gap, step, touch, begin, self._clear_time(plane, base, a, lever, spin))
+
+    def _clear_time(self, plane: int, base: float, a: float, lever: float, spin: float) -> float:
+        """Time after which no corner can reach a plane, however the box turns; inf where it must come back [s]."""
+        f, n = self.flight, self.bodies.normal[plane]
+        height = float(n @ (f.position(self.box, base) - f.position(plane, base)) - self.bodies.offset[plane])
+        rise = float(n @ (f.velocity(self.box, base) - f.v0[plane]))
+        if a < 0.0 or (a == 0.0 and rise < 0.0):
+            return math.inf
+        if a == 0.0 and rise == 0.0:
+            return 2.0 * math.pi / abs(spin)
+        lacking = max(lever - height, 0.0)  # rise t + a t^2 / 2 = lacking, the later root
+        root = math.sqrt(rise * rise + 2.0 * a * lacking)
+        return 2.0 * lacking / (rise + root) if rise > 0.0 else (root - rise) / a
 
     def _meet_disc(self, disc: int) -> float:
         """Time at which the outline meets a disc, by steps that the fastest possible closing cannot outrun."""
@@ -121,7 +135,6 @@ class BoxGaps:
         turning = abs(float(f.w0[i, 0])) * float(self.bodies.reach[i])
         a = float(np.hypot(*(f.a0[disc] - f.a0[i])))
         v = f.velocity(disc, base) - f.velocity(i, base)
-        horizon = TURNS * 2.0 * math.pi / abs(f.w0[i, 0]) if turning else self._passing_time(disc, base, v, a)
 
         def gap(tau: float) -> float:
             return self.nearest(disc, base + tau)[0]
@@ -137,15 +150,18 @@ class BoxGaps:
                 return base
             # leave the touching range: one step of the contact's own size at the fastest rate
             begin = 1e-9 * float(self.bodies.reach[disc]) / max(float(np.hypot(*v)) + turning, 1e-300)
-        return base + first_touch(gap, step, touch, begin, horizon)
+        return base + first_touch(gap, step, touch, begin, self._passing_time(disc, base, v, a))
 
     def _passing_time(self, disc: int, base: float, v: Array, a: float) -> float:
-        """Time after which a disc that flies straight has passed a box that does not turn [s]."""
-        speed = float(np.hypot(*v))
-        if a > 0.0 or speed == 0.0:
-            return math.inf if a > 0.0 else 0.0
+        """Time after which a disc is out of the box's reach for good, or has seen a whole turn of it [s]."""
+        speed, spin = float(np.hypot(*v)), abs(float(self.flight.w0[self.box, 0]))
         away = np.hypot(*(self.flight.position(disc, base) - self.flight.position(self.box, base)))
-        return float(away + self.bodies.reach[[disc, self.box]].sum()) / speed
+        way = float(away + self.bodies.reach[[disc, self.box]].sum())
+        if a > 0.0:
+            return first_fall(way, speed, -a)  # a t^2 / 2 - speed t beats the distance and both reaches
+        if speed > 0.0:
+            return way / speed
+        return 2.0 * math.pi / spin if spin > 0.0 else 0.0
 
     def _closing(self, disc: int, t: float) -> bool:
         f, i = self.flight, self.box

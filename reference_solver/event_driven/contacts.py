@@ -156,6 +156,12 @@ class Rows:
         result: Array = self.jacobian @ motion.ravel()
         return result
 
+    def bound(self, impulse: Array) -> tuple[Array, Array]:
+        """Sizes of the parts that `response` sums, which its round-off is proportional to."""
+        d = self.bodies.dimension
+        parts = (self.inverse * (np.abs(self.jacobian).T @ np.abs(impulse))).reshape(len(self.involved), -1)
+        return parts[:, :d], parts[:, d:]
+
     def response(self, impulse: Array) -> tuple[Array, Array]:
         """Change of linear (k, d) and angular (k, r) velocity of the involved bodies."""
         d = self.bodies.dimension

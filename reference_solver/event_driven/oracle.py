@@ -82,6 +82,7 @@ class EventDriven:
         self.bodies = Bodies(model)
         self.flight = Flight(model, self.bodies)
         self.time = 0.0
+        self.steps = 0
         self.events: list[Event] = []
         self._geometry = Geometry(self.bodies, self.flight)
         self._impacts = Impacts(self.bodies, self.flight)
@@ -114,8 +115,9 @@ class EventDriven:
             first = min(t, sticking[1])
             if first > until or first == math.inf:
                 break
-            if len(self.events) >= self.most_events:
+            if self.steps >= self.most_events:
                 raise TooManyEvents(self.time, f"{self.most_events} events")
+            self.steps += 1
             if sticking[0] is not None and sticking[1] <= t:
                 self._stick(sticking[0], max(sticking[1], self.time))
             else:

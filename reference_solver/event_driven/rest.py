@@ -148,8 +148,10 @@ class Rest:
             raise ContactParadox(t, "the forces of lasting contact have no solution: an impact without collision")
         force = min(found, key=lambda solution: float(np.abs(solution.impulse).sum())).impulse
         linear, angular = rows.response(force.ravel())
-        self.flight.a0[rows.involved] += linear
-        self.flight.b0[rows.involved] += angular
+        parts, turning_parts = rows.bound(force.ravel())
+        for k, i in enumerate(rows.involved):
+            _add_balanced(self.flight.a0[i], linear[k], parts[k])
+            _add_balanced(self.flight.b0[i], angular[k], turning_parts[k])
         scale = BALANCED * max(float(np.abs(force).max()), 1e-300)
         return [float(f[0]) > scale for f in force]
 
@@ -219,6 +221,13 @@ class Rest:
     def _skip(self, key: Key, value: int) -> None:
         if self.bodies.box not in key[:2]:
             self.bodies.skipped[key[0], key[1]] = self.bodies.skipped[key[1], key[0]] = value
+
+
+def _add_balanced(acceleration: Array, change: Array, parts: Array) -> None:
+    """Add, in place; forces in balance leave nothing, where round-off would move resting bodies with t^2."""
+    bound = STILL * (np.abs(acceleration).max() + parts.max())
+    acceleration += change
+    acceleration[np.abs(acceleration) <= bound] = 0.0
 
 
 def _swept(spin: Array, lever: Array) -> Array:
