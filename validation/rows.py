@@ -16,7 +16,7 @@ from validation.deviations import covering
 from validation.findings import finding_of, listed, reason_for, row_key
 from validation.posed import resolve
 from validation.studies import STUDIES, StudyResult
-from validation.verdicts import Physics, Standing, Verdict, judge, predicted
+from validation.verdicts import Physics, Prediction, Standing, Verdict, judge, judge_physics, predicted
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
@@ -105,16 +105,24 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
     slot = observation.slot
     value, why = observation.metrics.get(check.metric, (None, ""))
     if observation.outcome in (Outcome.OK, Outcome.INVALID):
-        laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
         has_list = listed(slot.engine) is not None
         finding = finding_of(slot, check.metric)
-        verdict = judge(value, check, predicted(laws, scene, slot), finding, has_list)
+        verdict = judge(value, check, _predictions(observation, scene, check, value), finding, has_list)
         if observation.outcome is Outcome.INVALID:
             verdict = Verdict(None, None, observation.reason)
     else:
         verdict = _verdict_of_outcome(observation, check)
     reason = "; ".join(text for text in (why, verdict.reason) if text)
     return _assemble(run, observation, slot, dict(scene.params), check, value, verdict, reason)
+
+
+def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
+    """What laws say about a FAIL. They state what a profile's own settings do, so not at iterations asked for."""
+    slot = observation.slot
+    if judge_physics(value, check) is not Physics.FAIL or slot.iterations is not None:
+        return []
+    laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
+    return predicted(laws, scene, slot)
 
 
 def _verdict_of_outcome(observation: Observation, check: Check) -> Verdict:

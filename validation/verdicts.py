@@ -21,6 +21,10 @@ from validation.deviation import Deviation
 from validation.findings import Finding
 
 
+#: A law, the value it predicts, and the band it allows.
+Prediction = tuple[Deviation, float, float]
+
+
 class Physics(Enum):
     """Against the truth."""
 
@@ -61,7 +65,7 @@ def is_marginal(value: float, check: Check) -> bool:
     return 0.5 * check.bound <= abs(value - check.truth) <= 2.0 * check.bound
 
 
-def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot) -> list[tuple[Deviation, float, float]]:
+def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot) -> list[Prediction]:
     """Laws that say something about this scene and step, with value and band."""
     said = ((law, law.law(scene, slot.dt)) for law in laws)
     return [(law, *prediction) for law, prediction in said if prediction is not None]
@@ -70,7 +74,7 @@ def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot) -> list[tuple
 def judge(
     value: float | None,
     check: Check,
-    predictions: Iterable[tuple[Deviation, float, float]],
+    predictions: Iterable[Prediction],
     finding: Finding | None,
     has_list: bool,
 ) -> Verdict:
