@@ -1,0 +1,249 @@
+"""The report in a real browser, offline: no request, no error, complete without JavaScript, usable by keyboard."""
+
+import json
+import re
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+WIDTHS = {"phone": 390, "laptop": 1280, "wide": 1920}
+
+
+@contextmanager
+def opened(browser, file, anchor="", width=1280, **options):
+    """A page that must cause no request, console message, error or policy violation until it is closed."""
+    context = browser.new_context(viewport={"width": width, "height": 800}, offline=True, **options)
+    page, wrong = context.new_page(), []
+    page.on("console", lambda message: wrong.append(f"console {message.type}: {message.text}"))
+    page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
+    page.on("request", lambda request: wrong.append(f"request: {request.url[:80]}"))
+    url = file.as_uri() + anchor
+    page.goto(url)
+    page.wait_for_load_state("networkidle")
+    allowed = f"request: {file.as_uri()[:80]}"
+    yield page
+    context.close()
+    assert [entry for entry in wrong if not entry.startswith(allowed) and "data:" not in entry] == []
+
+
+def until(page, condition):
+    """Wait for a condition; the page's policy forbids the evaluation that Playwright's own waiting needs."""
+    for _ in range(200):
+        if page.evaluate(f"() => {condition}"):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(condition)
+
+
+def test_the_page_asks_for_nothing_and_complains_about_nothing(browser, page_file):
+    with opened(browser, page_file) as page:
+        for summary in page.locator("summary").all():
+            summary.evaluate("node => node.parentElement.open = true")
+        assert page.title().startswith("contact-crosscheck")
+
+
+def test_the_policy_stops_a_script_that_is_injected(browser, page_file):
+    context = browser.new_context(offline=True)
+    page = context.new_page()
+    page.goto(page_file.as_uri())
+    page.evaluate(
+        "() => { const s = document.createElement('script'); s.textContent = 'window.hacked = 3';"
+        "document.body.append(s); const b = document.createElement('b');"
+        "b.setAttribute('onclick', 'window.hacked = 4'); document.body.append(b); b.click(); }"
+    )
+    assert page.evaluate("window.hacked") is None
+    context.close()
+
+
+def test_a_scene_named_like_a_script_is_shown_as_text(browser, page_file):
+    with opened(browser, page_file) as page:
+        assert page.evaluate("window.hacked") is None
+        assert page.locator("img").count() == 0
+        assert "<script>window.hacked=1</script>" in page.locator("main").inner_text()
+
+
+def test_without_javascript_verdicts_plots_and_tables_are_there(browser, page_file):
+    with opened(browser, page_file, java_script_enabled=False) as page:
+        assert page.locator(".matrix tbody tr").count() >= 5
+        assert "pass" in page.locator(".matrix").inner_text()
+        plots = page.locator("#scene-impact figure.plot svg")
+        assert plots.count() >= 2
+        assert plots.first.bounding_box()["height"] > 100
+        assert page.locator("#explorer-still svg").bounding_box()["height"] > 100
+        assert page.locator("a[download='rows.csv.gz']").get_attribute("href").startswith("data:application/gzip")
+        for id in ("player", "explorer-live"):
+            assert not page.locator(f"#{id}").is_visible()
+        assert page.locator("button:visible").count() == 0  # a button without JavaScript would do nothing
+
+
+def test_every_link_of_the_page_leads_somewhere(browser, page_file):
+    with opened(browser, page_file) as page:
+        dead = page.evaluate(
+            "() => [...document.querySelectorAll(\"a[href^='#']\")].map(a => a.getAttribute('href').slice(1))"
+            ".filter(id => !document.getElementById(id))"
+        )
+        assert dead == []
+        assert page.evaluate("() => { const ids = [...document.querySelectorAll('[id]')].map(e => e.id);"
+                             "return ids.filter((id, k) => ids.indexOf(id) !== k); }") == []  # fmt: skip
+
+
+def test_a_field_of_the_matrix_leads_to_its_row_and_the_row_to_its_opened_check(browser, page_file):
+    with opened(browser, page_file) as page:
+        page.locator(".matrix a.m", has_text="explained").first.click()
+        row = page.locator("tr:target")
+        assert row.is_visible()
+        row.locator("a.m").first.click()
+        assert page.locator("details:target").evaluate("node => node.open")
+
+
+def picture(page):
+    return page.locator("#replay-canvas").evaluate("node => node.toDataURL()")
+
+
+def test_the_replay_plays_steps_jumps_and_magnifies_by_mouse_and_keyboard(browser, page_file):
+    with opened(browser, page_file, "#replay") as page:
+        page.locator("#player").wait_for(state="visible")
+        until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
+        page.select_option("#replay-scene", "replay-bounce-2")
+        until(page, "document.getElementById('replay-time').max > 100")
+        start = picture(page)
+        canvas, time = page.locator("#replay-canvas"), page.locator("#replay-time")
+        canvas.focus()
+        for _ in range(40):
+            page.keyboard.press("ArrowRight")
+        assert time.input_value() == "40"
+        assert picture(page) != start
+        page.keyboard.press("Home")
+        assert time.input_value() == "0" and picture(page) == start
+        page.keyboard.press("End")
+        assert time.input_value() == time.get_attribute("max")
+        page.keyboard.press("Home")
+        page.keyboard.press("Space")
+        until(page, "document.getElementById('replay-time').value > 0")
+        page.keyboard.press("Space")
+        assert page.locator("#replay-play").inner_text() == "Play"
+        page.locator("#replay-jumps button", has_text="bullet/default").click()
+        departed = float(re.search(r"at ([\d.]+) s", page.locator("#replay-jumps button").first.inner_text())[1])
+        assert float(page.locator("#replay-clock").inner_text().split()[0]) == pytest.approx(departed, abs=1 / 60)
+        here = picture(page)
+        page.select_option("#replay-magnify", "10")
+        assert picture(page) != here
+        page.select_option("#replay-magnify", "1")
+        page.locator("#replay-series input").nth(2).click()
+        assert picture(page) != here
+        box = time.bounding_box()
+        page.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + 0.5 * box["height"])
+        share = float(time.input_value()) / float(time.get_attribute("max"))
+        assert share == pytest.approx(0.75, abs=0.05)
+
+
+def test_both_layouts_show_every_engine(browser, page_file):
+    with opened(browser, page_file, "#replay") as page:
+        until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
+        pictures = []
+        for layout in ("over", "beside"):
+            page.select_option("#replay-layout", layout)
+            pictures.append(picture(page))
+        assert pictures[0] != pictures[1]
+        assert page.locator("#replay-series label").count() == 4
+
+
+def test_a_spatial_replay_offers_three_views(browser, page_file):
+    with opened(browser, page_file, "#replay") as page:
+        until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
+        assert not page.locator("#replay-plane").is_visible()
+        page.select_option("#replay-scene", "replay-impact-3")
+        page.locator("#replay-plane").wait_for(state="visible")
+        front = picture(page)
+        page.select_option("#replay-plane", "xy")
+        assert picture(page) != front
+
+
+def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
+    with opened(browser, page_file, "#explorer") as page:
+        curve = page.locator("#explorer-plot polyline").last
+        before = curve.get_attribute("points")
+        points = page.locator("#explorer-plot path[role]").count()
+        assert points > 0
+        page.locator("#explorer-e").focus()
+        page.keyboard.press("ArrowLeft")
+        assert page.locator("#explorer-value").inner_text() == "0.79"
+        assert page.locator("#explorer-plot polyline").last.get_attribute("points") != before
+        page.locator("button.preset", has_text="clay").click()
+        assert page.locator("#explorer-value").inner_text() == "0.00"
+        assert "does not rise" in page.locator("#explorer-says").inner_text()
+        page.locator("button.preset", has_text="rubber").click()
+        assert page.locator("#explorer-plot polyline").last.get_attribute("points") == before
+        linear = page.locator("#explorer-plot").inner_html()
+        page.locator("#explorer-log").check()
+        assert page.locator("#explorer-plot").inner_html() != linear
+
+
+def test_a_chart_point_says_what_it_is(browser, page_file):
+    with opened(browser, page_file, "#scene-impact") as page:
+        point = page.locator(
+            "#fig-work-impact-2 path[role='graphics-symbol'][aria-label*='per simulated second']"
+        ).first
+        point.hover()
+        hint = page.locator("#hint")
+        assert hint.is_visible()
+        assert "dt 1/" in hint.inner_text() and "error" in hint.inner_text()
+        page.keyboard.press("Escape")
+        assert not hint.is_visible()
+
+
+@pytest.mark.parametrize("kind", ["CSV", "SVG", "PNG"])
+def test_tables_and_plots_can_be_saved(browser, page_file, kind):
+    selector = "#choose button.save" if kind == "CSV" else f"#scene-impact button.save:has-text('{kind}')"
+    with opened(browser, page_file) as page:
+        with page.expect_download() as found:
+            page.locator(selector).first.click()
+        content = Path(found.value.path()).read_bytes()
+    heads = {"CSV": b"scene,", "SVG": b"<svg ", "PNG": b"\x89PNG"}
+    assert content.startswith(heads[kind])
+
+
+def test_rows_come_out_as_json_with_numbers_as_numbers(browser, page_file, page_source):
+    with opened(browser, page_file, "#tables") as page:
+        with page.expect_download() as found:
+            page.locator("#as-json button").click()
+        rows = json.loads(Path(found.value.path()).read_bytes())
+    assert len(rows) == len(page_source.rows)
+    assert [row["value"] for row in rows] == [row["value"] for row in page_source.rows]
+    assert [row["because"] for row in rows] == [row["because"] for row in page_source.rows]
+
+
+@pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
+def test_no_width_scrolls_sideways(browser, page_file, width):
+    with opened(browser, page_file, width=width) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_serious_issue(browser, page_file, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install axe-playwright-python").Axe()
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, offline=True, color_scheme=scheme)
+    page = context.new_page()
+    page.goto(page_file.as_uri())
+    page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+    found = axe.run(page).response["violations"]
+    context.close()
+    serious = [
+        (issue["id"], node["target"], node.get("failureSummary"))
+        for issue in found if issue["impact"] in ("serious", "critical") for node in issue["nodes"][:3]
+    ]  # fmt: skip
+    assert serious == []
+
+
+def test_light_and_dark_swap_paper_and_ink(browser, page_file):
+    seen = {}
+    for scheme in ("light", "dark"):
+        with opened(browser, page_file, color_scheme=scheme) as page:
+            style = page.evaluate(
+                "() => { const s = getComputedStyle(document.body); return [s.backgroundColor, s.color]; }"
+            )
+            seen[scheme] = [sum(map(int, re.findall(r"\d+", colour)[:3])) for colour in style]
+    assert seen["light"][0] > seen["light"][1]
+    assert seen["dark"][0] < seen["dark"][1]
