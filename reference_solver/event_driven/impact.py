@@ -11,7 +11,13 @@ from reference_solver.event_driven.bodies import Bodies
 from reference_solver.event_driven.contacts import Contact, Rows
 from reference_solver.event_driven.errors import ContactParadox, LeavesClosedForm
 from reference_solver.event_driven.flight import Flight
-from reference_solver.exact_contact import ContactSolution, coulomb_solutions, frictionless_solutions
+from reference_solver.exact_contact import (
+    MOST_WITH_FRICTION,
+    MOST_WITHOUT,
+    ContactSolution,
+    coulomb_solutions,
+    frictionless_solutions,
+)
 from reference_solver.model import Array
 
 #: A rebound slower than this share of the fastest impact that its bodies ever had ends an accumulation of impacts:
@@ -156,6 +162,9 @@ def _solve(rows: Rows, free: Array, friction: Sequence[float], t: float) -> tupl
     """Impulses of the law's solution, the smallest where there are several, and how many there are."""
     if len(free) == 1:
         return np.maximum(-free / rows.matrix[0], 0.0), 1
+    most = MOST_WITHOUT if rows.width == 1 else MOST_WITH_FRICTION
+    if len(friction) > most:
+        raise LeavesClosedForm(t, f"{len(friction)} contacts at once, enumeration ends at {most}")
     found: list[ContactSolution]
     if rows.width == 1:
         found = frictionless_solutions(rows.matrix, free)

@@ -11,7 +11,7 @@ from reference_solver.event_driven.bodies import PLANE, Bodies
 from reference_solver.event_driven.contacts import Contact, Geometry, Key, Rows
 from reference_solver.event_driven.errors import ContactParadox, LeavesClosedForm
 from reference_solver.event_driven.flight import Flight
-from reference_solver.exact_contact import MOST_WITH_FRICTION, coulomb_solutions, frictionless_solutions
+from reference_solver.exact_contact import MOST_WITH_FRICTION, MOST_WITHOUT, coulomb_solutions, frictionless_solutions
 from reference_solver.model import Array
 
 #: Relative speeds below this share of the bodies' speeds are round-off: 64 units in the last place.
@@ -129,8 +129,9 @@ class Rest:
         self, contacts: list[Contact], mu: list[float], slips: list[Array], slides: list[bool], t: float
     ) -> list[bool]:
         rough = any(mu)
-        if rough and len(contacts) > MOST_WITH_FRICTION:
-            raise LeavesClosedForm(t, f"{len(contacts)} contacts with friction press at once, too many to enumerate")
+        most = MOST_WITH_FRICTION if rough else MOST_WITHOUT
+        if len(contacts) > most:
+            raise LeavesClosedForm(t, f"{len(contacts)} contacts press at once, enumeration ends at {most}")
         rows = Rows(self.bodies, contacts, tangential=rough)
         free = rows.relative(self.flight.a0, self.flight.b0)
         free[:: rows.width] += [self._centrifugal(c, slip) for c, slip in zip(contacts, slips, strict=True)]

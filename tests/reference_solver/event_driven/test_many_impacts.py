@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Disc, HalfSpace, Model, Sphere
-from reference_solver.event_driven import EventDriven, TooManyEvents
+from reference_solver.event_driven import EventDriven, LeavesClosedForm, TooManyEvents
 
 
 def disc(x, y=0.0, vx=0.0, vy=0.0, mass=1.0, radius=0.5):
@@ -170,6 +170,13 @@ def test_spheres_collide_as_discs_do():
     plane.advance(4.0)
     assert len(space.events) == len(plane.events) >= 2
     assert space.pose[:, [0, 2]] == pytest.approx(plane.pose[:, :2], abs=1e-12)
+
+
+def test_more_contacts_at_once_than_can_be_enumerated_end_a_run_with_its_reason():
+    row = [disc(float(k), vx=0.0 if k else 1.0) for k in range(14)]
+    with pytest.raises(LeavesClosedForm, match="13 contacts at once, enumeration ends at 12"):
+        oracle(row, law="N-SIM").run()
+    oracle(row).run()  # one after the other they are no trouble
 
 
 def test_a_bound_on_events_ends_a_run_with_its_reason():
