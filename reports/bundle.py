@@ -1,0 +1,107 @@
+"""A result as one archive: what ran, on what, with which outcome, how to cite it, and checksums of all of it.
+
+README.txt           what is inside
+environment.json     machine, Python, packages, commit, plan
+observations.jsonl   raw measurements, one cell per line; verdicts are derived from them
+rows.jsonl, rows.csv every judged value
+timings.csv          raw timings of the bench, if there is one
+report.html          the report
+CITATION.cff         how to cite, with run and commit
+SHA256SUMS           checksums, as ``sha256sum -c`` reads them
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Mapping
+from importlib.metadata import distributions
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from reports import exports, speed
+from reports.page import load_source, render
+from reports.page.source import Source
+from validation.store import Run, Store
+
+README = """contact-crosscheck, run {run}
+
+{contents}
+
+Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the rows.
+Check the files with: sha256sum -c SHA256SUMS
+"""
+#: File -> what it is, in the order of the archive.
+CONTENTS = {
+    "environment.json": "machine, Python, packages, commit and plan of the run (and of the bench)",
+    "observations.jsonl": "raw measurements, one cell per line",
+    "rows.jsonl": "every judged value, one per line",
+    "rows.csv": "the same as a table",
+    "timings.csv": "raw timings of the bench",
+    "report.html": "the report, one self-contained page",
+    "CITATION.cff": "how to cite this result",
+}
+
+
+def write_bundle(folder: Path, run: str, path: Path) -> list[str]:
+    """Write the archive of ``run`` of the store in ``folder`` to ``path``; return the names inside.
+
+    Raises
+    ------
+    StoreError
+        If the folder has no results or no such run.
+    """
+    source = load_source(folder, run)
+    texts = _texts(source, folder)
+    contents = "\n".join(f"{name:<20} {what}" for name, what in CONTENTS.items() if name in texts)
+    texts = {"README.txt": README.format(run=source.run.id, contents=contents), **texts}
+    sums = "".join(f"{hashlib.sha256(text.encode()).hexdigest()}  {name}\n" for name, text in texts.items())
+    texts["SHA256SUMS"] = sums
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in texts.items():
+            entry = zipfile.ZipInfo(f"contact-crosscheck-{source.run.id}/{name}")  # 1980: same run, same archive
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text)
+    return list(texts)
+
+
+def _texts(source: Source, folder: Path) -> dict[str, str]:
+    texts = {
+        "environment.json": json.dumps(_environment(source), indent=1) + "\n",
+        "observations.jsonl": "".join(json.dumps(o.as_dict(), default=str) + "\n" for o in source.observations),
+        "rows.jsonl": exports.as_jsonl(source.rows),
+        "rows.csv": exports.as_csv(source.rows),
+    }
+    if source.bench is not None:
+        store = Store(folder, create=False)
+        texts["timings.csv"] = speed.raw_of(store, source.bench.run).to_csv(index=False)
+        store.close()
+    return texts | {"report.html": render(source), "CITATION.cff": citation(source.run)}
+
+
+def _environment(source: Source) -> dict[str, Any]:
+    packages = {d.metadata["Name"]: d.version for d in distributions() if d.metadata["Name"]}
+    found: dict[str, Any] = {"run": _run(source.run), "packages_now": dict(sorted(packages.items()))}
+    if source.bench is not None:
+        found["bench"] = {**_run(source.bench.run), "protocol": dict(source.bench.protocol)}
+    return found
+
+
+def _run(run: Run) -> Mapping[str, Any]:
+    return {
+        "id": run.id, "date": run.date, "commit": run.commit, "title": run.title, "machine": run.machine,
+        "finished": run.finished, "slots": list(run.plan),
+    }  # fmt: skip
+
+
+def citation(run: Run) -> str:
+    """Citation file of the project with the run and its commit added."""
+    here = files("reports")
+    beside = Path(str(here)).parent / "CITATION.cff"  # in a checkout; a wheel carries its copy inside the package
+    inside = Path(str(here.joinpath("CITATION.cff")))
+    text = (beside if beside.is_file() else inside).read_text(encoding="utf-8").rstrip("\n")
+    commit = f'\ncommit: "{run.commit}"' if run.commit else ""
+    return f'{text}{commit}\nidentifiers:\n  - type: other\n    value: "run {run.id} of {run.date}"\n'
