@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pandas as pd
+from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from reports.findings import finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
@@ -89,33 +89,35 @@ def as_markdown(rows: Sequence[Plain]) -> str:
 
 def as_junit(rows: Sequence[Plain]) -> str:
     """JUnit XML: a suite per engine and profile; only what makes the command fail is a failure."""
-    root = ElementTree.Element("testsuites", name="contact-crosscheck")
-    suites: dict[str, ElementTree.Element] = {}
+    suites: dict[str, TestSuite] = {}
     for row in rows:
         name = f"{row['engine']}/{row['profile']}"
-        suite = suites.setdefault(name, ElementTree.SubElement(root, "testsuite", name=name))
         params = _flat(row["slot"]["params"])
-        case = ElementTree.SubElement(
-            suite,
-            "testcase",
-            classname=f"{name}.{row['scene']}{row['dimension']}d",
-            name=f"{row['metric']} {params} dt={row['dt']:.6g} it={row['iterations'] or 'own'}",
+        case = TestCase(
+            f"{row['metric']} {params} dt={row['dt']:.6g} it={row['iterations'] or 'own'}",
+            f"{name}.{row['scene']}{row['dimension']}d",
         )
-        mark = mark_of(row)
-        if mark in ("crashed", "timed_out"):
-            ElementTree.SubElement(case, "error", message=finding_line(row)).text = row["log"]
-        elif mark in ("invalid", "new", "drifted"):
-            ElementTree.SubElement(case, "failure", message=finding_line(row))
-        elif mark in ("unsupported", "not_installed", "none"):
-            ElementTree.SubElement(case, "skipped", message=row["reason"])
-        elif mark != "pass":
-            ElementTree.SubElement(case, "system-out").text = finding_line(row)
+        _mark_case(case, row)
+        suites.setdefault(name, TestSuite(name)).add_testcase(case)
+    document = JUnitXml("contact-crosscheck")
     for suite in suites.values():
-        suite.set("tests", str(len(suite)))
-        for attribute, tag in (("errors", "error"), ("failures", "failure"), ("skipped", "skipped")):
-            suite.set(attribute, str(len(suite.findall(f"testcase/{tag}"))))
-    ElementTree.indent(root)
-    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+        document.add_testsuite(suite)
+    document.update_statistics()
+    return bytes(document.tostring()).decode()
+
+
+def _mark_case(case: TestCase, row: Plain) -> None:
+    mark = mark_of(row)
+    if mark in ("crashed", "timed_out"):
+        failed = Error(finding_line(row))
+        failed.text = row["log"]
+        case.result = [failed]
+    elif mark in ("invalid", "new", "drifted"):
+        case.result = [Failure(finding_line(row))]
+    elif mark in ("unsupported", "not_installed", "none"):
+        case.result = [Skipped(row["reason"])]
+    elif mark != "pass":
+        case.system_out = finding_line(row)
 
 
 def write_all(folder: Path, rows: Sequence[Plain]) -> dict[str, Path]:
