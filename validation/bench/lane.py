@@ -43,11 +43,11 @@ class Limits:
     fewest, most
         Rounds: an interval of fewer than five values means nothing; after forty it hardly narrows.
     unit_seconds
-        Time spent on one unit, building included, after which three rounds have to do.
+        CPU time spent on one unit, building included, after which three rounds have to do.
     size_seconds
-        A pile whose round takes longer ends its series: larger ones are left out, with the reason.
+        A pile whose round takes more CPU time ends its series: larger ones are left out, with the reason.
     lane_seconds
-        Time for the whole lane; what is open then keeps the rounds it has.
+        Wall time for the whole lane; what is open then keeps the rounds it has.
     patience
         Seconds without an answer after which the lane's process counts as hanging.
     renew
@@ -58,7 +58,7 @@ class Limits:
     fewest: int = 5
     most: int = 40
     unit_seconds: float = 20.0
-    size_seconds: float = 20.0
+    size_seconds: float = 30.0
     lane_seconds: float = 3600.0
     patience: float = 600.0
     renew: int = 5

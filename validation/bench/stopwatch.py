@@ -25,7 +25,7 @@ from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_o
 
 @dataclass(frozen=True)
 class Lap:
-    """Answer of the stopwatch: times of the call, of everything around it, and what state it ended in."""
+    """Answer of the stopwatch: CPU and wall time of the call, CPU time with everything around it, the end state."""
 
     engine_version: str
     seconds: float
@@ -39,14 +39,14 @@ class Lap:
 
 def lap(unit: Unit) -> Lap:
     """Time ``unit`` once; an engine that fails gives a void lap, not an exception."""
-    started = time.perf_counter()
+    started = time.process_time()
     version = find(unit.slot.engine).version
     try:
         seconds, wall, state, error, kernel = _clocked(unit)
     except Exception as failure:  # whatever an engine raises costs this unit only
         reason = f"{type(failure).__name__}: {failure}".splitlines()[0]
-        return Lap(version, 0.0, 0.0, time.perf_counter() - started, "", None, void=reason)
-    return Lap(version, seconds, wall, time.perf_counter() - started, state, error, kernel, _void(unit, error))
+        return Lap(version, 0.0, 0.0, time.process_time() - started, "", None, void=reason)
+    return Lap(version, seconds, wall, time.process_time() - started, state, error, kernel, _void(unit, error))
 
 
 def _void(unit: Unit, error: float | None) -> str:
