@@ -8,6 +8,8 @@ from typing import Any
 
 from reports.wording import LABELS, mark_of, number, params_text, reproduce
 
+#: Marks that make the command exit with 1.
+ALARMING = ("crashed", "timed_out", "invalid", "new", "drifted")
 #: Marks in the order in which findings are printed.
 ORDER = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained")
 
@@ -16,6 +18,8 @@ def finding_line(row: Mapping[str, Any]) -> str:
     """One line for one row."""
     label = LABELS[mark_of(row)]
     where = f"{row['engine']}/{row['profile']} {row['scene']} {row['dimension']}-D {params_text(row['slot']['params'])}"
+    if row["iterations"] is not None:
+        where = f"{where.strip()} at {row['iterations']} iterations"
     if row["value"] is None:
         what = row["reason"]
     else:
@@ -39,22 +43,20 @@ def grouped(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Mappi
 
 
 def lines(rows: Sequence[Mapping[str, Any]], most: int | None) -> Iterator[str]:
-    """Lines of all findings; of known and explained ones at most ``most`` per engine, profile, scene and metric.
+    """Lines of all findings; at most ``most`` per family, the worst first, with a count of the rest.
 
-    A starved stack fails twenty interfaces at once: the worst row stands for the group, with a count.
+    A starved stack fails twenty interfaces at once: a family is one engine, profile, scene and kind of metric; of
+    what makes the command fail, also one cell.
     """
     for mark, group in grouped(rows):
-        if most is None or mark in ("crashed", "timed_out", "invalid", "new", "drifted"):
-            yield from (finding_line(row) for row in group)
-            continue
         families: dict[tuple[Any, ...], list[Mapping[str, Any]]] = defaultdict(list)
         for row in group:
-            metric = row["metric"].partition("[")[0]
-            families[row["engine"], row["profile"], row["scene"], metric].append(row)
+            cell = repr(row["slot"]) if mark in ALARMING else ""
+            families[row["engine"], row["profile"], row["scene"], row["metric"].partition("[")[0], cell].append(row)
         for family in families.values():
             worst = sorted(family, key=_severity, reverse=True)
             for row in worst[:most]:
-                rest = len(family) - most
+                rest = 0 if most is None else len(family) - most
                 yield finding_line(row) + (f" (and {rest} more like it)" if rest > 0 else "")
 
 
