@@ -1,14 +1,16 @@
 """Block solve: all points of one manifold together, then over-relaxed (E12, E13).
 
-Most blocks of three or four points stick: `stick` solves them at once. Otherwise the points are solved one after
-the other, each exactly with its friction (`coulomb_impulse`), until they agree. Three or four points of one plane
-are redundant: their impulses are not unique, but the wrench on the bodies, and with it every velocity, is.
+Most blocks of three or four points stick: `stick` solves them at once. Others go to
+`solve_by_newton`; where that finds nothing (friction so large that there may be nothing to find), the points are
+solved one after the other, each exactly with its friction (`coulomb_impulse`). Three or four points of one plane are
+redundant: their impulses are not unique, but the wrench on the bodies, and with it every velocity, is.
 """
 
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.state import Options
+from reference_solver.spatial.block_newton import solve_by_newton
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
 from reference_solver.spatial.one_contact import coulomb_impulse, into_disc
 from reference_solver.spatial.state import Bodies, Manifolds
@@ -32,14 +34,27 @@ def sweep_blocks(bodies: Bodies, manifolds: Manifolds, options: Options, relaxat
         for p in range(manifolds.points[m]):
             for k in range(3):
                 manifolds.before[m, p, k] = manifolds.impulse[m, p, k]
-        if not (manifolds.rigid[m] and stick(manifolds, m, v, w)):
-            solve_block(manifolds, m, v, w)
+        solve_block(manifolds, m, v, w)
         apply_block(bodies, manifolds, m, options, relaxation)
 
 
 @inner_kernel
 def solve_block(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
     """Impulses of manifold m that solve its points together, the rest of the world held."""
+    if manifolds.points[m] == 1:
+        solve_point(manifolds, m, 0, velocity_at(v, w, manifolds, m, 0))
+    elif manifolds.rigid[m] and stick(manifolds, m, v, w):
+        return
+    elif not solve_by_newton(manifolds, m, v, w):
+        for p in range(manifolds.points[m]):
+            for k in range(3):
+                manifolds.impulse[m, p, k] = manifolds.before[m, p, k]
+        solve_in_turn(manifolds, m, v, w)
+
+
+@inner_kernel
+def solve_in_turn(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
+    """Points one after the other, each exactly, until they agree or `INNER_SWEEPS` are made."""
     first_change = 0.0
     for sweep in range(INNER_SWEEPS):
         largest_change, largest = 0.0, 0.0
@@ -50,7 +65,7 @@ def solve_block(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
             largest = max(largest, manifolds.impulse[m, p, 2])
         if sweep == 0:
             first_change = largest_change
-        if manifolds.points[m] == 1 or largest_change <= max(INNER_GAIN * first_change, INNER_FLOOR * largest):
+        if largest_change <= max(INNER_GAIN * first_change, INNER_FLOOR * largest):
             return
 
 

@@ -16,7 +16,6 @@ from reference_solver.spatial.vector import (
     add,
     add_scaled,
     cross,
-    dot,
     length,
     row,
     sub,

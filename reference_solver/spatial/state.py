@@ -78,6 +78,8 @@ MANIFOLD = np.dtype(
         ("factor", "f8", (6, 6)),  # Cholesky factor of the relative twist per wrench at the centre, frame
         ("wrench", "f8", 6),  # force and moment at the centre being solved for, frame [N s, N m s]
         ("share", "f8", (POINTS, 3)),  # how the points would share it, frame [N s]
+        ("trial", "f8", (POINTS, 3)),  # impulses of a Newton step, frame [N s]
+        ("system", "f8", (6, 7)),  # matrix and right side of a Newton step
         ("push", "f8", POINTS),  # accumulated pseudo-impulse along n
         ("push_target", "f8", POINTS),  # pseudo-velocity to reach [m/s]
         ("speed", "f8", POINTS),  # reference speed of the residual [m/s]
