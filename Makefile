@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test lint setup clean
+.PHONY: run test lint setup publish clean
 
 setup: $(STAMP)
 
@@ -33,6 +33,14 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# One full report and the README's pictures, with the commit inside; needs a clean checkout and Chromium.
+publish: $(STAMP)
+	@test -z "$$(git status --porcelain)" || { echo "commit first: the report carries the commit's hash"; exit 2; }
+	$(MAKE) run OUT=$(OUT)
+	mkdir -p reports/published
+	cp $(OUT)/report.html reports/published/report.html
+	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
