@@ -49,17 +49,18 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def as_json(protocol: Mapping[str, Any], tables: Tables) -> str:
-    """One object: the protocol, and every table as a list of rows."""
-    data = {"protocol": dict(protocol)} | {name: plain(table) for name, table in tables.items()}
+def as_json(run: Run, protocol: Mapping[str, Any], tables: Tables) -> str:
+    """One object: the run with its machine, the protocol, and every table as a list of rows."""
+    head = {"id": run.id, "date": run.date, "commit": run.commit, "machine": run.machine, "title": run.title}
+    data = {"run": head, "protocol": dict(protocol)} | {name: plain(table) for name, table in tables.items()}
     return json.dumps(data, indent=1, allow_nan=False, default=str)
 
 
-def write_all(folder: Path, protocol: Mapping[str, Any], tables: Tables, raw: pd.DataFrame) -> list[Path]:
+def write_all(folder: Path, run: Run, protocol: Mapping[str, Any], tables: Tables, raw: pd.DataFrame) -> list[Path]:
     """Write bench.json, one CSV per table, and the raw timings into ``folder/bench``."""
     target = folder / "bench"
     target.mkdir(parents=True, exist_ok=True)
-    (target / "bench.json").write_text(as_json(protocol, tables) + "\n", encoding="utf-8")
+    (target / "bench.json").write_text(as_json(run, protocol, tables) + "\n", encoding="utf-8")
     for name, table in {**tables, "raw_timings": raw}.items():
         flat = table.drop(columns=["slot"], errors="ignore")
         flat.to_csv(target / f"{name}.csv", index=False)

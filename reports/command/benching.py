@@ -117,9 +117,9 @@ def _time(store: Store, run: Run, units: Sequence[Unit], limits: Limits, seed: i
 
 def _show(store: Store, run: Run, out: Path, as_json: bool, console: Console) -> None:
     tables, protocol = speed.tables_of(store, run), store.protocol(run) or {}
-    written = speed.write_all(out, protocol, tables, speed.raw_of(store, run))
+    written = speed.write_all(out, run, protocol, tables, speed.raw_of(store, run))
     if as_json:
-        click.echo(speed.as_json(protocol, tables))
+        click.echo(speed.as_json(run, protocol, tables))
     for table in speed.level_tables(tables["work_points"]):
         console.print(table)
     console.print("*: cheapest; -: not reached in this sweep; 1/240 x30: step and iterations that did it", style="dim")
