@@ -18,20 +18,24 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.kinematics import velocity_at
 from reference_solver.spatial.state import Manifolds
-from reference_solver.spatial.vector import Vector, cross, row
+from reference_solver.spatial.vector import ZERO, Vector, add, cross, row, scale, sub
 
 #: rho in units of 1 / k_nn. A round contracts by its inverse; its round-off enters impulses multiplied by it.
 STIFFNESS = 100.0
-#: Rounds at that value that most blocks need no more than.
+#: Rounds at that value; most blocks need no more.
 EASY_ROUNDS = 8
-#: Rounds in which it then grows tenfold each. Points that cannot all stick, because they lie at different depth, slip
-#: at speeds far below the others' (1e-7 of them for a tilt of 1e-5); only a stiffness as large as the inverse of that
-#: ratio brings their friction to the cone within a few rounds.
-GROWING_ROUNDS = 7
-#: Rounds in all; the last ones at `STIFFNESS` take the amplified round-off out again.
-ROUNDS = 40
+#: Bound of the stiffness afterwards. Points that cannot all stick, because they lie at different depth, slip at speeds
+#: far below the others' (1e-7 of them for a tilt of 1e-5); only a stiffness as large as the inverse of that ratio
+#: brings their friction to the cone within a few rounds.
+LARGEST_STIFFNESS = 1e10
+#: Rounds in all.
+ROUNDS = 100
+#: A round that changes impulses by more than this share of the largest is at work: the stiffness stays.
+AT_WORK = 0.3
 #: Newton steps per round; usual are 1 or 2, after 3 to 6 in the first.
-NEWTON_STEPS = 30
+NEWTON_STEPS = 60
+#: Halvings of a step that does not reduce F.
+HALVINGS = 4
 #: F this small, relative to stiffness times the terms it sums, is round-off: velocities enter it multiplied by it.
 SOLVED = 5e-16
 #: Impulses that change by less than this share of the largest are final: velocities then miss their targets by
@@ -59,22 +63,34 @@ def solve_by_newton(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> bool:
 
 @inner_kernel
 def iterate(manifolds: Manifolds, m: int, free_v: Vector, free_w: Vector, v: Vector, w: Vector, rounds: int) -> bool:
-    """Proximal rounds until the impulses are final: at `STIFFNESS`, then growing, then at `STIFFNESS` again."""
-    stiffness = STIFFNESS
+    """Proximal rounds until the impulses are final.
+
+    The stiffness grows when easy rounds have not been enough, stays while impulses change, gives way where Newton's
+    method fails, and falls back once nothing is left but its own round-off, to take that out again.
+    """
+    stiffness, limit = STIFFNESS, LARGEST_STIFFNESS
     for k in range(rounds):
-        if k >= EASY_ROUNDS:
-            stiffness = 10.0 * stiffness if k < EASY_ROUNDS + GROWING_ROUNDS else STIFFNESS
-        solved, v, w = newton(manifolds, m, stiffness, free_v, free_w, v, w)
+        solved, new_v, new_w = newton(manifolds, m, stiffness, free_v, free_w, v, w)
         if not solved:
-            return False
+            if stiffness == STIFFNESS:
+                return False
+            limit = 0.1 * stiffness
+            stiffness = max(0.01 * stiffness, STIFFNESS)
+            continue
+        v, w = new_v, new_w
         change, largest = 0.0, 0.0
         for p in range(manifolds.points[m]):
             for d in range(3):
                 change = max(change, abs(manifolds.trial[m, p, d] - manifolds.impulse[m, p, d]))
                 manifolds.impulse[m, p, d] = manifolds.trial[m, p, d]
             largest = max(largest, manifolds.impulse[m, p, 2])
-        if stiffness == STIFFNESS and change <= SETTLED * largest:
-            return True
+        if change <= SETTLED * (stiffness / STIFFNESS) * largest:
+            if stiffness == STIFFNESS:
+                return True
+            stiffness = STIFFNESS
+            limit = STIFFNESS
+        elif k + 1 >= EASY_ROUNDS and change <= AT_WORK * largest:
+            stiffness = min(10.0 * stiffness, limit)
     return False
 
 
@@ -103,29 +119,54 @@ def moved_twist(
 def newton(
     manifolds: Manifolds, m: int, stiffness: float, free_v: Vector, free_w: Vector, v: Vector, w: Vector
 ) -> tuple[bool, Vector, Vector]:
-    """Root of F from the start (v, w); leaves the impulses Pi(z) in `trial`."""
+    """Root of F from the start (v, w); leaves the impulses Pi(z) in `trial`.
+
+    A step that does not reduce F is halved, a few times at most: F has kinks, and where only a kink separates two
+    slopes a step across it, though uphill, is the way on.
+    """
     system = manifolds.system[m]
+    step_v, step_w = ZERO, ZERO
+    before, halvings = math.inf, 0
     for _ in range(NEWTON_STEPS):
-        set_system(manifolds, m, stiffness, v, w)
-        made_v, made_w = free_v, free_w
-        size_v, size_w = 0.0, 0.0
-        for p in range(manifolds.points[m]):
-            trial = row(manifolds.trial[m], p, 0)
-            made_v, made_w = moved_twist(manifolds, m, p, trial, 1.0, made_v, made_w)
-            size_v = max(size_v, response_size(manifolds.response[m, p], 0, trial))
-            size_w = max(size_w, response_size(manifolds.response[m, p], 3, trial))
-        miss_v, miss_w = 0.0, 0.0
-        for d in range(3):
-            system[d, 6], system[3 + d, 6] = made_v[d] - v[d], made_w[d] - w[d]
-            miss_v, miss_w = max(miss_v, abs(system[d, 6])), max(miss_w, abs(system[3 + d, 6]))
-            size_v, size_w = max(size_v, abs(free_v[d])), max(size_w, abs(free_w[d]))
-        if miss_v <= SOLVED * stiffness * size_v and miss_w <= SOLVED * stiffness * size_w:
+        miss = set_system(manifolds, m, stiffness, free_v, free_w, v, w)
+        if miss <= SOLVED * stiffness:
             return True, v, w
+        if miss > before and halvings < HALVINGS:
+            halvings += 1
+            step_v, step_w = scale(0.5, step_v), scale(0.5, step_w)
+            v, w = sub(v, step_v), sub(w, step_w)
+            continue
+        before, halvings = miss, 0
         if not eliminate(system):
             return False, v, w
-        v = (v[0] + system[0, 6], v[1] + system[1, 6], v[2] + system[2, 6])
-        w = (w[0] + system[3, 6], w[1] + system[4, 6], w[2] + system[5, 6])
+        step_v = (system[0, 6], system[1, 6], system[2, 6])
+        step_w = (system[3, 6], system[4, 6], system[5, 6])
+        v, w = add(v, step_v), add(w, step_w)
     return False, v, w
+
+
+@inner_kernel
+def set_system(
+    manifolds: Manifolds, m: int, stiffness: float, free_v: Vector, free_w: Vector, v: Vector, w: Vector
+) -> float:
+    """Matrix F' and right side -F at (v, w); returns F relative to the terms it sums."""
+    set_matrix(manifolds, m, stiffness, v, w)
+    made_v, made_w = free_v, free_w
+    size_v, size_w = 0.0, 0.0
+    for p in range(manifolds.points[m]):
+        trial = row(manifolds.trial[m], p, 0)
+        made_v, made_w = moved_twist(manifolds, m, p, trial, 1.0, made_v, made_w)
+        size_v = max(size_v, response_size(manifolds.response[m, p], 0, trial))
+        size_w = max(size_w, response_size(manifolds.response[m, p], 3, trial))
+    miss_v, miss_w = 0.0, 0.0
+    for d in range(3):
+        manifolds.system[m, d, 6] = made_v[d] - v[d]
+        manifolds.system[m, 3 + d, 6] = made_w[d] - w[d]
+        miss_v, miss_w = max(miss_v, abs(made_v[d] - v[d])), max(miss_w, abs(made_w[d] - w[d]))
+        size_v, size_w = max(size_v, abs(free_v[d])), max(size_w, abs(free_w[d]))
+    miss_v = miss_v / size_v if size_v > 0.0 else miss_v
+    miss_w = miss_w / size_w if size_w > 0.0 else miss_w
+    return max(miss_v, miss_w)
 
 
 @inner_kernel
@@ -139,7 +180,7 @@ def response_size(r: Array, first: int, impulse: Vector) -> float:
 
 
 @inner_kernel
-def set_system(manifolds: Manifolds, m: int, stiffness: float, v: Vector, w: Vector) -> None:
+def set_matrix(manifolds: Manifolds, m: int, stiffness: float, v: Vector, w: Vector) -> None:
     """Impulses Pi(z) and the matrix F' at (v, w)."""
     system = manifolds.system[m]
     for i in range(6):

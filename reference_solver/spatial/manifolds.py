@@ -18,6 +18,11 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.vector import dot, row, tangents
 
+#: Heights of a manifold's points over their centre below this fraction of the smaller half width count as none.
+#: Points at different height cannot all stick while the bodies turn about a tangent; differences of this size are
+#: the noise of a resting contact, and would make it slip at 1e-8 of its speeds, which no solver could resolve.
+FLAT = 1e-8
+
 
 @inner_kernel
 def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> int:
@@ -39,7 +44,7 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
         found = collide(bodies, detection, a, b, TOUCHING if bounces else options.margin, manifolds, m)
         if found > 0:
             sort_points(manifolds, m)
-            set_frame(manifolds, m)
+            set_frame(bodies, manifolds, m)
             set_world_points(bodies, manifolds, m)
             m += 1
     detection.found[MANIFOLDS] = m
@@ -67,11 +72,12 @@ def swap(values, j):
 
 
 @inner_kernel
-def set_frame(manifolds: Manifolds, m: int) -> None:
+def set_frame(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
     """Tangents, levers of the manifold's centre, and the points' offsets from it in the contact frame.
 
     All velocities and impulses of a manifold act through the relative twist and the wrench at its centre.
     """
+    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
     count = manifolds.points[m]
     t1, t2 = tangents(row(manifolds.frame[m], 2, 0))
     for d in range(3):
@@ -89,6 +95,12 @@ def set_frame(manifolds: Manifolds, m: int) -> None:
             for d in range(3):
                 offset += manifolds.frame[m, k, d] * (manifolds.arm_b[m, p, d] - manifolds.lever_b[m, d])
             manifolds.offset[m, p, k] = offset
+        height = manifolds.offset[m, p, 2]
+        if abs(height) <= FLAT * extent:
+            manifolds.offset[m, p, 2] = 0.0
+            for d in range(3):
+                manifolds.arm_a[m, p, d] -= height * manifolds.frame[m, 2, d]
+                manifolds.arm_b[m, p, d] -= height * manifolds.frame[m, 2, d]
 
 
 @inner_kernel

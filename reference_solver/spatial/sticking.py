@@ -12,14 +12,12 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.state import Bodies, Manifolds
-from reference_solver.spatial.vector import Vector, add, cross, dot, row, scale, times
+from reference_solver.spatial.vector import ZERO, Vector, add, cross, dot, row, scale, times
 
 #: Points whose spread in the plane has a smaller determinant than this share of its trace squared are on a line.
 COLLINEAR = 1e-6
 #: Targets, and heights of points over their plane, count as affine up to this share of the largest.
 AFFINE = 1e-13
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 @inner_kernel

@@ -13,6 +13,8 @@ from reference_solver.model import Array
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
+ZERO = (0.0, 0.0, 0.0)
+
 
 @inner_kernel
 def add(a: Vector, b: Vector) -> Vector:
