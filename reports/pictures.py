@@ -1,17 +1,22 @@
 """Pictures of a report for the README, taken in a real browser: ``python -m reports.pictures REPORT FOLDER``.
 
-Needs Playwright and a Chromium, like the browser tests; nothing else of the project imports this module.
+Needs Playwright and a Chromium, like the browser tests; nothing else of the project imports this module. Every
+picture carries the report's last line (run and commit) as a text chunk named ``Source``.
 """
 
 from __future__ import annotations
 
 import shutil
+import struct
 import sys
+import zlib
 from pathlib import Path
 from typing import Any, Literal
 
 #: Picture -> the part of the page that it shows.
-SHOTS = {"verdicts": "#verdicts", "restitution": "#explorer .plots", "cost": "#speed .plots"}
+SHOTS = {"verdicts": "#verdicts", "restitution": "#shot-restitution", "cost": "#shot-cost"}
+#: Room around a picture, and nothing in it that cannot be clicked.
+STYLE = ".save { display: none } #verdicts, .shot { padding: 16px }"
 WIDTH, HEIGHT = 1280, 860
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 
@@ -26,13 +31,17 @@ def main(report: str, folder: str) -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         for scheme in SCHEMES:
             context = browser.new_context(
-                viewport={"width": WIDTH, "height": HEIGHT}, color_scheme=scheme, offline=True
+                viewport={"width": WIDTH, "height": HEIGHT}, color_scheme=scheme, offline=True, bypass_csp=True
             )
             page = context.new_page()
             page.goto(Path(report).resolve().as_uri())
+            page.add_style_tag(content=STYLE)
             for name, part in SHOTS.items():
                 page.locator(part).first.screenshot(path=target / f"{name}-{scheme}.png")
             _replay(page, target / f"replay-{scheme}.png")
+            said = page.locator("footer").inner_text()
+            for path in target.glob(f"*-{scheme}.png"):
+                path.write_bytes(labelled(path.read_bytes(), said))
             context.close()
         browser.close()
 
@@ -44,6 +53,14 @@ def _replay(page: Any, path: Path) -> None:
     page.wait_for_timeout(300)
     page.locator("#replay-time").fill("34")
     page.locator("#replay-canvas").screenshot(path=path)
+
+
+def labelled(png: bytes, text: str) -> bytes:
+    """The picture with a text chunk after its header (PNG specification, third edition, 11.3.3.2)."""
+    body = b"tEXtSource\0" + text.encode("latin-1", "replace")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    header = 8 + 25  # signature, IHDR
+    return png[:header] + chunk + png[header:]
 
 
 if __name__ == "__main__":

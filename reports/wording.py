@@ -64,7 +64,8 @@ def number(value: float | None, digits: int = 4) -> str:
     if value == 0.0:
         return "0"
     if 1e-3 <= abs(value) < 1e5:
-        return f"{value:.{digits}g}"
+        text = f"{value:.{digits}g}"
+        return f"{float(text):g}" if "e" in text else text  # 5500, not 5.5e+03
     return f"{value:.{max(1, digits - 2)}e}".replace("e-0", "e-").replace("e+0", "e+")
 
 

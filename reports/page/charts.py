@@ -44,7 +44,7 @@ _NOISE = re.compile(r' (?:pointer-events="none"|opacity="1"|stroke-miterlimit="1
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
-    spec = chart.to_dict()
+    spec = chart.to_dict(validate=False)  # a tenth of a second each; a wrong one would not draw
     spec["config"] = _CONFIG
     text = vl_convert.vegalite_to_svg(spec)
     text = _NOISE.sub("", _EMPTY.sub("", text))
@@ -55,10 +55,12 @@ def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
 
 
 def log_axis(low: float, high: float) -> list[float]:
-    """Decades from ``low`` to ``high``, thinned to at most eight."""
+    """Decades from ``low`` to ``high``, thinned to at most eight; with 2 and 5 between them where they are few."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     stride = max(1, math.ceil((last - first) / 8))
-    return [10.0**k for k in range(first, last + 1, stride)]
+    steps = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
+    ticks = [step * 10.0**k for k in range(first, last + 1, stride) for step in steps]
+    return [tick for tick in ticks if low <= tick <= high]
 
 
 def log_scale(values: Sequence[float], pad: float = 1.3) -> tuple[alt.Scale, list[float]]:
@@ -67,20 +69,24 @@ def log_scale(values: Sequence[float], pad: float = 1.3) -> tuple[alt.Scale, lis
     low, high = min(positive) / pad, max(positive) * pad
     if high / low < 10.0:
         low, high = low / math.sqrt(10.0), high * math.sqrt(10.0)
-    ticks = [tick for tick in log_axis(low, high) if low <= tick <= high]
-    return alt.Scale(type="log", domain=[low, high], nice=False), ticks
+    return alt.Scale(type="log", domain=[low, high], nice=False), log_axis(low, high)
 
 
-#: 1e-6 as 10 to the power of -6, and plain numbers between 0.01 and 100.
+#: Plain numbers between 0.01 and 100, 2e-6 elsewhere, 0 for what lies on the floor.
 POWER = (
     "datum.value <= 1.01e-17 ? '0' : datum.value >= 0.0099 && datum.value <= 101 ? format(datum.value, '~r') : "
-    "'1e' + round(log(datum.value)/log(10))"
+    "replace(format(datum.value, '.0e'), '+', '')"
 )
 
 
 def power_axis(title: str, ticks: list[float], **more: Any) -> alt.Axis:
     """Axis in powers of ten."""
     return alt.Axis(title=title, values=ticks, labelExpr=POWER, labelOverlap=True, **more)
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Title of an axis; a ratio has no unit."""
+    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def styled(table: pd.DataFrame) -> dict[str, Any]:

@@ -115,9 +115,16 @@ def wrongs(source: Source) -> str:
     return f"{said}{head}{len(listed)} rows fail without a law{unlisted}; the largest is {_row_text(worst)}."
 
 
+def where_text(row: Plain) -> str:
+    """Parameters and iterations that a row asked for: ``n=10, 4 iterations``."""
+    count = row["iterations"]
+    own = "" if count is None else f"{count} iteration{'s' if count > 1 else ''}"
+    return ", ".join(text for text in (params_text(row["slot"]["params"]), own) if text)
+
+
 def _row_text(row: Plain) -> str:
     name = f"{row['engine']}/{row['profile']} on {row['scene']} {row['dimension']}-D"
-    where = params_text(row["slot"]["params"])
+    where = where_text(row)
     head = f"{name}{' with ' + where if where else ''}, {row['metric']}"
     if row["value"] is None:
         return f"{head}: {row['reason'] or row['outcome']}"
@@ -172,7 +179,7 @@ def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
 def _finding(key: tuple[Any, ...], rows: Sequence[Plain]) -> FindingFamily:
     worst = max(rows, key=severity)
     engine, profile, scene, dimension, family = key
-    where = params_text(worst["slot"]["params"])
+    where = where_text(worst)
     value = worst["outcome"] if worst["value"] is None else f"{number(worst['value'], 4)}"
     text = f"{where + ': ' if where else ''}{worst['metric']} = {value}, truth {number(worst['truth'], 4)}, "
     text += f"tolerance {number(worst['tolerance'], 2)} {worst['unit'] if worst['unit'] != '1' else ''}".strip()

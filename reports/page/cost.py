@@ -10,7 +10,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from reports.page.charts import dashes, log_scale, power_axis, styled, svg
+from reports.page.charts import dashes, log_scale, power_axis, styled, svg, with_unit
 from reports.page.figures import Figure
 from reports.page.source import Bench, Source
 from reports.page.verdicts import slug
@@ -159,7 +159,7 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame) -> Figure:
     x_scale, x_ticks = log_scale(list(table["cost"]), 1.6)
     y_scale, y_ticks = log_scale(list(table["shown"]), 3.0)
     x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", x_ticks))
-    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", y_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(with_unit(primary.name, primary.unit), y_ticks))
     table = table.assign(label=[
         f"{r['engine']}/{r['profile']}, {_setting(r)}: error {number(r['error'], 2)}, {duration(r['cost'])}"
         for r in table.to_dict("records")

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from reports.page.charts import FLOOR, HEIGHT, WIDTH, dashes, lines, log_scale, power_axis, styled, svg
+from reports.page.charts import FLOOR, HEIGHT, WIDTH, dashes, lines, log_scale, power_axis, styled, svg, with_unit
 from reports.speed import duration
 from reports.wording import number
 from validation.bench.primary import PRIMARY
@@ -64,13 +64,13 @@ def error_against_step(entries: Iterable[Convergence], scene: str, dimension: in
     scale = alt.Scale(type="log", domain=[ticks[0] / 1.25, ticks[-1] * 1.25], nice=False)
     x = alt.X("dt:Q", scale=scale, axis=alt.Axis(title="step dt [s]", values=ticks, labelExpr=names))
     error_scale, error_ticks = log_scale(list(table["error"]), 2.0)
-    y = alt.Y("error:Q", scale=error_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", error_ticks))
+    y = alt.Y("error:Q", scale=error_scale, axis=power_axis(with_unit(primary.name, primary.unit), error_ticks))
     # The guides start at the most exact engine of the coarsest step: what converges runs alongside them.
     coarsest = table[(table["dt"] == ticks[-1]) & (table["error"] > ROUND_OFF)]["error"]
     start = float(coarsest.min()) if len(coarsest) else float(table["error"].max())
     guides = _guides(ticks, (ticks[-1], start), x, y, float(error_scale["domain"][0]))
     title = f"{scene} {dimension}-D: {primary.name} against step"
-    caption = f"{primary.law}. Dotted: slopes of order 1 and 2."
+    caption = "Supremum over the phases of an impact where there is one. Dotted: slopes of order 1 and 2."
     picture = svg(lines(table, x, y, below=[guides]), title)
     return Figure(f"fig-step-{scene}-{dimension}", title, caption, picture)
 
@@ -104,7 +104,7 @@ def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure |
     x_scale, x_ticks = log_scale(list(table["cost"]), 1.4)
     y_scale, y_ticks = log_scale(list(table["shown"]), 2.0)
     x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU time per simulated second [s/s]", x_ticks))
-    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(f"{primary.name} [{primary.unit}]", y_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(with_unit(primary.name, primary.unit), y_ticks))
     style = styled(table)
     best = table[table["best"]].sort_values("cost")
     front = alt.Chart(best).mark_line(

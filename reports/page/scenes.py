@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from reports.page import figures
-from reports.page.charts import FLOOR
+from reports.page.charts import FLOOR, with_unit
 from reports.page.figures import Figure
 from reports.page.source import Source
 from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
@@ -92,7 +92,7 @@ def _iterations(errors: pd.DataFrame, scene: str, dimension: int) -> Figure | No
     if scene not in PRIMARY:
         return None
     primary = PRIMARY[scene]
-    return figures.error_against_iterations(table, scene, dimension, QUICK_DT, f"{primary.name} [{primary.unit}]")
+    return figures.error_against_iterations(table, scene, dimension, QUICK_DT, with_unit(primary.name, primary.unit))
 
 
 def step_text(dts: Sequence[float]) -> str:
@@ -105,4 +105,5 @@ def split_figure(figure: str) -> tuple[list[str], str]:
     blocks = [block for block in re.split(r"\n\s*\n", figure.strip("\n")) if block.strip()]
     drawn = [block for block in blocks if block.startswith(" ")]
     said = [" ".join(block.split()) for block in blocks if not block.startswith(" ")]
+    said = [text.replace("``", "") for text in said]
     return said, textwrap.dedent("\n\n".join(drawn)).strip("\n")

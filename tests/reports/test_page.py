@@ -265,3 +265,33 @@ def test_the_first_departure_is_told_for_engines_that_leave_and_for_no_other(pag
     found = next(r for r in replays(page_source) if r.id == "replay-bounce-2")
     gone = {f"{engine}/{profile}": departure for engine, profile, departure, *_ in found.departures}
     assert gone["bullet/default"] is not None and gone["bullet/tuned"] is None and gone["chipmunk/tuned"] is None
+
+
+# ---- what is missing ----
+
+
+@pytest.mark.parametrize("missing", ["bench", "replays", "everything"])
+def test_a_page_is_made_of_whatever_there_is(page_source, missing):
+    if missing == "everything":
+        source = Source(page_source.run, [], [])
+    else:
+        kept = {} if missing == "replays" else {"replays": page_source.replays}
+        source = Source(page_source.run, page_source.rows, page_source.observations, **kept)
+    page = render(source)
+    said = {
+        "bench": "no bench in this store yet",
+        "replays": "kept no recordings",
+        "everything": "within its tolerance",
+    }
+    assert said[missing] in page
+
+
+def test_a_picture_keeps_its_pixels_and_says_where_it_is_from():
+    from reports.pictures import labelled
+
+    def chunk(kind, body):
+        return len(body).to_bytes(4, "big") + kind + body + zlib.crc32(kind + body).to_bytes(4, "big")
+
+    header = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", bytes([0, 0, 0, 1, 0, 0, 0, 1, 8, 0, 0, 0, 0]))
+    rest = chunk(b"IDAT", zlib.compress(b"\0\0")) + chunk(b"IEND", b"")
+    assert labelled(header + rest, "run 1, commit a") == header + chunk(b"tEXt", b"Source\0run 1, commit a") + rest

@@ -215,8 +215,7 @@
       pen.fillStyle = series[0].colour;
       pen.fillRect(6, 7, 9, 9);
       pen.fillStyle = ink;
-      pen.fillText(title, 20, 16);
-      if (gone) pen.fillText("left the tolerance", 20, 31);
+      [...title.split("/"), ...(gone ? ["left tolerance"] : [])].forEach((line, i) => pen.fillText(line, 20, 16 + 15 * i));
       return;
     }
     const length = 10 ** Math.floor(Math.log10(140 / zoom)), pixels = zoom * length;
@@ -301,6 +300,8 @@
   }
 
   player.hidden = false;
+  /* Beside each other every engine is seen whole, where there is room for it. */
+  if (canvas.clientWidth >= 700) $("layout").value = "beside";
   canvas.tabIndex = 0;
   $("scene").addEventListener("change", () => choose($("scene").value));
   $("play").addEventListener("click", () => play(!playing));
