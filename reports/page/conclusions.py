@@ -136,9 +136,9 @@ def _row_text(row: Plain) -> str:
 def sentences(source: Source) -> list[tuple[str, str]]:
     """Three headed sentences for the first screen."""
     return [
-        ("They agree", agreement(source)),
-        ("They depart by a known law", departures(source)),
-        ("Something is wrong", wrongs(source)),
+        ("Where they agree", agreement(source)),
+        ("Where they depart by a known law", departures(source)),
+        ("Where something is wrong", wrongs(source)),
     ]
 
 
