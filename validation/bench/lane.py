@@ -59,7 +59,7 @@ class Limits:
     most: int = 40
     unit_seconds: float = 20.0
     size_seconds: float = 30.0
-    lane_seconds: float = 3600.0
+    lane_seconds: float = 5400.0
     patience: float = 600.0
     renew: int = 5
 
