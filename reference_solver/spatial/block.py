@@ -17,6 +17,9 @@ from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.sticking import stick
 from reference_solver.spatial.vector import Vector, add, cross, length, row, sub
 
+#: Failures of Newton's method after which a block is left to `solve_in_turn` for the rest of the step: each failure
+#: costs as much as a hundred inner sweeps.
+MOST_FAILURES = 5
 #: Inner sweeps of one block at most; later outer sweeps go on where this ends.
 INNER_SWEEPS = 40
 #: A block is solved when an inner sweep changes it by less than this part of its first change; deeper accuracy
@@ -45,7 +48,10 @@ def solve_block(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
         solve_point(manifolds, m, 0, velocity_at(v, w, manifolds, m, 0))
     elif manifolds.rigid[m] and stick(manifolds, m, v, w):
         return
+    elif manifolds.failures[m] >= MOST_FAILURES:
+        solve_in_turn(manifolds, m, v, w)
     elif not solve_by_newton(manifolds, m, v, w):
+        manifolds.failures[m] += 1
         for p in range(manifolds.points[m]):
             for k in range(3):
                 manifolds.impulse[m, p, k] = manifolds.before[m, p, k]

@@ -18,7 +18,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.kinematics import velocity_at
 from reference_solver.spatial.state import Manifolds
-from reference_solver.spatial.vector import ZERO, Vector, add, cross, row, scale, sub
+from reference_solver.spatial.vector import ZERO, Vector, add, cross, length, row, scale, sub
 
 #: rho in units of 1 / k_nn. A round contracts by its inverse; its round-off enters impulses multiplied by it.
 STIFFNESS = 100.0
@@ -36,7 +36,7 @@ AT_WORK = 0.3
 NEWTON_STEPS = 60
 #: Halvings of a step that does not reduce F.
 HALVINGS = 4
-#: F this small, relative to stiffness times the terms it sums, is round-off: velocities enter it multiplied by it.
+#: F is round-off when it is this small relative to the terms it sums, or to stiffness times the velocities in z.
 SOLVED = 5e-16
 #: Impulses that change by less than this share of the largest are final: velocities then miss their targets by
 #: that share over `STIFFNESS`.
@@ -68,14 +68,14 @@ def iterate(manifolds: Manifolds, m: int, free_v: Vector, free_w: Vector, v: Vec
     The stiffness grows when easy rounds have not been enough, stays while impulses change, gives way where Newton's
     method fails, and falls back once nothing is left but its own round-off, to take that out again.
     """
-    stiffness, limit = STIFFNESS, LARGEST_STIFFNESS
+    stiffness, growth = STIFFNESS, 10.0
     for k in range(rounds):
         solved, new_v, new_w = newton(manifolds, m, stiffness, free_v, free_w, v, w)
         if not solved:
             if stiffness == STIFFNESS:
                 return False
-            limit = 0.1 * stiffness
-            stiffness = max(0.01 * stiffness, STIFFNESS)
+            stiffness = max(0.1 * stiffness, STIFFNESS)
+            growth = math.sqrt(growth)
             continue
         v, w = new_v, new_w
         change, largest = 0.0, 0.0
@@ -87,10 +87,9 @@ def iterate(manifolds: Manifolds, m: int, free_v: Vector, free_w: Vector, v: Vec
         if change <= SETTLED * (stiffness / STIFFNESS) * largest:
             if stiffness == STIFFNESS:
                 return True
-            stiffness = STIFFNESS
-            limit = STIFFNESS
+            stiffness, growth = STIFFNESS, 1.0
         elif k + 1 >= EASY_ROUNDS and change <= AT_WORK * largest:
-            stiffness = min(10.0 * stiffness, limit)
+            stiffness = min(growth * stiffness, LARGEST_STIFFNESS)
     return False
 
 
@@ -128,8 +127,8 @@ def newton(
     step_v, step_w = ZERO, ZERO
     before, halvings = math.inf, 0
     for _ in range(NEWTON_STEPS):
-        miss = set_system(manifolds, m, stiffness, free_v, free_w, v, w)
-        if miss <= SOLVED * stiffness:
+        miss, noise = set_system(manifolds, m, stiffness, free_v, free_w, v, w)
+        if miss <= SOLVED * noise:
             return True, v, w
         if miss > before and halvings < HALVINGS:
             halvings += 1
@@ -148,32 +147,33 @@ def newton(
 @inner_kernel
 def set_system(
     manifolds: Manifolds, m: int, stiffness: float, free_v: Vector, free_w: Vector, v: Vector, w: Vector
-) -> float:
-    """Matrix F' and right side -F at (v, w); returns F relative to the terms it sums."""
+) -> tuple[float, float]:
+    """Matrix F' and right side -F at (v, w); returns the size of F and of what it is the sum of [m/s].
+
+    Angular velocities count with the distance of the farthest point.
+    """
     set_matrix(manifolds, m, stiffness, v, w)
     made_v, made_w = free_v, free_w
-    size_v, size_w = 0.0, 0.0
+    noise, width, speed = 0.0, 0.0, 0.0
     for p in range(manifolds.points[m]):
         trial = row(manifolds.trial[m], p, 0)
         made_v, made_w = moved_twist(manifolds, m, p, trial, 1.0, made_v, made_w)
-        size_v = max(size_v, response_size(manifolds.response[m, p], 0, trial))
-        size_w = max(size_w, response_size(manifolds.response[m, p], 3, trial))
-    miss_v, miss_w = 0.0, 0.0
+        noise = max(noise, response_size(manifolds.response[m, p], trial))
+        width = max(width, length(row(manifolds.offset[m], p, 0)))
+        speed = max(speed, abs(manifolds.target[m, p]))
     for d in range(3):
         manifolds.system[m, d, 6] = made_v[d] - v[d]
         manifolds.system[m, 3 + d, 6] = made_w[d] - w[d]
-        miss_v, miss_w = max(miss_v, abs(made_v[d] - v[d])), max(miss_w, abs(made_w[d] - w[d]))
-        size_v, size_w = max(size_v, abs(free_v[d])), max(size_w, abs(free_w[d]))
-    miss_v = miss_v / size_v if size_v > 0.0 else miss_v
-    miss_w = miss_w / size_w if size_w > 0.0 else miss_w
-    return max(miss_v, miss_w)
+    speed = max(speed, length(v) + width * length(w))
+    noise = max(noise, length(free_v) + width * length(free_w), stiffness * speed)
+    return length(sub(made_v, v)) + width * length(sub(made_w, w)), noise
 
 
 @inner_kernel
-def response_size(r: Array, first: int, impulse: Vector) -> float:
-    """Size of the terms of three rows of a response, for the round-off of their sum."""
+def response_size(r: Array, impulse: Vector) -> float:
+    """Size of the terms of the velocity response to an impulse, for the round-off of their sum [m/s]."""
     largest = 0.0
-    for d in range(first, first + 3):
+    for d in range(3):
         size = abs(r[d, 0] * impulse[0]) + abs(r[d, 1] * impulse[1]) + abs(r[d, 2] * impulse[2])
         largest = max(largest, size)
     return largest

@@ -19,9 +19,10 @@ from reference_solver.spatial.state import (
 from reference_solver.spatial.vector import dot, row, tangents
 
 #: Heights of a manifold's points over their centre below this fraction of the smaller half width count as none.
-#: Points at different height cannot all stick while the bodies turn about a tangent; differences of this size are
-#: the noise of a resting contact, and would make it slip at 1e-8 of its speeds, which no solver could resolve.
-FLAT = 1e-8
+#: Points at different height cannot all stick while the bodies turn about a tangent: they would slip at that fraction
+#: of the other speeds, with a friction that hardly determines itself (condition 1 / height^2). Where a contact point
+#: lies between two overlapping surfaces is uncertain by more, g dt^2 at least.
+FLAT = 1e-4
 
 
 @inner_kernel

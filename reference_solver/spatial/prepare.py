@@ -10,6 +10,10 @@ from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
 
+#: Approach speeds below this fraction of what the loads of one step bring about are a resting body's noise. As
+#: targets they would differ from point to point and lift a corner of a face: all its weight would change places.
+RESTING_NOISE = 1e-8
+
 
 @inner_kernel
 def prepare(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> None:
@@ -66,18 +70,22 @@ def set_target(
 ) -> None:
     """Normal velocity b_n to reach (E7, E8, E15); u is the normal velocity before forces.
 
-    A gap may be closed within the step, not more; an overlap asks for nothing. A gap within round-off counts as
-    touching: divided by dt it would be noise that the solver had to answer in every step.
+    Without restitution a gap may be closed within the step, down to the slop, not more; an overlap asks for nothing.
+    A gap within round-off counts as touching: divided by dt it would be noise to answer in every step. With
+    restitution a contact exists only where bodies touch.
     """
     gap = manifolds.gap[m, p]
-    point = row(manifolds.point[m], p, 0)
-    place = max(abs(point[0]), abs(point[1]), abs(point[2]))
-    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-    target = -gap / options.dt if gap > ROUND_OFF * extent + COORDINATE_NOISE * place else 0.0
+    target = 0.0
+    if restitution == 0.0:
+        point = row(manifolds.point[m], p, 0)
+        place = max(abs(point[0]), abs(point[1]), abs(point[2]))
+        extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+        if gap > options.slop + ROUND_OFF * extent + COORDINATE_NOISE * place:
+            target = -(gap - options.slop) / options.dt
+    elif u < -RESTING_NOISE * load_speed(bodies, manifolds, m, p, options):
+        target = -restitution * u
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
-    if options.restitution and u < 0.0 and restitution > 0.0:
-        target = max(target, -restitution * u)
     manifolds.target[m, p] = target
 
 

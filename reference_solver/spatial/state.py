@@ -78,6 +78,7 @@ MANIFOLD = np.dtype(
         ("factor", "f8", (6, 6)),  # Cholesky factor of the relative twist per wrench at the centre, frame
         ("wrench", "f8", 6),  # force and moment at the centre being solved for, frame [N s, N m s]
         ("share", "f8", (POINTS, 3)),  # how the points would share it, frame [N s]
+        ("failures", "i8"),  # of Newton's method in this step
         ("trial", "f8", (POINTS, 3)),  # impulses of a Newton step, frame [N s]
         ("system", "f8", (6, 7)),  # matrix and right side of a Newton step
         ("push", "f8", POINTS),  # accumulated pseudo-impulse along n

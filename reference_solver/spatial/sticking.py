@@ -25,6 +25,7 @@ def prepare_wrenches(bodies: Bodies, manifolds: Manifolds, options: Options) -> 
     """Factorise the response of every manifold that could be solved by `stick`."""
     for m in range(len(manifolds)):
         manifolds.rigid[m] = 0
+        manifolds.failures[m] = 0
         if options.solver == BLOCK and manifolds.points[m] > 2 and manifolds.friction[m] > 0.0:
             if set_spread(manifolds, m):
                 set_admittance(bodies, manifolds, m)
