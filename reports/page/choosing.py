@@ -14,6 +14,7 @@ from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
 from reports.speed import duration
 from reports.wording import mark_of, number
 from validation.cells import Observation, format_dt
+from validation.plan import QUICK_DT
 from validation.tracks import SHOWN
 
 #: Scene, dimension.
@@ -180,6 +181,7 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
         return None
     # The default cell of the scene is the one that people know, and its first check the plainest; else the worst.
     plain = [pair for pair in known if not pair[0]["slot"]["params"]]
+    plain.sort(key=lambda pair: abs(math.log(pair[0]["dt"] / QUICK_DT)))
     worst, same = plain[0] if plain else max(known, key=lambda pair: ratio_of(pair[0]) or 0.0)
     if (ratio_of(same) or 0.0) >= (ratio_of(worst) or 0.0):
         return None

@@ -35,13 +35,13 @@ def _error_text(error: float) -> str:
 
 
 def _guides(x: Sequence[float], anchor: tuple[float, float], scale_x: alt.X, scale_y: alt.Y, low: float) -> alt.Chart:
-    """Faint lines of slope 1 and 2 through ``anchor``."""
-    ends = np.array([min(x), max(x)])
-    table = pd.concat(
-        pd.DataFrame({"dt": ends, "error": np.maximum(anchor[1] * (ends / anchor[0]) ** p, low), "order": str(p)})
-        for p in (1, 2)
-    )
-    mark = alt.Chart(table).mark_line(color="currentColor", opacity=0.22, strokeDash=[2, 3], aria=False)
+    """Faint lines of slope 1 and 2 from ``anchor`` down to the smallest x, or to the lower edge of the picture."""
+    parts = []
+    for order in (1, 2):
+        edge = anchor[0] * (low / anchor[1]) ** (1.0 / order)
+        ends = np.array([max(min(x), edge), anchor[0]])
+        parts.append(pd.DataFrame({"dt": ends, "error": anchor[1] * (ends / anchor[0]) ** order, "order": str(order)}))
+    mark = alt.Chart(pd.concat(parts)).mark_line(color="currentColor", opacity=0.22, strokeDash=[2, 3], aria=False)
     return mark.encode(x=scale_x, y=scale_y, detail="order:N")
 
 

@@ -295,3 +295,16 @@ def test_a_picture_keeps_its_pixels_and_says_where_it_is_from():
     header = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", bytes([0, 0, 0, 1, 0, 0, 0, 1, 8, 0, 0, 0, 0]))
     rest = chunk(b"IDAT", zlib.compress(b"\0\0")) + chunk(b"IEND", b"")
     assert labelled(header + rest, "run 1, commit a") == header + chunk(b"tEXt", b"Source\0run 1, commit a") + rest
+
+
+@pytest.mark.parametrize("low", [1e-9, 1e-3])
+def test_the_guides_of_a_chart_have_the_slopes_they_claim_also_where_the_picture_ends(low):
+    import altair
+
+    from reports.page.figures import _guides
+
+    chart = _guides([1 / 960, 1 / 60], (1 / 60, 1e-2), altair.X("dt:Q"), altair.Y("error:Q"), low)
+    for order, ends in chart.data.groupby("order"):
+        rise = np.diff(np.log(ends["error"])) / np.diff(np.log(ends["dt"]))
+        assert rise == pytest.approx(float(order), rel=1e-9)
+        assert ends["error"].min() >= low * (1 - 1e-9)
