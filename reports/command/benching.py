@@ -48,7 +48,8 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
     """Measure errors and times of SCENES over steps and iterations; time at equal error, scaling, overhead.
 
     Errors come first, in worker processes; then everything is timed in a lane of its own. --quick takes under two
-    minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer than 90 % of the ratios agree.
+    minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
+    than 90 % of the ratios agree.
     """
     console = Console(stderr=True)
     if options["ulp"]:

@@ -66,15 +66,16 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
         twin.close()
     simulation = engine.build(scene, dt, settings)
     try:
+        view = PlanarView(simulation) if lifted else simulation
+        start = np.array(view.pose())
         if unit.warm_up:
             simulation.advance(unit.warm_up)
-        view = PlanarView(simulation) if lifted else simulation
         seconds, wall = _clock(simulation, view, unit.steps, unit.sampled)
         pose, twist = view.pose(), view.twist()
         state = hashlib.sha256((pose + 0.0).tobytes() + (twist + 0.0).tobytes()).hexdigest()[:16]
         error = unit.error
         if unit.purpose != "work":
-            error = own_error(scene_of(unit.slot), (unit.warm_up + unit.steps) * dt, pose)
+            error = own_error(scene_of(unit.slot), (unit.warm_up + unit.steps) * dt, start, pose)
         elif not np.isfinite(pose).all():
             error = math.inf
         return seconds, wall, state, error, str(simulation.certificate().get("kernel", ""))
