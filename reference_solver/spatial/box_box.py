@@ -3,7 +3,7 @@
 The fifteen candidate axes are the three face normals of each box and the nine products of their edges
 (Gottschalk, Lin and Manocha, "OBBTree", SIGGRAPH 1996). The axis of largest separation decides. Parallel faces
 make several candidates equal but for round-off, so candidates are ranked: a face of f, a face of s, a pair of
-edges; a lower rank must win by `PREFERENCE` of the smallest half extent.
+edges; a lower rank must win by an advantage.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from reference_solver.spatial.polygon import ON_SIDE, clip_to_rectangle, keep_wi
 from reference_solver.spatial.state import POINTS, Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add_scaled, axis, cross, dot, length, row, scale, sub
 
-#: A lower-ranked axis must separate better by this part of the smallest half extent. It has to exceed the tilt
-#: [rad] with which boxes land on each other, about v dt / L = 1e-3; the overlap is wrong by at most as much.
-PREFERENCE = 1e-3
+#: A face of s must separate better than one of f by this part of the smaller half extent, so that ties of aligned
+#: boxes are always decided the same way and round-off cannot swap the reference face.
+FACE_ADVANTAGE = 1e-6
+#: A pair of edges must separate better than any face by this part. It has to exceed the tilt [rad] with which boxes
+#: land on each other, about v dt / L = 1e-3: an edge pair is one point where a face offers four.
+EDGE_ADVANTAGE = 1e-3
 #: Edges closer to parallel than this [rad] offer no axis of their own: a face normal covers them.
 PARALLEL = 1e-6
 #: Feature numbers: face contacts lie below (72 pairs of faces, 64 vertices each), 12 x 12 pairs of edges above.
@@ -31,7 +34,7 @@ def box_box(
 ) -> tuple[int, Vector]:
     """Boxes f and s: up to four points of two faces, or one of two edges."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
-    preference = PREFERENCE * min(bodies.extent[f], bodies.extent[s])
+    extent = min(bodies.extent[f], bodies.extent[s])
     face_f, gap_f = _best_face(bodies, f, s, between)
     face_s, gap_s = _best_face(bodies, s, f, between)
     if gap_f > reach or gap_s > reach:
@@ -39,8 +42,8 @@ def box_box(
     edges, gap_e, normal_e = _best_edges(bodies, f, s, between)
     if gap_e > reach:
         return 0, (0.0, 0.0, 1.0)
-    by_s = gap_s > gap_f + preference
-    if gap_e <= (gap_s if by_s else gap_f) + preference:
+    by_s = gap_s > gap_f + FACE_ADVANTAGE * extent
+    if gap_e <= (gap_s if by_s else gap_f) + EDGE_ADVANTAGE * extent:
         if by_s:
             count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, manifolds, m)
             normal = scale(-1.0, normal)
