@@ -222,12 +222,9 @@ def _overhead(table: pd.DataFrame) -> Sequence[Plain]:
 
 
 def _protocol(bench: Bench) -> list[tuple[str, str]]:
-    """The protocol as it was kept, one line each; nested tables flattened."""
-    return [
-        (name.replace("_", " "), _said(value))
-        for name, value in bench.protocol.items()
-        if value not in (None, "", [], {})
-    ]
+    """The protocol as it was kept, one line each; nested tables flattened. Declared errors stand in their scenes."""
+    kept = {k: v for k, v in bench.protocol.items() if k != "primary" and v not in (None, "", [], {})}
+    return [(name.replace("_", " "), _said(value)) for name, value in kept.items()]
 
 
 def _said(value: Any) -> str:
