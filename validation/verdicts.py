@@ -20,7 +20,6 @@ from validation.cells import Slot
 from validation.deviation import Deviation
 from validation.findings import Finding
 
-
 #: A law, the value it predicts, and the band it allows.
 Prediction = tuple[Deviation, float, float]
 
