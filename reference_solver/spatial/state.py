@@ -145,7 +145,8 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     bodies.pose = [body.pose for body in model.bodies]
     bodies.twist = [body.twist for body in model.bodies]
     bodies.acceleration = acceleration
-    bodies.torque[free] = [body.torque for body in model.bodies if body.motion == "free"]
+    torques = [body.torque for body in model.bodies if body.motion == "free"]
+    bodies.torque[free] = np.reshape(np.array(torques, dtype=np.float64), (-1, 3))  # also without a free body
     bodies.inverse_mass = 1.0 / mass
     bodies.inverse_moments = 1.0 / moments if needs.rotation else 0.0
     bodies.moments = moments

@@ -126,3 +126,16 @@ def test_the_uncompiled_solver_gives_the_same_answer():
         simulation.advance(40)
         assert simulation.pose == pytest.approx(pose, abs=1e-12)
         assert simulation.twist == pytest.approx(twist, abs=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_world_without_a_free_body_runs(dimension):
+    normal = (0.0,) * (dimension - 1) + (1.0,)
+    pose, twist = ((0.0,) * 3, (0.0,) * 3) if dimension == 2 else ((0.0,) * 3 + (1.0,) + (0.0,) * 3, (0.0,) * 6)
+    load = (0.0,) * dimension
+    torque = 0.0 if dimension == 2 else (0.0,) * 3
+    floor = Body(HalfSpace(normal, 0.0), pose=pose, twist=twist, motion="fixed", force=load, torque=torque)
+    model = Model(dimension, (floor,), (0.0,) * dimension, np.zeros((1, 1)), np.zeros((1, 1)))
+    simulation = Simulation(model, Settings.classical(1 / 240))
+    simulation.advance(3)
+    assert len(simulation.contacts().gap) == 0
