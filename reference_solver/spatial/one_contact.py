@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, kernel
 
 # Newton steps on a smooth scalar function; each at least doubles the digits once near, so 30 always suffice.
 NEWTON_STEPS = 30
@@ -17,7 +17,7 @@ NEWTON_STEPS = 30
 SCAN = 32
 
 
-@inner_kernel
+@kernel
 def disc_friction(k11, k12, k22, g1, g2, radius):
     """Friction impulse minimising 1/2 p.K p + g.p over the disc |p| <= radius.
 
@@ -47,7 +47,7 @@ def disc_friction(k11, k12, k22, g1, g2, radius):
     return radius * p1 / size, radius * p2 / size
 
 
-@inner_kernel
+@kernel
 def coulomb_impulse(k, q, mu):
     """Impulse (p1, p2, pn) with 0 <= K p + q, complementary to pn, and friction of largest dissipation.
 
