@@ -109,10 +109,10 @@ def upper(k):
     return (k[0, 0], k[0, 1], k[0, 2], k[1, 1], k[1, 2], k[2, 2])
 
 
-@given(collision_matrices(), st.tuples(components, components, components), st.floats(0.0, 0.3))
+@given(collision_matrices(), st.tuples(components, components, components), st.floats(0.0, 1.5))
 @hypothesis_settings(max_examples=300, deadline=None)
 def test_the_impulse_of_one_contact_obeys_signorini_and_coulomb(k, q, mu):
-    """With mu below every |k_nt| the solution exists; it must fulfil the law, whichever branch found it.
+    """Whichever branch found the impulse, it must fulfil the law.
 
     Well-posed: k_nn > mu |k_nt|; other contacts may have none (Painleve) and are not drawn.
     """
