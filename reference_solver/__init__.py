@@ -10,7 +10,7 @@
 4.8
 """
 
-from reference_solver.model import Body, Box, Disc, HalfSpace, Model, Sphere
+from reference_solver.model import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Sphere
 from reference_solver.records import Contacts, Record
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
@@ -18,10 +18,12 @@ from reference_solver.simulation import Simulation
 __all__ = [
     "Body",
     "Box",
+    "Capsule",
     "Contacts",
     "Disc",
     "HalfSpace",
     "Model",
+    "Polygon",
     "Record",
     "Settings",
     "Simulation",

@@ -8,7 +8,6 @@ Everything is checked here, because compiled kernels check nothing.
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_solver.checks import load, require_positive, unit, vector
+from reference_solver.shapes import Box, Capsule, Disc, HalfSpace, Polygon, Shape, Sphere, smallest_extent
+
 Motion = Literal["free", "fixed", "prescribed"]
 Array = NDArray[np.float64]
 
@@ -24,55 +26,22 @@ Array = NDArray[np.float64]
 POSE_SIZE = {2: 3, 3: 7}
 TWIST_SIZE = {2: 3, 3: 6}
 
-#: A quaternion or a normal this close to unit length is normalised in silence; further off it is a mistake.
-UNIT_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class Disc:
-    """Planar disc of ``radius`` [m]."""
-
-    radius: float
-
-    def __post_init__(self) -> None:
-        _require_positive("radius", self.radius)
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """Sphere of ``radius`` [m]."""
-
-    radius: float
-
-    def __post_init__(self) -> None:
-        _require_positive("radius", self.radius)
-
-
-@dataclass(frozen=True)
-class Box:
-    """Box about its centre with two (planar) or three (spatial) ``half_extents`` [m]."""
-
-    half_extents: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "half_extents", _vector("half_extents", self.half_extents, (2, 3)))
-        for value in self.half_extents:
-            _require_positive("half_extents", value)
-
-
-@dataclass(frozen=True)
-class HalfSpace:
-    """Solid region ``normal . x <= offset`` in body axes; ``normal`` leaves the solid, ``offset`` in m."""
-
-    normal: tuple[float, ...]
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", _unit("normal", _vector("normal", self.normal, (2, 3))))
-        _require_finite("offset", self.offset)
-
-
-Shape = Disc | Sphere | Box | HalfSpace
+__all__ = [
+    "POSE_SIZE",
+    "TWIST_SIZE",
+    "Array",
+    "Body",
+    "Box",
+    "Capsule",
+    "Disc",
+    "HalfSpace",
+    "Model",
+    "Motion",
+    "Polygon",
+    "Shape",
+    "Sphere",
+    "smallest_extent",
+]
 
 
 @dataclass(frozen=True)
@@ -112,17 +81,17 @@ class Body:
 
     def __post_init__(self) -> None:
         if not isinstance(self.shape, Shape):
-            raise ValueError(f"shape: {self.shape!r} is none of Disc, Sphere, Box, HalfSpace")
+            raise ValueError(f"shape: {self.shape!r} is none of Disc, Sphere, Box, Capsule, Polygon, HalfSpace")
         if self.motion not in ("free", "fixed", "prescribed"):
             raise ValueError(f"motion: {self.motion!r} is none of 'free', 'fixed', 'prescribed'")
-        pose = _vector("pose", self.pose, (3, 7))
+        pose = vector("pose", self.pose, (3, 7))
         dimension = 2 if len(pose) == 3 else 3
         if dimension == 3:
-            pose = pose[:3] + _unit("pose", pose[3:])
+            pose = pose[:3] + unit("pose", pose[3:])
         self._set(pose=pose)
-        self._set(twist=_load("twist", self.twist, TWIST_SIZE[dimension]))
-        self._set(force=_load("force", self.force, dimension))
-        self._set(torque=_load("torque", self.torque, 1 if dimension == 2 else 3))
+        self._set(twist=load("twist", self.twist, TWIST_SIZE[dimension]))
+        self._set(force=load("force", self.force, dimension))
+        self._set(torque=load("torque", self.torque, 1 if dimension == 2 else 3))
         if self.motion == "fixed" and any(self.twist or ()):
             raise ValueError(f"twist: a fixed body must be at rest, not {self.twist!r}; use motion='prescribed'")
         if self.motion == "free":
@@ -131,10 +100,10 @@ class Body:
     def _check_inertia(self, dimension: int) -> None:
         if isinstance(self.shape, HalfSpace):
             raise ValueError("motion: a HalfSpace cannot be free")
-        _require_positive("mass", self.mass)
-        inertia = _load("inertia", self.inertia, 1 if dimension == 2 else 3)
+        require_positive("mass", self.mass)
+        inertia = load("inertia", self.inertia, 1 if dimension == 2 else 3)
         for value in inertia if isinstance(inertia, tuple) else (inertia,):
-            _require_positive("inertia", value)
+            require_positive("inertia", value)
         self._set(inertia=inertia)
 
     def _set(self, **fields: Any) -> None:
@@ -190,57 +159,9 @@ class Model:
         if (friction < 0.0).any():
             raise ValueError("friction: must not be negative")
         object.__setattr__(self, "bodies", tuple(self.bodies))
-        object.__setattr__(self, "gravity", _vector("gravity", self.gravity, (self.dimension,)))
+        object.__setattr__(self, "gravity", vector("gravity", self.gravity, (self.dimension,)))
         object.__setattr__(self, "restitution", np.clip(restitution, 0.0, 1.0))
         object.__setattr__(self, "friction", friction)
-
-
-def smallest_extent(shape: Shape) -> float:
-    """Smallest half width of a shape [m]; infinite for a half-space. Scales margins, so that units cancel."""
-    if isinstance(shape, HalfSpace):
-        return math.inf
-    return min(shape.half_extents) if isinstance(shape, Box) else shape.radius
-
-
-def _require_finite(name: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
-        raise ValueError(f"{name}: {value!r} is not a number")
-    if not math.isfinite(value):
-        raise ValueError(f"{name}: {value!r} is not finite")
-
-
-def _require_positive(name: str, value: float) -> None:
-    _require_finite(name, value)
-    if value <= 0.0:
-        raise ValueError(f"{name}: {value!r} must be positive")
-
-
-def _vector(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(x) for x in value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: {value!r} is not a sequence of numbers") from error
-    if len(numbers) not in sizes:
-        raise ValueError(f"{name}: {len(numbers)} numbers where {' or '.join(map(str, sizes))} are needed")
-    for number in numbers:
-        _require_finite(name, number)
-    return numbers
-
-
-def _load(name: str, value: Any, size: int) -> float | tuple[float, ...]:
-    """Return a vector of ``size`` numbers, a plain number for size 1, zeros where the value is missing."""
-    if size == 1:
-        number = 0.0 if value is None else value
-        _require_finite(name, number)
-        return float(number)
-    return (0.0,) * size if value is None else _vector(name, value, (size,))
-
-
-def _unit(name: str, vector: tuple[float, ...]) -> tuple[float, ...]:
-    length = math.hypot(*vector)
-    if abs(length - 1.0) > UNIT_TOLERANCE:
-        raise ValueError(f"{name}: {vector!r} has length {length:.6g}, not 1")
-    return tuple(x / length for x in vector)
 
 
 def _require_dimension(name: str, body: Body, dimension: int) -> None:
@@ -250,6 +171,8 @@ def _require_dimension(name: str, body: Body, dimension: int) -> None:
     fits = {
         Disc: dimension == 2,
         Sphere: dimension == 3,
+        Capsule: True,
+        Polygon: dimension == 2,
         Box: isinstance(shape, Box) and len(shape.half_extents) == dimension,
         HalfSpace: isinstance(shape, HalfSpace) and len(shape.normal) == dimension,
     }

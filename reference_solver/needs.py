@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference_solver.model import Box, Model
+from reference_solver.model import Box, Capsule, Model, Polygon
 
 #: Up to this many bodies all pairs are tested; sorting pays off beyond (performance notes: indifferent to ~100).
 ALL_PAIRS_LIMIT = 64
@@ -40,7 +40,7 @@ def needs(model: Model) -> Needs:
     np.fill_diagonal(meets, False)
     friction = bool((model.friction[meets] > 0.0).any())
     turned = any(
-        body.motion == "free" and (isinstance(body.shape, Box) or np.any(np.asarray(body.torque)))
+        body.motion == "free" and (isinstance(body.shape, Box | Capsule | Polygon) or np.any(np.asarray(body.torque)))
         for body in model.bodies
     )
     return Needs(

@@ -5,8 +5,19 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.columns import COS, EXTENT, MOTION, SHAPE, SIN, SIZE
-from reference_solver.planar.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Indices, Options, Pairs, Rows
+from reference_solver.planar.columns import COS, EXTENT, MOTION, REACH, SHAPE, SIN, SIZE
+from reference_solver.planar.state import (
+    BOX,
+    CANDIDATES,
+    CAPSULE,
+    FREE,
+    HALF_SPACE,
+    Bodies,
+    Indices,
+    Options,
+    Pairs,
+    Rows,
+)
 
 
 @inner_kernel
@@ -21,6 +32,8 @@ def bound_bodies(bodies: Bodies, pairs: Pairs, options: Options) -> None:
             c, s = abs(bodies.real[i, COS]), abs(bodies.real[i, SIN])
             wide = c * bodies.real[i, SIZE] + s * bodies.real[i, SIZE + 1]
             high = s * bodies.real[i, SIZE] + c * bodies.real[i, SIZE + 1]
+        elif bodies.kind[i, SHAPE] >= CAPSULE:
+            wide = high = bodies.real[i, REACH]
         # A pair's margin is the smaller of both extents, so that one body's own margin always covers it.
         grow = options.margin * bodies.real[i, EXTENT] + 1e-15 * (abs(bodies.pose[i, 0]) + abs(bodies.pose[i, 1]))
         pairs.bounds[i, 0] = bodies.pose[i, 0] - wide - grow

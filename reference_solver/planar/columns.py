@@ -10,7 +10,9 @@ each one row of a two-dimensional array, and these are the names of the columns.
 SHAPE = 0
 #: Motion code.
 MOTION = 1
-BODY_INTEGERS = 2
+#: First vertex of the body's core in `Bodies.vertex`, and how many (0: half-space, 1: disc, 2: capsule).
+FIRST_VERTEX, VERTICES = 2, 3
+BODY_INTEGERS = 4
 
 # Bodies.real.
 #: Cosine and sine of the angle.
@@ -21,11 +23,15 @@ LOAD = 2
 INVERSE_MASS = 5
 #: 0 unless the body is free, and 0 throughout where rotation is left out.
 INVERSE_INERTIA = 6
-#: Three columns: disc (radius, ., .), box (half extents, .), half-space (normal, offset) [m].
+#: Three columns: disc (radius, ., .), box (half extents, .), half-space (normal, offset) [m]; zeros for others.
 SIZE = 7
 #: Smallest half width [m].
 EXTENT = 10
-BODY_REALS = 11
+#: By how much the core is grown: all that is within this of the polygon of its vertices is the body [m].
+ROUNDING = 11
+#: Largest distance of a point of the body from its centre of mass [m]; infinite for a half-space.
+REACH = 12
+BODY_REALS = 13
 
 # Rows.integer, integers.
 #: Bodies, A < B.

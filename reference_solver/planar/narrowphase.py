@@ -14,8 +14,9 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.box_box import box_box
 from reference_solver.planar.columns import COS, EXTENT, SHAPE, SIN, SIZE
+from reference_solver.planar.core_core import core_core, half_space_core
 from reference_solver.planar.points import share_of_gap, write_point
-from reference_solver.planar.state import DISC, HALF_SPACE, Bodies, Rows
+from reference_solver.planar.state import CAPSULE, DISC, HALF_SPACE, Bodies, Rows
 
 
 @inner_kernel
@@ -25,6 +26,10 @@ def collide(bodies: Bodies, a: int, b: int, margin: float, rows: Rows, c: int) -
     if bodies.kind[a, SHAPE] > bodies.kind[b, SHAPE]:
         first, second = b, a
     reach = margin * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+    if bodies.kind[second, SHAPE] >= CAPSULE:
+        if bodies.kind[first, SHAPE] == HALF_SPACE:
+            return half_space_core(bodies, first, second, reach, rows, c)
+        return core_core(bodies, a, b, reach, rows, c)
     if bodies.kind[first, SHAPE] == HALF_SPACE:
         if bodies.kind[second, SHAPE] == DISC:
             return half_space_disc(bodies, first, second, reach, rows, c)

@@ -11,36 +11,42 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, Disc, HalfSpace, Model, smallest_extent
+from reference_solver.model import Array, Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, smallest_extent
 from reference_solver.needs import Needs
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
     BODY_REALS,
     COS,
     EXTENT,
+    FIRST_VERTEX,
     INVERSE_INERTIA,
     INVERSE_MASS,
     LOAD,
     MOTION,
+    REACH,
+    ROUNDING,
     ROW_INTEGERS,
     ROW_REALS,
     SHAPE,
     SIN,
     SIZE,
+    VERTICES,
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
+from reference_solver.shapes import MOST_VERTICES
 
 Indices = NDArray[np.int64]
 
 #: Shape codes; a pair of different shapes is handled in this order.
-HALF_SPACE, DISC, BOX = 0, 1, 2
+HALF_SPACE, DISC, BOX, CAPSULE, POLYGON = 0, 1, 2, 3, 4
 FIXED, FREE, PRESCRIBED = 0, 1, 2
 SCALAR, BLOCK = 0, 1
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
-#: Features per pair: bound of the feature numbers in narrowphase.py, to pack (a, b, feature) into one key.
-FEATURES = 64
+#: Features per pair: bound of the feature numbers in core_core.py (edge on edge, then vertex on vertex), to pack
+#: (a, b, feature) into one key.
+FEATURES = 5 * MOST_VERTICES**2
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
@@ -54,6 +60,7 @@ class Bodies(NamedTuple):
     pseudo: Array  # (n, 3): pseudo-velocity of position correction
     real: Array  # (n, BODY_REALS)
     kind: Indices  # (n, BODY_INTEGERS)
+    vertex: Array  # (k, 2): vertices of all cores in body axes [m], counter-clockwise
 
 
 class Pairs(NamedTuple):
@@ -126,14 +133,21 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     real[:, INVERSE_INERTIA] = 1.0 / inertia if needs.rotation else 0.0
     real[:, SIZE : SIZE + 3] = [_size(body) for body in model.bodies]
     real[:, EXTENT] = [smallest_extent(body.shape) for body in model.bodies]
+    cores = [_core(body) for body in model.bodies]
+    count = np.array([len(core) for core in cores])
+    vertex = np.array([point for core in cores for point in core] or np.zeros((1, 2)), dtype=np.float64)
+    real[:, ROUNDING] = [getattr(body.shape, "radius", 0.0) for body in model.bodies]
+    far = [max((np.hypot(x, y) for x, y in core), default=np.inf) for core in cores]
+    real[:, REACH] = np.array(far) + real[:, ROUNDING]
     kind = np.zeros((n, BODY_INTEGERS), np.int64)
+    kind[:, FIRST_VERTEX], kind[:, VERTICES] = np.cumsum(count) - count, count
     kind[:, SHAPE] = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
     kind[:, MOTION] = [_MOTION_CODE[body.motion] for body in model.bodies]
     twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
-    return Bodies(pose, twist, np.zeros((n, 3)), real, kind)
+    return Bodies(pose, twist, np.zeros((n, 3)), real, kind, vertex)
 
 
-_SHAPE_CODE = {HalfSpace: HALF_SPACE, Disc: DISC, Box: BOX}
+_SHAPE_CODE = {HalfSpace: HALF_SPACE, Disc: DISC, Box: BOX, Capsule: CAPSULE, Polygon: POLYGON}
 _MOTION_CODE = {"fixed": FIXED, "free": FREE, "prescribed": PRESCRIBED}
 
 
@@ -143,8 +157,20 @@ def _size(body: Body) -> tuple[float, float, float]:
         return (shape.normal[0], shape.normal[1], shape.offset)
     if isinstance(shape, Box):
         return (shape.half_extents[0], shape.half_extents[1], 0.0)
-    assert isinstance(shape, Disc)
-    return (shape.radius, 0.0, 0.0)
+    return (shape.radius, 0.0, 0.0) if isinstance(shape, Disc) else (0.0, 0.0, 0.0)
+
+
+def _core(body: Body) -> tuple[tuple[float, float], ...]:
+    """Vertices of the polygon that, grown by the rounding radius, is the body; none of a half-space."""
+    shape = body.shape
+    if isinstance(shape, HalfSpace):
+        return ()
+    if isinstance(shape, Box):
+        x, y = shape.half_extents
+        return ((x, y), (-x, y), (-x, -y), (x, -y))
+    if isinstance(shape, Polygon):
+        return shape.vertices
+    return ((shape.half_length, 0.0), (-shape.half_length, 0.0)) if isinstance(shape, Capsule) else ((0.0, 0.0),)
 
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
