@@ -21,7 +21,7 @@ class Gate:
     made_by
         Profile or oracle that made the measured value.
     holds
-        Whether the promise is kept; use `at_most` and `exactly`, which decide it.
+        Whether the promise is kept; use `at_most`, `at_least` and `exactly`, which decide it.
     """
 
     quantity: str
@@ -35,6 +35,11 @@ class Gate:
     def at_most(cls, quantity: str, case: str, measured: float, gate: float, made_by: str) -> Gate:
         """Return a gate that holds where ``|measured| <= gate``; nan never does."""
         return cls(quantity, case, float(measured), float(gate), made_by, bool(abs(measured) <= gate))
+
+    @classmethod
+    def at_least(cls, quantity: str, case: str, measured: float, gate: float, made_by: str) -> Gate:
+        """Return a gate that holds where ``measured >= gate``; nan never does."""
+        return cls(quantity, case, float(measured), float(gate), made_by, bool(measured >= gate))
 
     @classmethod
     def exactly(cls, quantity: str, case: str, measured: float, gate: float, made_by: str) -> Gate:

@@ -1,0 +1,62 @@
+"""Every gate that `crosscheck certify` prints holds; the functions are those that the command calls."""
+
+import pytest
+
+from reference_solver.certification import Gate, columns, friction, impact, rotation
+from reference_solver.certification.space import SPACES
+
+IN_BOTH = [
+    (impact.single_rebound, "classical"),
+    (impact.flat_rebound,),
+    (impact.deep_overlap,),
+    (friction.creep,),
+    (friction.sliding,),
+    (friction.slide_to_roll,),
+    (columns.convergence,),
+    (columns.column, 10, 100_000),
+    (columns.heavy_on_light, 1e2, 1e-12),
+]
+ALONE = [
+    (rotation.order, "classical"),
+    (rotation.order, "reference"),
+    (rotation.angular_momentum, "classical"),
+    (rotation.angular_momentum, "reference"),
+    (columns.column, SPACES[0], 50, 1000),
+    (columns.pyramid, SPACES[0]),
+]
+
+
+def named(call):
+    return "-".join(str(getattr(part, "name", getattr(part, "__name__", part))) for part in call)
+
+
+@pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
+@pytest.mark.parametrize("call", IN_BOTH, ids=named)
+def test_gate_holds_in_both_dimensions(call, space):
+    function, *arguments = call
+    rows = list(function(space, *arguments))
+    assert rows
+    assert [row for row in rows if not row.holds] == []
+
+
+@pytest.mark.parametrize("call", ALONE, ids=named)
+def test_gate_holds(call):
+    function, *arguments = call
+    rows = list(function(*arguments))
+    assert rows
+    assert [row for row in rows if not row.holds] == []
+
+
+def test_each_part_yields_what_its_functions_yield():
+    names = {row.quantity for row in rotation.gates()}
+    assert names == {
+        "free rotation: observed order",
+        "free rotation: |L|, relative",
+        "free rotation: direction of L [rad]",
+    }
+
+
+def test_a_gate_from_below_is_failed_by_what_is_too_small_and_by_what_is_no_number():
+    assert Gate.at_least("", "", 2.0, 1.9, "").holds
+    assert not Gate.at_least("", "", 1.8, 1.9, "").holds
+    assert not Gate.at_least("", "", float("nan"), 1.9, "").holds
