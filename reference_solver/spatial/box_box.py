@@ -24,6 +24,10 @@ FACE_ADVANTAGE = 1e-6
 EDGE_ADVANTAGE = 1e-3
 #: Edges closer to parallel than this [rad] offer no axis of their own: a face normal covers them.
 PARALLEL = 1e-6
+#: Cosines above -TIE, and distances above -TIE half extents, count as positive. Where a direction is exactly tied (two
+#: edges equally far out, centres side by side along the normal) round-off would choose, and another one in a turned
+#: world; so the positive body axis wins. The cross product of edges nearly `PARALLEL` has round-off of 1e-16 / 1e-6.
+TIE = 1e-9
 #: Feature numbers: face contacts lie below (72 pairs of faces, 64 vertices each), 12 x 12 pairs of edges above.
 EDGES = 72 * 64
 
@@ -89,7 +93,7 @@ def _best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, f
             sine = length(n)
             if sine < PARALLEL:
                 continue
-            n = scale((1.0 if dot(n, between) >= 0.0 else -1.0) / sine, n)
+            n = scale((1.0 if dot(n, between) >= -TIE * sine * bodies.extent[f] else -1.0) / sine, n)
             gap = dot(between, n) - _half_width(bodies, f, n) - _half_width(bodies, s, n)
             if gap > best_gap + ON_SIDE * bodies.extent[f]:
                 best, best_gap, best_normal = 3 * i + j, gap, n
@@ -135,7 +139,7 @@ def _supporting_edge(bodies: Bodies, i: int, k: int, n: Vector) -> tuple[Vector,
     for other in range(3):
         if other != k:
             direction = axis(bodies.axes, i, other)
-            if dot(direction, n) >= 0.0:
+            if dot(direction, n) >= -TIE:
                 middle = add_scaled(middle, bodies.geometry[i, other], direction)
                 name += bit
             else:
@@ -151,7 +155,7 @@ def _clip_faces(
     """Clip the face of box c that looks against face +-k of box r; return point count and normal from r to c."""
     between = sub(row(bodies.pose, c, 0), row(bodies.pose, r, 0))
     n = axis(bodies.axes, r, k)
-    towards = dot(between, n) >= 0.0
+    towards = dot(between, n) >= -TIE * bodies.extent[r]
     if not towards:
         n = scale(-1.0, n)
     ku, kv = (k + 1) % 3, (k + 2) % 3

@@ -13,7 +13,7 @@ survive from step to step and carry accumulated impulses with them.
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.spatial.box_box import box_box
+from reference_solver.spatial.box_box import TIE, box_box
 from reference_solver.spatial.points import share_of_gap, write_point
 from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import (
@@ -149,10 +149,10 @@ def box_sphere(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifold
     else:
         k = 0
         for i in range(1, 3):
-            if abs(local[i]) - half[i] > abs(local[k]) - half[k]:
+            if abs(local[i]) - half[i] > abs(local[k]) - half[k] + TIE * bodies.extent[f]:
                 k = i
         distance = abs(local[k]) - half[k]
-        normal = scale(1.0 if local[k] >= 0.0 else -1.0, axis(bodies.axes, f, k))
+        normal = scale(1.0 if local[k] >= -TIE * bodies.extent[f] else -1.0, axis(bodies.axes, f, k))
     gap = distance - bodies.geometry[s, 0]
     if gap > reach:
         return 0, normal
