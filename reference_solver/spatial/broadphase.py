@@ -7,7 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import sift_down
 from reference_solver.planar.state import Options
-from reference_solver.spatial.state import BOX, CANDIDATES, FREE, HALF_SPACE, Bodies, Detection, Indices
+from reference_solver.spatial.state import BOX, CANDIDATES, CAPSULE, FREE, HALF_SPACE, Bodies, Detection, Indices
 
 
 @inner_kernel
@@ -24,6 +24,8 @@ def bound_bodies(bodies: Bodies, options: Options) -> None:
                 wide = 0.0
                 for k in range(3):
                     wide += abs(bodies.axes[i, d, k]) * bodies.geometry[i, k]
+            elif bodies.kind[i] == CAPSULE:
+                wide = abs(bodies.axes[i, d, 0]) * bodies.geometry[i, 0] + bodies.geometry[i, 1]
             far = wide + (grow + 1e-15 * (wide + abs(bodies.pose[i, d])))  # 1e-15: rounding of these sums
             bodies.low[i, d] = bodies.pose[i, d] - far
             bodies.high[i, d] = bodies.pose[i, d] + far

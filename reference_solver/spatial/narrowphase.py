@@ -14,8 +14,9 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.box_box import TIE, box_box
+from reference_solver.spatial.capsule import box_capsule, capsule_capsule, half_space_capsule, sphere_capsule
 from reference_solver.spatial.points import share_of_gap, write_point
-from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Detection, Manifolds
+from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, SPHERE, Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import (
     Vector,
     add,
@@ -54,6 +55,14 @@ def collide(bodies: Bodies, detection: Detection, a: int, b: int, margin: float,
 def _pair(
     bodies: Bodies, detection: Detection, f: int, s: int, reach: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
+    if bodies.kind[s] == CAPSULE:
+        if bodies.kind[f] == HALF_SPACE:
+            return half_space_capsule(bodies, f, s, reach, manifolds, m)
+        if bodies.kind[f] == SPHERE:
+            return sphere_capsule(bodies, f, s, reach, manifolds, m)
+        if bodies.kind[f] == CAPSULE:
+            return capsule_capsule(bodies, f, s, reach, manifolds, m)
+        return box_capsule(bodies, f, s, reach, manifolds, m)
     if bodies.kind[f] == HALF_SPACE:
         if bodies.kind[s] == SPHERE:
             return half_space_sphere(bodies, f, s, reach, manifolds, m)

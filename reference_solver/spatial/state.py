@@ -15,13 +15,13 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, HalfSpace, Model, Sphere, smallest_extent
+from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Sphere, smallest_extent
 from reference_solver.needs import Needs
 
 Indices = NDArray[np.int64]
 
 #: Shape codes, from flat to round; a pair of different shapes is handled in this order.
-HALF_SPACE, BOX, SPHERE = 0, 1, 2
+HALF_SPACE, BOX, SPHERE, CAPSULE = 0, 1, 2, 3
 FIXED, FREE, PRESCRIBED = 0, 1, 2
 
 #: Points per manifold: a plane support needs no more than four to carry any load.
@@ -48,7 +48,8 @@ BODY = np.dtype(
         ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
         ("turning", "i8"),  # 1 where the quaternion can change
         ("kind", "i8"),  # shape code
-        ("geometry", "f8", 4),  # half-space (normal, offset), box (half extents, .), sphere (radius, ., ., .)
+        # half-space (normal, offset), box (half extents), sphere (radius), capsule (half length, radius) [m]
+        ("geometry", "f8", 4),
         ("extent", "f8"),  # smallest half width [m]
         ("motion", "i8"),  # FIXED, FREE or PRESCRIBED
         ("low", "f8", 3),  # lower corner of the bounding box
@@ -159,7 +160,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     return bodies
 
 
-_SHAPE_CODE = {HalfSpace: HALF_SPACE, Box: BOX, Sphere: SPHERE}
+_SHAPE_CODE = {HalfSpace: HALF_SPACE, Box: BOX, Sphere: SPHERE, Capsule: CAPSULE}
 _MOTION_CODE = {"fixed": FIXED, "free": FREE, "prescribed": PRESCRIBED}
 
 
@@ -169,6 +170,8 @@ def _geometry(body: Body) -> tuple[float, ...]:
         return (*shape.normal, shape.offset)
     if isinstance(shape, Box):
         return (*shape.half_extents, 0.0)
+    if isinstance(shape, Capsule):
+        return (shape.half_length, shape.radius, 0.0, 0.0)
     assert isinstance(shape, Sphere)
     return (shape.radius, 0.0, 0.0, 0.0)
 
