@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,11 +73,25 @@ class Frames:
     contacts: Contacts
 
 
+def joined(parts: Sequence[Frames]) -> Frames:
+    """Return the samples of consecutive runs as those of one."""
+    ends = np.cumsum([0] + [part.offset[-1] for part in parts])
+    offsets = [part.offset[1:] + end for part, end in zip(parts, ends, strict=False)]
+    contacts = [part.contacts for part in parts]
+    return Frames(
+        np.concatenate([part.pose for part in parts]),
+        np.concatenate([part.twist for part in parts]),
+        np.concatenate([np.zeros(1, np.int64), *offsets]),
+        Contacts(*(np.concatenate([getattr(c, f.name) for c in contacts]) for f in fields(Contacts))),
+    )
+
+
 @dataclass(frozen=True)
 class Record:
     """A recorded run, the start state included: ``t`` (s,) [s], then as in `Frames` with s samples.
 
-    The start state carries no contacts (``offset[1] == 0``).
+    The start state carries no contacts (``offset[1] == 0``). ``certificates``, where asked for, holds for each name of
+    ``Simulation.certificate`` the values (s,) of the steps since the sample before; zeros, and True, at the start.
     """
 
     t: Array
@@ -83,3 +99,4 @@ class Record:
     twist: Array
     offset: Indices
     contacts: Contacts
+    certificates: dict[str, NDArray[Any]] = field(default_factory=dict)

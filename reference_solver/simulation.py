@@ -20,11 +20,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from reference_solver.certificate import columns, summary
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
-from reference_solver.records import Contacts, Frames, Record
+from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
-from reference_solver.tally import summary
+from reference_solver.tally import merge, new_tally
 
 
 class World(Protocol):
@@ -76,8 +77,11 @@ class Simulation:
         self._world.run(steps, 0, False)
         self._steps += steps
 
-    def record(self, steps: int, stride: int = 1, contacts: bool = False) -> Record:
+    def record(self, steps: int, stride: int = 1, contacts: bool = False, certificates: bool = False) -> Record:
         """Make ``steps`` steps and return the samples at the start and after every ``stride`` steps.
+
+        With ``certificates`` every sample tells how good the steps since the one before were; compiled code is then
+        entered once a sample instead of once a run.
 
         Raises
         ------
@@ -87,7 +91,11 @@ class Simulation:
         _require_count("steps", steps, 0)
         _require_count("stride", stride, 1)
         first, start_pose, start_twist = self._steps, self.pose, self.twist
-        frames = self._world.run(steps, stride, contacts)
+        tallies: list[Array] = []
+        if certificates:
+            frames, tallies = self._certified(steps, stride, contacts)
+        else:
+            frames = self._world.run(steps, stride, contacts)
         self._steps += steps
         count = len(frames.pose)
         return Record(
@@ -96,7 +104,20 @@ class Simulation:
             twist=np.concatenate([start_twist[None], frames.twist]),
             offset=np.concatenate([[0], frames.offset]),
             contacts=frames.contacts,
+            certificates=columns([new_tally(), *tallies]) if certificates else {},
         )
+
+    def _certified(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, list[Array]]:
+        """Run with a tally of its own for each sample; all of them are then entered in that of the run."""
+        whole, parts, tallies = self._world.tally.copy(), [], []
+        for chunk in [stride] * (steps // stride) + [steps % stride] * (steps % stride > 0):
+            self._world.tally[:] = 0.0
+            parts.append(self._world.run(chunk, stride, contacts))
+            tallies.append(self._world.tally.copy())
+            merge(whole, tallies[-1])
+        self._world.tally[:] = whole
+        parts = parts or [self._world.run(0, stride, contacts)]
+        return joined(parts), tallies[: steps // stride]
 
     @property
     def pose(self) -> Array:
@@ -121,9 +142,27 @@ class Simulation:
     def certificate(self) -> dict[str, Any]:
         """How well the answers solve their own equations, over the whole run.
 
-        ``residual``: worst scaled natural map of a step (E14); ``sweeps``: total; ``worst_sweeps``: of one step;
-        ``converged``: every step reached `Settings.residual` (always true without a residual stop);
-        ``projected``: worst position correction of a step [m].
+        ``holds``
+            Whether the run may serve as truth: every share below is within its gate (`certificate.GATES`).
+        ``reasons``
+            What failed, one sentence each.
+        ``residual``, ``sweeps``, ``worst_sweeps``, ``converged``
+            Worst natural map the sweeps ended with (E14), their total, those of the worst step, whether every step
+            reached `Settings.residual` (always true without a residual stop).
+        ``natural``, ``cone``, ``pull``, ``excess``
+            Worst shares by which a contact misses its law: natural map (E14), friction cone (E60), negative normal
+            impulse, friction beyond mu p_n.
+        ``penetration``, ``projected``
+            Worst overlap at detection as a share of the smaller half width; worst position correction of a step [m].
+        ``momentum``, ``energy``
+            Worst shares by which a body's momentum (E61) or a solve's kinetic energy (E62) does not balance.
+        ``pumped``, ``created``, ``kane``
+            Largest share of its work that a contact solve created without, and with, restitution (E63), and how many
+            solves did so with restitution: a property of Newton's law, reported and no failure.
+        ``contact_work``, ``surface_work``, ``load_work``
+            Sums over the run [J]: of impulses on relative motion, of prescribed surfaces on bodies, of loads (E62).
+        ``solves``
+            Contact solves certified.
         """
         return summary(self._world.tally)
 

@@ -61,6 +61,8 @@ class Bodies(NamedTuple):
     real: Array  # (n, BODY_REALS)
     kind: Indices  # (n, BODY_INTEGERS)
     vertex: Array  # (k, 2): vertices of all cores in body axes [m], counter-clockwise
+    start: Array  # (n, 3): twist before the impulses of a contact solve, for its certificate
+    pressed: Array  # (n, 2): sum of the sizes of those impulses over mass [m/s], and over inertia [rad/s]
 
 
 class Pairs(NamedTuple):
@@ -144,7 +146,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     kind[:, SHAPE] = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
     kind[:, MOTION] = [_MOTION_CODE[body.motion] for body in model.bodies]
     twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
-    return Bodies(pose, twist, np.zeros((n, 3)), real, kind, vertex)
+    return Bodies(pose, twist, np.zeros((n, 3)), real, kind, vertex, np.zeros((n, 3)), np.zeros((n, 2)))
 
 
 _SHAPE_CODE = {HalfSpace: HALF_SPACE, Disc: DISC, Box: BOX, Capsule: CAPSULE, Polygon: POLYGON}

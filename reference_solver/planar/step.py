@@ -10,6 +10,7 @@ import math
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
+from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.manifolds import detect, remember
@@ -49,9 +50,11 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, tally: Arra
         if options.solver == BLOCK:
             prepare_blocks(bodies, rows)
     accelerate(bodies, options)
+    open_solve(bodies, options.dt, tally)
     if rows.counts[CONTACTS] > 0:
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, options, tally)
+        certify(bodies, rows, options, tally)
     move(bodies, bodies.twist, options.dt)
     if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move(bodies, bodies.pseudo, options.dt)

@@ -40,6 +40,8 @@ BODY = np.dtype(
         ("inverse_mass", "f8"),  # 0 unless free
         ("inverse_moments", "f8", 3),  # of the principal moments; 0 unless free, or where rotation is left out
         ("pseudo", "f8", 6),  # pseudo-velocity of position correction
+        ("start", "f8", 6),  # twist before the impulses of a contact solve, for its certificate
+        ("pressed", "f8", 2),  # sum of the sizes of those impulses over mass [m/s], and over inertia [rad/s]
         ("acceleration", "f8", 3),  # gravity plus constant force over mass [m/s^2]
         ("torque", "f8", 3),  # constant torque [N m]
         ("moments", "f8", 3),  # principal moments of free bodies [kg m^2]

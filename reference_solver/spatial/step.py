@@ -8,6 +8,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
 from reference_solver.planar.state import Options
+from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
@@ -27,11 +28,13 @@ def step(bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, 
     recall(bodies, detection, manifolds, memory, options)
     prepare(bodies, detection, manifolds, options)
     accelerate(bodies, options)
+    open_solve(bodies, options.dt, tally)
     pushed = False
     if found > 0:
         prepare_wrenches(bodies, manifolds, options)
         warm_start(bodies, manifolds, options)
         solve_velocities(bodies, manifolds, options, tally)
+        certify(bodies, manifolds, options, tally)
         # Pushes belong to the poses at which contacts were found, and so come before bodies move.
         pushed = correct_positions(bodies, manifolds, options, tally)
     move(bodies, options)
