@@ -34,7 +34,8 @@ def point_residual(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
     if manifolds.friction[m] > 0.0:
         t1, t2 = manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1]
         stiffness = 0.5 * (k[0] + k[3])
-        moved1, moved2 = into_disc(t1 - u[0] / stiffness, t2 - u[1] / stiffness, manifolds.friction[m] * pressed)
+        bound = manifolds.friction[m] * max(pressed, 0.0)
+        moved1, moved2 = into_disc(t1 - u[0] / stiffness, t2 - u[1] / stiffness, bound)
         slip_defect = math.sqrt((t1 - moved1) ** 2 + (t2 - moved2) ** 2)
         worst = max(worst, share(slip_defect, max(speed / stiffness, IMPULSE_SHARE * pressed)))
     return worst
