@@ -125,7 +125,7 @@ def newton(
     """
     system = manifolds.system[m]
     step_v, step_w = ZERO, ZERO
-    before, halvings = math.inf, 0
+    before, halvings, width = math.inf, 0, extent(manifolds, m)
     for _ in range(NEWTON_STEPS):
         miss, noise = set_system(manifolds, m, stiffness, free_v, free_w, v, w)
         if miss <= SOLVED * noise:
@@ -136,7 +136,7 @@ def newton(
             v, w = sub(v, step_v), sub(w, step_w)
             continue
         before, halvings = miss, 0
-        if not eliminate(system):
+        if not eliminate(system, width):
             return False, v, w
         step_v = (system[0, 6], system[1, 6], system[2, 6])
         step_w = (system[3, 6], system[4, 6], system[5, 6])
@@ -242,8 +242,23 @@ def unit_velocity(j: int, offset: Vector) -> Vector:
 
 
 @inner_kernel
-def eliminate(system: Array) -> bool:
-    """Solve the 6 x 6 system in place, right side and solution in column 6; False if it is singular."""
+def extent(manifolds: Manifolds, m: int) -> float:
+    """Distance of the farthest point from the centre: what an angular velocity counts with [m]."""
+    width = 0.0
+    for p in range(manifolds.points[m]):
+        width = max(width, length(row(manifolds.offset[m], p, 0)))
+    return width
+
+
+@inner_kernel
+def eliminate(system: Array, width: float) -> bool:
+    """Solve the 6 x 6 system in place, right side and solution in column 6; False if it is singular.
+
+    Rows 3 to 5 are angular: times ``width`` [m] they compare with the others as pivots, whatever the unit of length.
+    """
+    for i in range(3, 6):
+        for j in range(7):
+            system[i, j] *= width
     for k in range(6):
         pivot = k
         for i in range(k + 1, 6):

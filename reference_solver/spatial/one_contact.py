@@ -12,6 +12,8 @@ from reference_solver.compilation import inner_kernel, kernel
 
 # Newton steps on a smooth scalar function; each at least doubles the digits once near, so 30 always suffice.
 NEWTON_STEPS = 30
+# A disc this small beside the sticking impulse does not change the slip, and the secular equation would underflow.
+NO_FRICTION = 1e-50
 # Directions tried when Newton fails. The slip condition is a trigonometric polynomial of degree two, with at
 # most four roots; a sixteenth of a turn separates all but nearly double ones.
 SCAN = 32
@@ -38,6 +40,9 @@ def disc_friction(k11, k12, k22, g1, g2, radius):
         size = math.sqrt(p1 * p1 + p2 * p2)
         if step == 0 and size <= radius:
             return p1, p2
+        if step == 0 and radius < NO_FRICTION * size:
+            slip = math.sqrt(g1 * g1 + g2 * g2)
+            return -radius * g1 / slip, -radius * g2 / slip
         if size <= radius * (1.0 + 1e-15):
             break
         w1 = (c * p1 - k12 * p2) / determinant

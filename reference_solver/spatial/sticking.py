@@ -64,14 +64,17 @@ def set_admittance(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
 
 @inner_kernel
 def factorise(manifolds: Manifolds, m: int) -> None:
-    """Cholesky factor of the admittance, in place, in the lower triangle."""
+    """Factors L D L^T of the admittance, in place: D on the diagonal, L below it.
+
+    Without square roots, so that units changed by powers of two change no bit.
+    """
     f = manifolds.factor[m]
     for j in range(6):
         for i in range(j, 6):
             entry = f[i, j]
             for k in range(j):
-                entry -= f[i, k] * f[j, k]
-            f[i, j] = math.sqrt(entry) if i == j else entry / f[j, j]
+                entry -= f[i, k] * (f[k, k] * f[j, k])
+            f[i, j] = entry if i == j else entry / f[j, j]
 
 
 @inner_kernel
@@ -132,11 +135,10 @@ def substitute(manifolds: Manifolds, m: int) -> None:
     for i in range(6):
         for k in range(i):
             x[i] -= f[i, k] * x[k]
-        x[i] /= f[i, i]
     for i in range(5, -1, -1):
+        x[i] /= f[i, i]
         for k in range(i + 1, 6):
             x[i] -= f[k, i] * x[k]
-        x[i] /= f[i, i]
 
 
 @inner_kernel

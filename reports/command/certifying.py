@@ -22,7 +22,7 @@ from reports.command.group import AS_JSON, main
 from reports.wording import number
 
 #: Modules of `reference_solver.certification` that answer for gates, in the order in which they are shown.
-PARTS = ("impact", "friction", "columns", "conservation", "rotation", "event_driven")
+PARTS = ("impact", "friction", "columns", "conservation", "rotation", "metamorphic", "event_driven")
 #: Processes side by side; the parts are of such lengths that more would wait for the longest.
 WORKERS = 2
 
