@@ -39,11 +39,11 @@ def box_box(
     """Boxes f and s: up to four points of two faces, or one of two edges."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     extent = min(bodies.extent[f], bodies.extent[s])
-    face_f, gap_f = _best_face(bodies, f, s, between)
-    face_s, gap_s = _best_face(bodies, s, f, between)
+    face_f, gap_f = best_face(bodies, f, s, between)
+    face_s, gap_s = best_face(bodies, s, f, between)
     if gap_f > reach or gap_s > reach:
         return 0, (0.0, 0.0, 1.0)
-    edges, gap_e, normal_e = _best_edges(bodies, f, s, between)
+    edges, gap_e, normal_e = best_edges(bodies, f, s, between)
     if gap_e > reach:
         return 0, (0.0, 0.0, 1.0)
     by_s = gap_s > gap_f + FACE_ADVANTAGE * extent
@@ -62,7 +62,7 @@ def box_box(
 
 
 @inner_kernel
-def _half_width(bodies: Bodies, i: int, n: Vector) -> float:
+def half_width(bodies: Bodies, i: int, n: Vector) -> float:
     """Half width of box i along the unit vector n."""
     return (
         bodies.geometry[i, 0] * abs(dot(axis(bodies.axes, i, 0), n))
@@ -72,19 +72,19 @@ def _half_width(bodies: Bodies, i: int, n: Vector) -> float:
 
 
 @inner_kernel
-def _best_face(bodies: Bodies, r: int, c: int, between: Vector) -> tuple[int, float]:
+def best_face(bodies: Bodies, r: int, c: int, between: Vector) -> tuple[int, float]:
     """Face axis of box r with the largest gap to box c, and that gap."""
     best, best_gap = 0, -math.inf
     for k in range(3):
         n = axis(bodies.axes, r, k)
-        gap = abs(dot(between, n)) - bodies.geometry[r, k] - _half_width(bodies, c, n)
+        gap = abs(dot(between, n)) - bodies.geometry[r, k] - half_width(bodies, c, n)
         if gap > best_gap + ON_SIDE * bodies.extent[r]:
             best, best_gap = k, gap
     return best, best_gap
 
 
 @inner_kernel
-def _best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, float, Vector]:
+def best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, float, Vector]:
     """Pair of edges (3 i + j) with the largest gap, that gap, and the unit normal from f to s; -1 if none."""
     best, best_gap, best_normal = -1, -math.inf, (0.0, 0.0, 1.0)
     for i in range(3):
@@ -94,7 +94,7 @@ def _best_edges(bodies: Bodies, f: int, s: int, between: Vector) -> tuple[int, f
             if sine < PARALLEL:
                 continue
             n = scale((1.0 if dot(n, between) >= -TIE * sine * bodies.extent[f] else -1.0) / sine, n)
-            gap = dot(between, n) - _half_width(bodies, f, n) - _half_width(bodies, s, n)
+            gap = dot(between, n) - half_width(bodies, f, n) - half_width(bodies, s, n)
             if gap > best_gap + ON_SIDE * bodies.extent[f]:
                 best, best_gap, best_normal = 3 * i + j, gap, n
     return best, best_gap, best_normal

@@ -109,8 +109,26 @@ def collect_momentum(bodies: Bodies, i: int, before: Vector) -> None:
 
 @inner_kernel
 def turn_freely(bodies: Bodies, i: int, dt: float) -> None:
-    """Turn body i with constant angular momentum for dt: axes 1 and 2 half, 3 whole, 2 and 1 half (E18)."""
-    local = times_transposed(bodies.axes, i, row(bodies.angular_momentum, i, 0))
+    """Turn body i with constant angular momentum for dt, and set the spin that belongs to it (E18)."""
+    momentum = row(bodies.angular_momentum, i, 0)
+    set_orientation(bodies, i, split_turn(bodies, i, momentum, dt))
+    w = spin_of(bodies, i, momentum)
+    for d in range(3):
+        bodies.twist[i, 3 + d] = w[d]
+
+
+@inner_kernel
+def spin_of(bodies: Bodies, i: int, momentum: Vector) -> Vector:
+    """Angular velocity of body i with this angular momentum, world axes [rad/s]."""
+    local = times_transposed(bodies.axes, i, momentum)
+    moments = row(bodies.moments, i, 0)
+    return times(bodies.axes, i, (local[0] / moments[0], local[1] / moments[1], local[2] / moments[2]))
+
+
+@inner_kernel
+def split_turn(bodies: Bodies, i: int, momentum: Vector, dt: float) -> Quaternion:
+    """Quaternion of body i after dt with constant angular momentum [kg m^2/s], by the splitting E18."""
+    local = times_transposed(bodies.axes, i, momentum)
     q = quaternion(bodies, i)
     moments = row(bodies.moments, i, 0)
     local, q = turn_about(0, local, q, moments, 0.5 * dt)
@@ -118,11 +136,7 @@ def turn_freely(bodies: Bodies, i: int, dt: float) -> None:
     local, q = turn_about(2, local, q, moments, dt)
     local, q = turn_about(1, local, q, moments, 0.5 * dt)
     local, q = turn_about(0, local, q, moments, 0.5 * dt)
-    set_orientation(bodies, i, q)
-    local = times_transposed(bodies.axes, i, row(bodies.angular_momentum, i, 0))
-    w = times(bodies.axes, i, (local[0] / moments[0], local[1] / moments[1], local[2] / moments[2]))
-    for d in range(3):
-        bodies.twist[i, 3 + d] = w[d]
+    return q
 
 
 @inner_kernel

@@ -47,6 +47,11 @@ BODY = np.dtype(
         ("moments", "f8", 3),  # principal moments of free bodies [kg m^2]
         ("angular_momentum", "f8", 3),  # world axes [kg m^2/s], kept for gyroscopic bodies only
         ("spin_before", "f8", 3),  # angular velocity at the start of the step
+        (
+            "rate",
+            "f8",
+            6,
+        ),  # constant in a located sub-step: acceleration, and torque or angular acceleration (`flight`)
         ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
         ("turning", "i8"),  # 1 where the quaternion can change
         ("kind", "i8"),  # shape code
