@@ -1,4 +1,4 @@
-"""``certify``: what the solver and the oracle promise, measured beside the gate."""
+"""``certify``: what solver and oracle promise, measured beside the gate; ``--order``: how errors fall with dt."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reference_solver.certification import Gate
+from reference_solver.certification.orders import PHASES, RATES, orders
 from reports.command.group import AS_JSON, main
 from reports.wording import number
 
@@ -25,13 +26,21 @@ from reports.wording import number
 PARTS = ("impact", "friction", "columns", "conservation", "rotation", "metamorphic", "event_driven")
 #: Processes side by side; the parts are of such lengths that more would wait for the longest.
 WORKERS = 2
+#: Columns of a table that goes to a file; a terminal has its own width.
+WIDTH = 150
 
 
 @main.command()
 @AS_JSON
-def certify(as_json: bool) -> None:
+@click.option("--order", is_flag=True, help="Show how errors fall with the step instead: fitted orders.")
+def certify(as_json: bool, order: bool) -> None:
     """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold."""
     console = Console(stderr=True)
+    if not console.is_terminal:
+        console = Console(stderr=True, width=WIDTH)
+    if order:
+        show_orders(console, as_json)
+        return
     found = side_by_side(measured, PARTS, console)
     gates = [gate for part in PARTS for gate in found[part]]
     if as_json:
@@ -40,6 +49,21 @@ def certify(as_json: bool) -> None:
     broken = sum(not gate.holds for gate in gates)
     console.print(f"{len(gates) - broken} of {len(gates)} gates hold")
     sys.exit(1 if broken else 0)
+
+
+def show_orders(console: Console, as_json: bool) -> None:
+    """Print the fitted orders of all schemes and cases; they are observations, no gates."""
+    with console.status("halving steps"):
+        found = list(orders())
+    if as_json:
+        click.echo(json.dumps([asdict(row) for row in found], indent=1))
+    table = Table(title=f"Orders, largest error of {PHASES} phases", title_justify="left")
+    for heading in ("case", "made by", "order", *(f"at 1/{rate} s" for rate in (RATES[0], RATES[-1]))):
+        table.add_column(heading, no_wrap=True)
+    for row in found:
+        slope = "round-off" if row.order is None else f"{row.order:.2f}"
+        table.add_row(row.case, row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
+    console.print(table)
 
 
 def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: Console) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from reference_solver.certification import Gate, rotation
+from reference_solver.certification.orders import RATES, Order
 from reports.command import certifying, main
 
 
@@ -50,3 +51,15 @@ def test_parts_run_in_processes_and_come_back_by_name():
     from rich.console import Console
 
     assert certifying.side_by_side(len, ("a", "bc", "def"), Console(stderr=True)) == {"a": 1, "bc": 2, "def": 3}
+
+
+def test_orders_are_shown_beside_their_errors(monkeypatch):
+    rows = [
+        Order("bounce", "classical, planar", RATES, (0.05, 0.025, 0.0125, 0.00625, 0.003125), 1.0),
+        Order("flight", "reference, planar", RATES, (0.0,) * 5, None),
+    ]
+    monkeypatch.setattr(certifying, "orders", lambda: iter(rows))
+    result = CliRunner().invoke(main, ["certify", "--order", "--json"])
+    assert result.exit_code == 0
+    assert [row["order"] for row in json.loads(result.stdout)] == [1.0, None]
+    assert "round-off" in result.stderr and "0.00312" in result.stderr and "0.05" in result.stderr
