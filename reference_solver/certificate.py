@@ -51,6 +51,8 @@ def summary(tally: Array) -> dict[str, Any]:
         "converged": bool(tally[entries.UNCONVERGED] == 0.0),
         "projected": float(tally[entries.PROJECTED]),
         "solves": int(tally[entries.SOLVES]),
+        "direct": int(tally[entries.DIRECT]),
+        "factorisations": int(tally[entries.FACTORISATIONS]),
     }
     values |= {gate.name: float(tally[gate.entry]) for gate in GATES}
     values |= {

@@ -37,6 +37,8 @@ class Settings:
         Gap or overlap that is left alone: within it a contact counts as touching [m].
     warm_starting
         Start from the impulses of the step before, matched by feature.
+    direct
+        Hand a step over to the direct solver (E44) where block sweeps with a residual stop turn out to be slow.
     margin
         Pairs with e = 0 are in contact while their gap is below this fraction of the smaller half width; they may
         close it, not more (E8). Pairs with e > 0 are in contact only where they touch.
@@ -58,6 +60,7 @@ class Settings:
     warm_starting: bool = True
     solver: Solver = "scalar"
     margin: float = 0.01
+    direct: bool = True
 
     def __post_init__(self) -> None:
         _require("dt", self.dt, math.isfinite(self.dt) and self.dt > 0.0, "a positive, finite time")

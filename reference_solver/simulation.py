@@ -163,6 +163,8 @@ class Simulation:
             Sums over the run [J]: of impulses on relative motion, of prescribed surfaces on bodies, of loads (E62).
         ``solves``
             Contact solves certified.
+        ``direct``, ``factorisations``
+            Contact solves that the direct solver finished (E44), and its factorisations in all of them.
         """
         return summary(self._world.tally)
 

@@ -38,11 +38,13 @@ CONTACT_WORK, SURFACE_WORK, LOAD_WORK = 15, 16, 17
 NOT_FINITE = 18
 #: Contact solves that were certified.
 SOLVES = 19
+#: Contact solves whose answer is the direct solver's (E44), and its factorisations.
+DIRECT, FACTORISATIONS = 20, 21
 
-SIZE = 20
+SIZE = 22
 
 #: Entries that add up over a run; of all others the largest counts.
-SUMS = (SWEEPS, UNCONVERGED, KANE, CONTACT_WORK, SURFACE_WORK, LOAD_WORK, NOT_FINITE, SOLVES)
+SUMS = (SWEEPS, UNCONVERGED, KANE, CONTACT_WORK, SURFACE_WORK, LOAD_WORK, NOT_FINITE, SOLVES, DIRECT, FACTORISATIONS)
 
 
 def new_tally() -> Array:

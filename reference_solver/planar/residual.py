@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, SPEED, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
 from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
-
-#: Share of a contact's own impulse that its scale never falls below. With a residual of 1e-13 it allows 1e-14 of
-#: the impulse, 45 units in the last place: what the sum over a tall column cannot be better than.
-IMPULSE_SHARE = 0.1
 
 
 @inner_kernel

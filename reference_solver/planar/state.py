@@ -102,6 +102,7 @@ class Options(NamedTuple):
     margin: float
     warm_starting: int
     solver: int
+    direct: int
     rotation: int
     friction: int
     restitution: int
@@ -205,6 +206,11 @@ def grown(rows: Rows) -> Rows:
     return bigger
 
 
+def uses_direct(settings: Settings) -> bool:
+    """Whether the direct solver may be called, and needs room."""
+    return settings.direct and settings.solver == "block" and settings.residual is not None
+
+
 def options(settings: Settings, needs: Needs) -> Options:
     """Return settings and needs as plain numbers."""
     return Options(
@@ -219,6 +225,7 @@ def options(settings: Settings, needs: Needs) -> Options:
         margin=float(settings.margin),
         warm_starting=int(settings.warm_starting),
         solver={"scalar": SCALAR, "block": BLOCK}[settings.solver],
+        direct=int(uses_direct(settings)),
         rotation=int(needs.rotation),
         friction=int(needs.friction),
         restitution=int(needs.restitution),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
@@ -41,7 +42,7 @@ def move(bodies: Bodies, twist: Array, dt: float) -> None:
 
 
 @inner_kernel
-def step(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, tally: Array) -> bool:
+def step(bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, options: Options, tally: Array) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
     if not detect(bodies, pairs, rows, options):
         return False
@@ -53,7 +54,7 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, tally: Arra
     open_solve(bodies, options.dt, tally)
     if rows.counts[CONTACTS] > 0:
         warm_start(bodies, rows, options)
-        solve_velocities(bodies, rows, options, tally)
+        solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
     move(bodies, bodies.twist, options.dt)
     if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
@@ -67,6 +68,7 @@ def run_steps(
     bodies: Bodies,
     pairs: Pairs,
     rows: Rows,
+    problem: Problem,
     options: Options,
     tally: Array,
     buffer: Buffer,
@@ -83,7 +85,7 @@ def run_steps(
         sampled = stride > 0 and (k + 1) % stride == 0
         if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(rows.real) > len(buffer.real):
             return k
-        if not step(bodies, pairs, rows, options, tally):
+        if not step(bodies, pairs, rows, problem, options, tally):
             return k
         if sampled:
             sample(bodies, rows, buffer, (k + 1) // stride - 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.planar.state import (
@@ -15,6 +16,7 @@ from reference_solver.planar.state import (
     allocate_rows,
     grown,
     options,
+    uses_direct,
 )
 from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
@@ -33,6 +35,7 @@ class World:
         self._pairs = allocate_pairs(model, 8 * n + 64)
         self._rows = allocate_rows(8 * n + 64)
         self._options = options(settings, needs)
+        self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
 
     @property
@@ -54,7 +57,16 @@ class World:
         done = 0
         while True:
             done = run_steps(
-                self._bodies, self._pairs, self._rows, self._options, self.tally, buffer, done, steps, stride
+                self._bodies,
+                self._pairs,
+                self._rows,
+                self._problem,
+                self._options,
+                self.tally,
+                buffer,
+                done,
+                steps,
+                stride,
             )
             if done == steps:
                 break
@@ -90,6 +102,7 @@ class World:
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
         else:
             self._rows = grown(self._rows)
+            self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))
 
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:

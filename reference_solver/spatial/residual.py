@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.residual import IMPULSE_SHARE
+from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.one_contact import into_disc
