@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from reference_solver.certification import Gate
@@ -62,7 +63,7 @@ def show_orders(console: Console, as_json: bool) -> None:
         table.add_column(heading, no_wrap=True)
     for row in found:
         slope = "round-off" if row.order is None else f"{row.order:.2f}"
-        table.add_row(row.case, row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
+        table.add_row(escape(row.case), row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
     console.print(table)
 
 
@@ -101,5 +102,6 @@ def _table(gates: Iterable[Gate]) -> Table:
         table.add_column(heading)
     for gate in gates:
         mark = "holds" if gate.holds else "FAILS"
-        table.add_row(gate.quantity, gate.case, number(gate.measured), number(gate.gate), gate.made_by, mark)
+        words = (escape(gate.quantity), escape(gate.case))  # [m] is a unit, not a style
+        table.add_row(*words, number(gate.measured), number(gate.gate), gate.made_by, mark)
     return table
