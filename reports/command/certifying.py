@@ -24,7 +24,7 @@ from reports.command.group import AS_JSON, main
 from reports.wording import number
 
 #: Modules of `reference_solver.certification` that answer for gates, in the order in which they are shown.
-PARTS = ("impact", "friction", "columns", "conservation", "rotation", "metamorphic", "event_driven")
+PARTS = ("impact", "friction", "columns", "conservation", "rotation", "metamorphic", "hard_cases", "event_driven")
 #: Processes side by side; the parts are of such lengths that more would wait for the longest.
 WORKERS = 2
 #: Columns of a table that goes to a file; a terminal has its own width.
