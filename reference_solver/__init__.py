@@ -14,6 +14,7 @@ from reference_solver.model import Body, Box, Capsule, Disc, HalfSpace, Model, P
 from reference_solver.records import Contacts, Record
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
+from reference_solver.step_problem import StepProblem
 
 __all__ = [
     "Body",
@@ -28,4 +29,5 @@ __all__ = [
     "Settings",
     "Simulation",
     "Sphere",
+    "StepProblem",
 ]

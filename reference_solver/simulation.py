@@ -10,6 +10,7 @@ The two dimensions are two packages behind one interface, chosen from one table.
         after every `stride` steps (stride 0: no samples; `contacts`: also the contacts of the step before each
         sample).
     world.contacts() -> Contacts     of the last step made
+    world.step_problem() -> StepProblem     of the next step, which is not made
     world.tally                      float64 array over the whole run, indexed by the constants in tally.py
 """
 
@@ -25,6 +26,7 @@ from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
+from reference_solver.step_problem import StepProblem
 from reference_solver.tally import merge, new_tally
 
 
@@ -40,6 +42,9 @@ class World(Protocol):
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
+
+    def step_problem(self) -> StepProblem:
+        """Contact problem of the next step."""
 
 
 #: Package of each dimension, imported when first used: loading kernels costs time.
@@ -137,6 +142,13 @@ class Simulation:
     def contacts(self) -> Contacts:
         """Contacts of the last step with the impulses it applied."""
         return self._world.contacts()
+
+    def step_problem(self) -> StepProblem:
+        """Contact problem that a step of length `Settings.dt` from here has to solve (E64); nothing moves.
+
+        Impacts and forces stand in one problem, as in a step at fixed dt, whatever the scheme cuts a step into.
+        """
+        return self._world.step_problem()
 
     @property
     def certificate(self) -> dict[str, Any]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
+from reference_solver.planar.problem import assemble, pose_problem
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
@@ -21,6 +24,7 @@ from reference_solver.planar.state import (
 from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
+from reference_solver.step_problem import StepProblem
 from reference_solver.tally import new_tally
 
 
@@ -83,6 +87,13 @@ class World:
         buffer = self._buffer(0, count)
         copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
+
+    def step_problem(self) -> StepProblem:
+        """Contact problem of the next step; the world stays what it is."""
+        trial = deepcopy(self)
+        while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
+            trial._grow()
+        return assemble(trial._bodies, trial._rows, trial._options)
 
     def _buffer(self, samples: int, room: int) -> Buffer:
         frames = np.zeros((samples, len(self.pose), 3))

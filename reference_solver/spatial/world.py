@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 
 from reference_solver.model import Array, Model
@@ -10,6 +12,7 @@ from reference_solver.planar.state import options
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.motion import initialise
+from reference_solver.spatial.problem import assemble, pose_problem
 from reference_solver.spatial.state import (
     CANDIDATES,
     MANIFOLDS,
@@ -21,6 +24,7 @@ from reference_solver.spatial.state import (
     allocate_memory,
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
+from reference_solver.step_problem import StepProblem
 from reference_solver.tally import new_tally
 
 
@@ -80,6 +84,15 @@ class World:
         """Contacts of the last step."""
         buffer = self._buffer(0, self._most_points)
         return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
+
+    def step_problem(self) -> StepProblem:
+        """Contact problem of the next step; the world stays what it is."""
+        trial, found = deepcopy(self), -1
+        while found < 0:
+            found = pose_problem(trial._bodies, trial._detection, trial._manifolds, trial._memory, trial._options)
+            if found < 0:
+                trial._grow()
+        return assemble(trial._bodies, trial._manifolds[:found])
 
     @property
     def _most_points(self) -> int:
