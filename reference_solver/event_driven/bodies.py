@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.model import Array, Body, Box, HalfSpace, Model
+from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Polygon
 
 BALL, PLANE, BOX = 0, 1, 2
 
@@ -101,6 +101,8 @@ def _normal(body: Body) -> Array:
 
 def _require_closed_form(name: str, body: Body, dimension: int) -> None:
     spin = np.atleast_1d(np.array(body.twist)[dimension:])
+    if isinstance(body.shape, Capsule | Polygon):
+        raise ValueError(f"{name}: contacts of a {type(body.shape).__name__} have no closed form here")
     if isinstance(body.shape, HalfSpace) and spin.any():
         raise ValueError(f"{name}: a half-space that turns has no closed-form contacts here")
     if isinstance(body.shape, Box):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Sphere
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Sphere
 from reference_solver.event_driven import EventDriven
 
 STILL = (0.0, 0.0, 0.0)
@@ -25,6 +25,8 @@ def disc(x, y=0.0):
         ([Body(Box((1.0, 1.0)), mass=1.0, inertia=1.0, torque=1.0)], "torque"),
         ([disc(0.0), Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(0.0, 0.0, 1.0))], "turns"),
         ([disc(0.0), disc(0.9)], "bodies: 0 and 1 overlap by 0.1 m"),
+        ([Body(Capsule(0.5, 0.2), mass=1.0, inertia=0.1)], r"bodies\[0\]: contacts of a Capsule"),
+        ([disc(5.0), Body(Polygon(((1.0, 0.0), (0.0, 1.0), (-1.0, -1.0))), 1.0, 1.0)], r"bodies\[1\]: .* Polygon"),
         ([Body(HalfSpace((0.0, 1.0)), motion="fixed"), disc(0.0, 0.4)], "overlap"),
         ([Body(HalfSpace((0.0, 1.0)), motion="fixed"), Body(Box((1.0, 1.0)), mass=1.0, inertia=1.0)], "overlap"),
     ],
