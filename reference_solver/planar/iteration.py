@@ -111,9 +111,15 @@ def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, ta
     """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer."""
     solve_directly(bodies, rows, options, problem, DIRECT_BUDGET)
     residual = natural_map(bodies, rows, options)
+    enter_direct(problem, residual, options, tally)
+    return residual
+
+
+@inner_kernel
+def enter_direct(problem: Problem, residual: float, options: Options, tally: Array) -> None:
+    """Add a call of the direct solver to the tally, and whether it finished the step."""
     tally[FACTORISATIONS] += problem.size[OF_STEP]
     tally[DIRECT] += 1.0 if residual <= options.residual else 0.0
-    return residual
 
 
 @inner_kernel

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.iteration import (
     CHECK_INTERVAL,
+    DIRECT_AFTER,
+    DIRECT_BUDGET,
+    DIRECT_WORTH,
     LARGEST_RELAXATION,
     PATIENCE,
     RATE_INTERVAL,
     better_relaxation,
     enter,
+    enter_direct,
+    sweeps_ahead,
 )
 from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.block import sweep_blocks
+from reference_solver.spatial.direct import solve_directly
 from reference_solver.spatial.residual import natural_map
 from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import Bodies, Manifolds
@@ -30,17 +37,18 @@ def sweep(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: fl
 
 
 @inner_kernel
-def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
+def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> None:
     """Sweep until the residual is reached, with the factor given or estimated.
 
     Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
     in circles. When the residual has made no progress for a while, the factor and its bound go half way to 1.
+    Sweeps that turn out slow hand over to the direct solver (E44), and go on from its answer if it does not finish.
     """
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     limit = LARGEST_RELAXATION
     residual = natural_map(bodies, manifolds, options)
     before = best = residual
-    sweeps, best_at = 0, 0
+    sweeps, best_at, next_direct = 0, 0, DIRECT_AFTER
     while residual > options.residual and sweeps < options.max_sweeps:
         sweep(bodies, manifolds, options, relaxation)
         sweeps += 1
@@ -49,6 +57,11 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, options: Options, ta
         residual = natural_map(bodies, manifolds, options)
         if residual < best:
             best, best_at = residual, sweeps
+        if options.direct and sweeps >= next_direct and sweeps % RATE_INTERVAL == 0:
+            if sweeps_ahead(options.residual, residual, before) > DIRECT_WORTH:
+                residual = hand_over(bodies, manifolds, problem, options, tally)
+                before, best, best_at, next_direct = residual, residual, sweeps, 2 * sweeps
+                continue
         if options.relaxation <= 0.0:
             if sweeps - best_at >= PATIENCE:
                 limit = 1.0 + 0.5 * (relaxation - 1.0)
@@ -63,10 +76,19 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, options: Options, ta
 
 
 @inner_kernel
-def solve_velocities(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
+def hand_over(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> float:
+    """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer."""
+    solve_directly(bodies, manifolds, options, problem, DIRECT_BUDGET)
+    residual = natural_map(bodies, manifolds, options)
+    enter_direct(problem, residual, options, tally)
+    return residual
+
+
+@inner_kernel
+def solve_velocities(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> None:
     """Sweep as `Options` asks and enter residual and sweeps in the tally."""
     if options.residual >= 0.0:
-        sweep_to_residual(bodies, manifolds, options, tally)
+        sweep_to_residual(bodies, manifolds, problem, options, tally)
         return
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     for _ in range(options.iterations):

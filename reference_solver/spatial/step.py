@@ -6,6 +6,7 @@ detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
@@ -19,7 +20,15 @@ from reference_solver.spatial.sticking import prepare_wrenches
 
 
 @inner_kernel
-def step(bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, options: Options, tally: Array) -> bool:
+def step(
+    bodies: Bodies,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
+    problem: Problem,
+    options: Options,
+    tally: Array,
+) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
     found = detect(bodies, detection, room, options)
     if found < 0:
@@ -33,7 +42,7 @@ def step(bodies: Bodies, detection: Detection, room: Manifolds, memory: Memory, 
     if found > 0:
         prepare_wrenches(bodies, manifolds, options)
         warm_start(bodies, manifolds, options)
-        solve_velocities(bodies, manifolds, options, tally)
+        solve_velocities(bodies, manifolds, problem, options, tally)
         certify(bodies, manifolds, options, tally)
         # Pushes belong to the poses at which contacts were found, and so come before bodies move.
         pushed = correct_positions(bodies, manifolds, options, tally)
@@ -50,6 +59,7 @@ def run_steps(
     detection: Detection,
     room: Manifolds,
     memory: Memory,
+    problem: Problem,
     options: Options,
     tally: Array,
     buffer: Buffer,
@@ -66,7 +76,7 @@ def run_steps(
         sampled = stride > 0 and (k + 1) % stride == 0
         if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + POINTS * len(room) > len(buffer.real):
             return k
-        if not step(bodies, detection, room, memory, options, tally):
+        if not step(bodies, detection, room, memory, problem, options, tally):
             return k
         if sampled:
             sample(bodies, room[: detection.found[MANIFOLDS]], buffer, (k + 1) // stride - 1)

@@ -6,9 +6,10 @@ from copy import deepcopy
 
 import numpy as np
 
+from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
-from reference_solver.planar.state import options
+from reference_solver.planar.state import options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.motion import initialise
@@ -39,6 +40,7 @@ class World:
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
         self._options = options(settings, needs)
+        self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
         initialise(self._bodies)
 
@@ -65,6 +67,7 @@ class World:
                 self._detection,
                 self._manifolds,
                 self._memory,
+                self._problem,
                 self._options,
                 self.tally,
                 buffer,
@@ -125,6 +128,7 @@ class World:
         memory[: len(self._memory)] = self._memory
         self._memory = memory
         self._manifolds = allocate_manifolds(2 * len(self._manifolds))
+        self._problem = allocate_problem(3, len(self._bodies), self._most_points, bool(self._options.direct))
 
 
 def _contacts(buffer: Buffer, count: int) -> Contacts:
