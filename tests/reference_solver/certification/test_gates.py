@@ -14,15 +14,18 @@ IN_BOTH = [
     (friction.slide_to_roll,),
     (columns.convergence,),
     (columns.column, 10, 100_000),
+    (columns.column, 50, 1000),
+    (columns.column, 200, 1000),
     (columns.heavy_on_light, 1e2, 1e-12),
+    (columns.heavy_on_light, 1e6, 1e-8),
+    (columns.pyramid,),
 ]
 ALONE = [
     (rotation.order, "classical"),
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    (columns.column, SPACES[0], 50, 1000),
-    (columns.pyramid, SPACES[0]),
+    (columns.heavy_on_light, SPACES[0], 1e4, 1e-10),
 ]
 
 
