@@ -35,7 +35,7 @@ GATES = (
     Gate("penetration", entries.PENETRATION, 1.0, "overlap deeper than the smallest half width"),
     # Velocities gather round-off with every sweep, 1e5 of them at most: 2e-11 if none cancelled.
     Gate("momentum", entries.MOMENTUM, 2e-11, "momentum does not balance"),
-    # Twice the defect of momentum: energy is its square.
+    # Twice the defect of momentum: energy is the square of it, and is measured against energies.
     Gate("energy", entries.ENERGY, 4e-11, "kinetic energy does not balance"),
     # Without a positive target p . (u+ + u*) <= 0 holds for every solution; what is left is the residual's share.
     Gate("pumped", entries.PUMPED, 1e-10, "energy created without restitution"),

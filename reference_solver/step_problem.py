@@ -85,12 +85,24 @@ class StepProblem:
     def pair_sums(self, impulse: Array) -> Array:
         """Return the sum of impulses on B of each pair of bodies (pairs, d), world axes [N s].
 
-        Single impulses of a face that rests on several points are not determined, their sums are.
+        Single impulses of a face that rests on several points are not determined, their sums are, unless bodies
+        stand in closed loops (a pyramid): see `body_sums`.
         """
         world = np.einsum("ci,cij->cj", np.reshape(impulse, (-1, self.dimension)), self.frame)
         pairs = np.unique(np.column_stack([self.body_a, self.body_b]), axis=0, return_inverse=True)
         sums = np.zeros((len(pairs[0]), self.dimension))
         np.add.at(sums, pairs[1].ravel(), world)
+        return sums
+
+    def body_sums(self, impulse: Array) -> Array:
+        """Return the sum of impulses on each body that any contact names (bodies, d), world axes [N s].
+
+        Determined wherever velocities are, also in heaps that carry stresses of their own.
+        """
+        world = np.einsum("ci,cij->cj", np.reshape(impulse, (-1, self.dimension)), self.frame)
+        bodies, index = np.unique(np.concatenate([self.body_a, self.body_b]), return_inverse=True)
+        sums = np.zeros((len(bodies), self.dimension))
+        np.add.at(sums, index.ravel(), np.concatenate([-world, world]))
         return sums
 
     def solutions(self) -> list[ContactSolution]:

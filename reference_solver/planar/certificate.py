@@ -34,7 +34,6 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
 from reference_solver.planar.residual import IMPULSE_SHARE, row_residual
-from reference_solver.planar.rows import SPEED_SHARE
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows
 from reference_solver.tally import (
     CONE,
@@ -166,7 +165,7 @@ def surface_power(bodies: Bodies, i: int, x: float, y: float, px: float, py: flo
 
 @inner_kernel
 def kinetic_change(bodies: Bodies) -> tuple[float, float]:
-    """Change of kinetic energy from v* to v+, and the energies that its round-off is a share of [J]."""
+    """Change of kinetic energy from v* to v+, and what its round-off is a share of: that energy itself [J]."""
     gained, size = 0.0, 0.0
     for i in range(len(bodies.kind)):
         for k in range(3):
@@ -175,7 +174,7 @@ def kinetic_change(bodies: Bodies) -> tuple[float, float]:
             if inverse > 0.0 and change != 0.0:
                 both = bodies.twist[i, k] + bodies.start[i, k]
                 gained += 0.5 * change * both / inverse
-                size += 0.5 * (abs(change * both) + (SPEED_SHARE * both) ** 2) / inverse
+                size += 0.5 * (abs(change * both) + 0.25 * both * both) / inverse
     return gained, size
 
 

@@ -14,7 +14,6 @@ from reference_solver.cone import cone_defect
 from reference_solver.model import Array
 from reference_solver.planar.certificate import enter_creation, enter_share
 from reference_solver.planar.residual import IMPULSE_SHARE
-from reference_solver.planar.rows import SPEED_SHARE
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import apply_wrench, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.residual import point_residual
@@ -137,7 +136,7 @@ def point_work(bodies: Bodies, manifolds: Manifolds, m: int, p: int, both: Vecto
 
 @inner_kernel
 def kinetic_change(bodies: Bodies) -> tuple[float, float]:
-    """Change of kinetic energy from v* to v+, and the energies that its round-off is a share of [J]."""
+    """Change of kinetic energy from v* to v+, and what its round-off is a share of: that energy itself [J]."""
     gained, size = 0.0, 0.0
     for i in range(len(bodies)):
         if bodies.inverse_mass[i] == 0.0:
@@ -160,7 +159,7 @@ def energy_between(before: Vector, after: Vector, mass: Vector) -> tuple[float, 
         change, both = after[k] - before[k], after[k] + before[k]
         if change != 0.0:
             gained += 0.5 * mass[k] * change * both
-            size += 0.5 * mass[k] * (abs(change * both) + (SPEED_SHARE * both) ** 2)
+            size += 0.5 * mass[k] * (abs(change * both) + 0.25 * both * both)
     return gained, size
 
 
