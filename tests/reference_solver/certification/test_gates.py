@@ -17,7 +17,7 @@ IN_BOTH = [
     (columns.column, 50, 1000),
     (columns.column, 200, 1000),
     (columns.heavy_on_light, 1e2, 1e-12),
-    (columns.heavy_on_light, 1e6, 1e-8),
+    (columns.alternating, 1e2, 1e-12),
     (columns.pyramid,),
 ]
 ALONE = [
@@ -25,7 +25,8 @@ ALONE = [
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    (columns.heavy_on_light, SPACES[0], 1e4, 1e-10),
+    (columns.alternating, SPACES[0], 1e4, 1e-10),
+    (columns.heavy_on_light, SPACES[1], 1e6, 1e-8),
 ]
 
 
