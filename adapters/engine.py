@@ -126,7 +126,11 @@ class Simulation(ABC):
         """What the engine now holds (masses, materials, dt, solver settings), read from the engine."""
 
     def certificate(self) -> dict[str, Any]:
-        """How well the last answer solves its own equations; empty where an engine does not say."""
+        """How well the answers solve their own equations; empty where an engine does not say.
+
+        Where a profile promises a solution, ``certified`` says whether it was found and ``reasons`` why not: a run
+        that is not certified is INVALID, and so never a truth nor a partner of comparison.
+        """
         return {}
 
     def close(self) -> None:  # noqa: B027  (most engines hold nothing that needs closing)

@@ -66,6 +66,9 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
     if trajectory.finish == "diverged":
         return replace(measured, outcome=Outcome.DIVERGED, reason=trajectory.reason)
     measured = replace(measured, metrics=prepared.canonical.measure(scene, trajectory))
+    if trajectory.certificate.get("certified") is False:
+        reasons = "; ".join(trajectory.certificate.get("reasons", ()))
+        return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
     broken = [slip for slip in slips if not slip.holds]
     if broken:
         worst = broken[0]

@@ -88,8 +88,9 @@ def rows_of(run: str, observations: Iterable[Observation]) -> list[Row]:
 
 
 def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
-    """Largest change of a row's value when its start moves by a few units in the last place."""
-    values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in moved]
+    """Largest change of a value when its start moves by some units in the last place; INVALID runs say nothing."""
+    sound = [observation for observation in moved if observation.outcome is not Outcome.INVALID]
+    values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in sound]
     changes = [abs(value - row.value) for value in values if value is not None and row.value is not None]
     return max(changes, default=None)
 

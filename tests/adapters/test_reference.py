@@ -154,6 +154,9 @@ def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) 
     solved, starved = drive(ball, "reference").certificate, drive(column, "classical", iterations=1).certificate
     assert solved["converged"] is True and solved["residual"] <= 1e-13
     assert starved["residual"] > 1e-6 and starved["worst_sweeps"] == 1 and starved["sweeps"] == 24
+    assert solved["certified"] is True and solved["reasons"] == []
+    assert starved["holds"] is False and starved["reasons"]
+    assert "certified" not in starved  # a fixed number of sweeps promises no solution
     assert json.loads(json.dumps(solved)) == solved
 
 
