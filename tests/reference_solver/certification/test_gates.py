@@ -9,6 +9,7 @@ IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.flat_rebound,),
     (impact.deep_overlap,),
+    (impact.turning_box,),
     (friction.creep,),
     (friction.sliding,),
     (friction.slide_to_roll,),
