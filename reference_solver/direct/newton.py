@@ -58,11 +58,11 @@ def newton(problem: Problem, stiffness: float) -> bool:
             miss, solved = evaluate(problem, stiffness, length)
             if miss < best:
                 best, part = miss, length
-            if solved or miss <= (1.0 - DESCENT * length) * before:
+            if solved or miss <= (1.0 - DESCENT * length) ** 2 * before:
                 break
         if best >= before:
             evaluate(problem, stiffness, 0.0)
-            return before <= ENOUGH * first
+            return before <= ENOUGH**2 * first
         if part != length:
             miss, solved = evaluate(problem, stiffness, part)
         for i in range(len(body)):
@@ -73,7 +73,7 @@ def newton(problem: Problem, stiffness: float) -> bool:
 
 @inner_kernel
 def evaluate(problem: Problem, stiffness: float, length: float) -> tuple[float, bool]:
-    """F at `delta` + length `step`, with impulses and slopes there; returns its size and whether it is round-off."""
+    """F at `delta` + length `step`, with impulses and slopes there; returns its square and whether it is round-off."""
     body, contact = problem.body, problem.contact
     rows, width = problem.size[ROW_COUNT], problem.size[VELOCITY_COUNT]
     for i in range(len(body)):
@@ -96,7 +96,7 @@ def evaluate(problem: Problem, stiffness: float, length: float) -> tuple[float, 
             noise += body.weight[i, k] * body.noise[i, k] ** 2
         total += miss
         solved = solved and miss <= ROUND_OFF * ROUND_OFF * noise
-    return math.sqrt(total), solved
+    return total, solved
 
 
 @inner_kernel

@@ -18,9 +18,10 @@ Indices = NDArray[np.int64]
 #: Room for rows of a contact and velocities of a body.
 ROWS, VELOCITIES = 3, 6
 
-#: Entries of `Problem.size`: contacts, bodies in the matrix, rows per contact, velocities per body, factorisations.
-CONTACTS, NODES, ROW_COUNT, VELOCITY_COUNT, FACTORISATIONS = 0, 1, 2, 3, 4
-SIZES = 5
+#: Entries of `Problem.size`: contacts, bodies in the matrix, rows per contact, velocities per body, factorisations;
+#: 1 where the answer in use is this solver's.
+CONTACTS, NODES, ROW_COUNT, VELOCITY_COUNT, FACTORISATIONS, HELD = 0, 1, 2, 3, 4, 5
+SIZES = 6
 
 #: Most numbers either triangle of the matrix may hold: 256 MB together, of which the operating system provides what is
 #: written to. A planar pyramid of 5000 boxes needs a quarter; what needs more is left to the sweeps.

@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import FACTORISATIONS as OF_STEP
-from reference_solver.direct.problem import Problem
+from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_blocks
 from reference_solver.planar.direct import solve_directly
@@ -31,6 +31,9 @@ DIRECT_AFTER = 32
 DIRECT_WORTH = 100.0
 #: Factorisations it may make before sweeps go on.
 DIRECT_BUDGET = 100
+#: After a step of its own it is asked before any sweep, and already at this part of the residual allowed: what needed
+#: it once is ill-conditioned, and leftovers of many steps add up.
+DIRECT_KEEP = 0.1
 
 
 @inner_kernel
@@ -68,10 +71,13 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     limit = LARGEST_RELAXATION
     residual = natural_map(bodies, rows, options)
+    if options.direct and problem.size[HELD] and residual > DIRECT_KEEP * options.residual:
+        residual = hand_over(bodies, rows, problem, options, tally)
     before = best = residual
     sweeps, best_at, next_direct = 0, 0, DIRECT_AFTER
     while residual > options.residual and sweeps < options.max_sweeps:
         sweep(bodies, rows, options, relaxation)
+        problem.size[HELD] = 0
         sweeps += 1
         if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
             continue
@@ -118,6 +124,7 @@ def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, ta
 @inner_kernel
 def enter_direct(problem: Problem, residual: float, options: Options, tally: Array) -> None:
     """Add a call of the direct solver to the tally, and whether it finished the step."""
+    problem.size[HELD] = 1 if residual <= options.residual else 0
     tally[FACTORISATIONS] += problem.size[OF_STEP]
     tally[DIRECT] += 1.0 if residual <= options.residual else 0.0
 

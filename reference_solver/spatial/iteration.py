@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.direct.problem import Problem
+from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
 from reference_solver.planar.iteration import (
     CHECK_INTERVAL,
     DIRECT_AFTER,
     DIRECT_BUDGET,
+    DIRECT_KEEP,
     DIRECT_WORTH,
     LARGEST_RELAXATION,
     PATIENCE,
@@ -47,10 +48,13 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     limit = LARGEST_RELAXATION
     residual = natural_map(bodies, manifolds, options)
+    if options.direct and problem.size[HELD] and residual > DIRECT_KEEP * options.residual:
+        residual = hand_over(bodies, manifolds, problem, options, tally)
     before = best = residual
     sweeps, best_at, next_direct = 0, 0, DIRECT_AFTER
     while residual > options.residual and sweeps < options.max_sweeps:
         sweep(bodies, manifolds, options, relaxation)
+        problem.size[HELD] = 0
         sweeps += 1
         if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
             continue

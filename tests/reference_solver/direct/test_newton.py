@@ -1,0 +1,132 @@
+"""Single contact problems: against enumeration, in special positions, and where a problem has no solution."""
+
+import numpy as np
+import pytest
+
+from reference_solver.direct.problem import FACTORISATIONS
+from reference_solver.exact_contact import coulomb_solutions
+
+#: Gap of the natural map, of speeds of about 1.
+SOLVED = 1e-13
+
+
+def random_problem(direct, seed, contacts, dimension=2, mu=0.5):
+    """Bodies of masses 0.1 to 10 with random contacts; the first contacts reach every body from the fixed one."""
+    rng = np.random.default_rng(seed)
+    rows, width = (2, 3) if dimension == 2 else (3, 6)
+    bodies = 1 + max(1, contacts // 2)
+    pairs = [(min(k, bodies - 2), min(k, bodies - 2) + 1) for k in range(contacts)]
+    normals = rng.normal(size=(contacts, rows, rows))
+    frames = np.linalg.qr(normals)[0]
+    jacobians = np.zeros((contacts, 2, rows, width))
+    jacobians[:, 1, :, :rows], jacobians[:, 0, :, :rows] = frames, -frames
+    jacobians[:, :, :, rows:] = rng.normal(size=(contacts, 2, rows, width - rows))
+    masses = 10.0 ** rng.uniform(-1.0, 1.0, (bodies, width))
+    twists = rng.normal(size=(bodies, width)) * (np.arange(bodies) > 0)[:, None]
+    return direct.problem(dimension, sorted(pairs), jacobians, masses, twists, mu, 0.0)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("seed", range(30))
+def test_planar_problems_agree_with_enumeration(direct, seed, mu):
+    """W p + q of the answer is one of the velocities that enumeration of all 4^c modes finds (O9)."""
+    contacts = 1 + seed % 5
+    problem = random_problem(direct, seed, contacts, mu=mu)
+    w, q = direct.delassus(problem)
+    solutions = coulomb_solutions(w, q, [mu] * contacts)
+    residual = direct.solve(problem, SOLVED, 500)
+    velocity = w @ problem.contact.best[:, :2].ravel() + q
+    if not solutions:
+        assert residual > SOLVED
+        return
+    assert residual <= SOLVED
+    # A residual of 1e-13 leaves its product with the condition of W, below 1e4 here.
+    distance = min(np.abs(velocity - solution.velocity.ravel()).max() for solution in solutions)
+    assert distance <= 1e-9
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_spatial_answers_obey_the_law(direct, seed):
+    """Signs, complementarity, disc, and friction against the slip, checked from W and q alone."""
+    mu, contacts = 0.4, 1 + seed % 6
+    problem = random_problem(direct, seed, contacts, dimension=3, mu=mu)
+    w, q = direct.delassus(problem)
+    assert direct.solve(problem, SOLVED, 500) <= SOLVED
+    p = problem.contact.best.copy()
+    u = (w @ p.ravel() + q).reshape(-1, 3)
+    size = np.abs(p).max()
+    assert p[:, 0].min() >= 0.0
+    assert u[:, 0].min() >= -1e-11
+    assert np.abs(p[:, 0] * u[:, 0]).max() <= 1e-11 * size
+    friction, slip = np.linalg.norm(p[:, 1:], axis=1), np.linalg.norm(u[:, 1:], axis=1)
+    assert (friction <= mu * p[:, 0] * (1.0 + 1e-15)).all()
+    # Maximal dissipation: p_t . u_t = -mu p_n |u_t|.
+    power = (p[:, 1:] * u[:, 1:]).sum(axis=1) + mu * p[:, 0] * slip
+    assert np.abs(power).max() <= 1e-11 * max(size, 1.0)
+
+
+def pressed_block(direct, points, mass=1.0):
+    """A block pressed on the floor at several points of one line: redundant beyond two."""
+    place = np.linspace(-1.0, 1.0, points)
+    jacobians = np.zeros((points, 2, 2, 3))
+    jacobians[:, 1, 0, 1], jacobians[:, 1, 0, 2] = 1.0, place
+    jacobians[:, 1, 1, 0], jacobians[:, 1, 1, 2] = -1.0, 0.5
+    jacobians[:, 0] = -jacobians[:, 1]
+    masses = np.array([[1.0] * 3, [mass, mass, mass / 3.0]])
+    twists = np.array([[0.0] * 3, [0.2, -1.0, 0.0]])
+    return direct.problem(2, [(0, 1)] * points, jacobians, masses, twists, 0.5, 0.0)
+
+
+@pytest.mark.parametrize("points", [2, 3, 10])
+def test_redundant_points_share_one_force(direct, points):
+    """Single impulses are not unique; their sums, and the rest they bring about, are."""
+    problem = pressed_block(direct, points)
+    assert direct.solve(problem, SOLVED, 100) <= SOLVED
+    assert problem.contact.best[:, 0].sum() == pytest.approx(1.0, rel=1e-14)
+    assert problem.contact.best[:, 1].sum() == pytest.approx(0.2, rel=1e-13)
+    assert np.abs(problem.body.twist[1]).max() <= 1e-15
+
+
+def test_a_worse_answer_is_not_taken(direct):
+    """Without a factorisation to spend nothing changes, and the residual is that of the start."""
+    problem = pressed_block(direct, 2)
+    before = direct.solve(problem, SOLVED, 0)
+    assert before > 0.1
+    assert np.abs(problem.contact.best).max() == 0.0
+    assert problem.size[FACTORISATIONS] == 0
+
+
+def test_no_solution_is_no_answer(direct):
+    """Painleve's problem without solution (O9 finds none): the residual says so, and nothing is endless."""
+    angle, mu = 0.8, 2.5
+    s, c = np.sin(angle), np.cos(angle)
+    jacobians = np.zeros((1, 2, 2, 3))
+    jacobians[0, 1] = [[0.0, 1.0, -3.0 * c / 3.0], [-1.0, 0.0, -3.0 * s / 3.0]]
+    jacobians[0, 0] = -jacobians[0, 1]
+    masses = np.array([[1.0] * 3, [1.0, 1.0, 1.0 / 3.0]])
+    twists = np.array([[0.0] * 3, [-5.0, 0.0, 0.0]])
+    problem = direct.problem(2, [(0, 1)], jacobians, masses, twists, mu, 1e-3)
+    w, q = direct.delassus(problem)
+    solutions = coulomb_solutions(w, q, [mu])
+    residual = direct.solve(problem, SOLVED, 300)
+    assert (residual <= SOLVED) == bool(solutions)
+
+
+def test_units_change_nothing_but_units(direct):
+    """Lengths by 2^7, masses by 2^-5, times by 2^3: impulses by the same powers, to the last bit."""
+    length, mass, time = 2.0**7, 2.0**-5, 2.0**3
+    answers = []
+    for scaled in (False, True):
+        problem = random_problem(direct, 3, 6)
+        if scaled:
+            speed = length / time
+            factor = np.array([1.0, 1.0, length])
+            problem.contact.jacobian[..., :3] *= factor
+            problem.contact.response[..., :3] /= mass * factor
+            problem.contact.admittance[:] /= mass
+            problem.contact.speed[:] *= speed
+            problem.body.twist[:, :3] *= speed / factor
+            problem.body.weight[:, :3] *= mass * factor**2
+        assert direct.solve(problem, SOLVED, 500) <= SOLVED
+        answers.append(problem.contact.best / (mass * length / time if scaled else 1.0))
+    assert np.array_equal(*answers)
