@@ -27,6 +27,13 @@ SETTLED = 1.0
 #: Rounds go on below the tolerance while each leaves less than this of the residual: they cost one factorisation
 #: each, and a mass ratio multiplies what a residual means for the impulses.
 POLISH = 0.3
+#: A round of one factorisation that leaves this much of the residual, or that much over it, has only moved load along
+#: redundant contacts, at a pace the next rounds would keep: the next goes all the way to where a contact gives in.
+STANDING = 0.9
+#: One that multiplies the residual by this has brought its own round-off, which goes with the stiffness.
+NOISY = 2.0
+#: Friction within this share of its limit slides, or is about to: it does not end that way.
+AT_LIMIT = 1e-9
 #: What the stiffness grows by after a round, and falls by where Newton's method fails. After each failure it grows by
 #: the root of what it did, so that it settles where rounds succeed.
 GROWTH, LEAST_GROWTH, RETREAT = 10.0, 1.5, 0.1
@@ -45,13 +52,20 @@ def solve_problem(problem: Problem, tolerance: float, budget: int) -> float:
     if not order_bodies(problem):
         return best
     stiffness = min(max(FIRST_STIFFNESS, SETTLED / best), LARGEST_STIFFNESS) if best > 0.0 else FIRST_STIFFNESS
-    growth = GROWTH
+    growth, standing = GROWTH, False
     while problem.size[FACTORISATIONS] < budget:
         spent = problem.size[FACTORISATIONS]
         if newton(problem, stiffness):
-            commit(problem)
+            before, settled = residual, problem.size[FACTORISATIONS] <= spent + 1
+            times = reach(problem) if standing and settled else 1.0
+            commit(problem, times)
             residual = scaled_map(problem)
-            stiffness = min(growth * stiffness, LARGEST_STIFFNESS)
+            standing = settled and STANDING * before < residual < before / STANDING
+            if settled and times == 1.0 and residual > NOISY * before:
+                stiffness = max(RETREAT * stiffness, LEAST_STIFFNESS)
+                growth = max(math.sqrt(growth), LEAST_GROWTH)
+            else:
+                stiffness = min(growth * stiffness, LARGEST_STIFFNESS)
         else:
             stiffness = max(RETREAT * stiffness, LEAST_STIFFNESS)
             growth = max(math.sqrt(growth), LEAST_GROWTH)
@@ -80,18 +94,43 @@ def set_excess(problem: Problem) -> None:
 
 
 @inner_kernel
-def commit(problem: Problem) -> None:
-    """Add the changes of the round to the impulses, inside the cone to the last place, and to the twists."""
+def reach(problem: Problem) -> float:
+    """How often the changes of the round can be added before a contact opens or begins to slide; at least once."""
+    contact, least = problem.contact, math.inf
+    for c in range(problem.size[CONTACTS]):
+        p, change = contact.impulse[c], contact.change[c]
+        if p[0] <= 0.0:
+            continue
+        if change[0] < 0.0:
+            least = min(least, -p[0] / change[0])
+        # |p_t + s c_t| = mu (p_n + s c_n): a s^2 + 2 b s + d = 0 with d < 0 inside the cone.
+        mu = contact.friction[c]
+        a, b, d = -((mu * change[0]) ** 2), -mu * mu * p[0] * change[0], -((mu * p[0]) ** 2)
+        inside = (1.0 - AT_LIMIT) * d
+        for r in range(1, problem.size[ROW_COUNT]):
+            a += change[r] ** 2
+            b += p[r] * change[r]
+            d += p[r] ** 2
+            inside += p[r] ** 2
+        root = b * b - a * d
+        if inside < 0.0 and root >= 0.0 and b + math.sqrt(root) > 0.0:
+            least = min(least, -d / (b + math.sqrt(root)))
+    return max(least, 1.0) if least < math.inf else 1.0
+
+
+@inner_kernel
+def commit(problem: Problem, times: float) -> None:
+    """Add the changes of the round so often to the impulses, inside the cone to the last place, and to the twists."""
     contact = problem.contact
     rows = problem.size[ROW_COUNT]
     for c in range(problem.size[CONTACTS]):
         change, p = contact.change[c], contact.impulse[c]
-        pressed, length = max(p[0] + change[0], 0.0), 0.0
+        pressed, length = max(p[0] + times * change[0], 0.0), 0.0
         for r in range(1, rows):
-            length += (p[r] + change[r]) ** 2
+            length += (p[r] + times * change[r]) ** 2
         length, bound = math.sqrt(length), contact.friction[c] * pressed
         for r in range(rows):
-            new = p[r] + change[r] if r > 0 else pressed
+            new = p[r] + times * change[r] if r > 0 else pressed
             if r > 0 and length > bound:
                 new *= bound / length
             for side in range(2):
