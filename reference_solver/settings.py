@@ -100,7 +100,7 @@ class Settings:
             dt=dt,
             solver="block",  # scalar rows stall on two-point manifolds at 1e-4
             residual=1e-13,  # some hundred units in the last place; below that round-off decides
-            max_sweeps=100_000,  # columns need O(n) sweeps, so that this is a bound for broken problems only
+            max_sweeps=5000,  # with eight calls of the direct solver on the way (E44): a bound for broken problems
             relaxation=None,  # estimated: the best factor depends on the height of the pile
             position_correction="split",
             beta=1.0,  # no velocity is touched, so that the whole overlap can go at once

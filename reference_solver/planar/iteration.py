@@ -33,7 +33,7 @@ DIRECT_WORTH = 100.0
 DIRECT_BUDGET = 100
 #: After a step of its own it is asked before any sweep, and already at this part of the residual allowed: what needed
 #: it once is ill-conditioned, and leftovers of many steps add up.
-DIRECT_KEEP = 0.1
+DIRECT_KEEP = 0.02
 
 
 @inner_kernel
