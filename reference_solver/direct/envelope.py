@@ -1,6 +1,6 @@
 """Triangular factors within an envelope: A = L U without interchanges, for matrices of symmetric structure (E43).
 
-Row i of L and column i of U start at the same first entry, and nothing before it ever fills. In 5000 factorisations of
+Row i of L and column i of U start at the same first entry, and nothing before it ever fills. In 3000 factorisations of
 E41's matrix (piles of boxes and discs, friction up to mu = 1) no entry of the factors exceeded 25 times the largest of
 the matrix, so that interchanges would gain one digit at most. Without them the factors of a problem in other units
 (powers of two) differ by those powers alone.
