@@ -80,6 +80,7 @@ def gates() -> Iterator[Gate]:
             yield row(relation, space, "reference")
         for relation in ANY_PROFILE:
             yield row(relation, space, "classical")
+        yield from predictability(space)
 
 
 def row(relation: str, space: Space, profile: str) -> Gate:
@@ -92,6 +93,14 @@ def row(relation: str, space: Space, profile: str) -> Gate:
             worst = max(worst, measure(relation, scene, space, profile, drawn(rng, space)))
     gate, case = (0.0, "bits") if relation in EXACT else (1.0, "of its round-off bound")
     return Gate.at_most(f"relation: {relation}", f"{len(scenes)} scenes, {case}", worst, gate, made_by(space, profile))
+
+
+def predictability(space: Space) -> Iterator[Gate]:
+    """Growth of a disturbance of 1e-9 m/s up to the horizon, which the bound of all relations rests on (E73)."""
+    rng = np.random.default_rng(SEED)
+    for scene in SCENES:
+        worst = max(growth(scene, space, "reference", drawn(rng, space)) for _ in range(TRIALS))
+        yield Gate.at_most("growth of a disturbance", scene, worst, GROWTH, made_by(space, "reference"))
 
 
 def drawn(rng: np.random.Generator, space: Space) -> Trial:
