@@ -53,6 +53,9 @@ def summary(tally: Array) -> dict[str, Any]:
         "solves": int(tally[entries.SOLVES]),
         "direct": int(tally[entries.DIRECT]),
         "factorisations": int(tally[entries.FACTORISATIONS]),
+        "events": int(tally[entries.EVENTS_LOCATED]),
+        "missed_events": int(tally[entries.EVENTS_MISSED]),
+        "held_rebound": float(tally[entries.RELEASED_SPEED]),
     }
     values |= {gate.name: float(tally[gate.entry]) for gate in GATES}
     values |= {

@@ -57,7 +57,7 @@ def cache_folder() -> Path | None:
 CACHE_FOLDER = cache_folder()
 
 
-def _compiled(function: F, *, inner: bool) -> F:
+def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
     before = config.CACHE_DIR
     if CACHE_FOLDER is not None:
         config.CACHE_DIR = str(CACHE_FOLDER)
@@ -69,6 +69,7 @@ def _compiled(function: F, *, inner: bool) -> F:
             _nrt=False,  # kernels allocate nothing; counting references to arrays cost two thirds of the time
             no_cpython_wrapper=inner,
             no_cfunc_wrapper=True,
+            inline="always" if inline else "never",
         )
         return result
     finally:
@@ -91,3 +92,12 @@ def inner_kernel(function: F) -> F:
     Without the wrapper that unpacks Python arguments they compile in two thirds of the time.
     """
     return _compiled(function, inner=True)
+
+
+def spliced_kernel(function: F) -> F:
+    """Compile like `inner_kernel`, as part of each caller.
+
+    A compiled function carries all code it calls, optimised once more at every level of calls. What stands high
+    above the solvers is therefore spliced into one function at the top: their code is then carried once.
+    """
+    return _compiled(function, inner=True, inline=True)

@@ -8,6 +8,7 @@ from typing import Literal
 
 Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
+Scheme = Literal["fixed", "located"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,9 @@ class Settings:
     margin
         Pairs with e = 0 are in contact while their gap is below this fraction of the smaller half width; they may
         close it, not more (E8). Pairs with e > 0 are in contact only where they touch.
+    scheme
+        ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
+        steps are cut where bodies meet and where a slide ends (E19 to E24).
 
     Raises
     ------
@@ -61,6 +65,7 @@ class Settings:
     solver: Solver = "scalar"
     margin: float = 0.01
     direct: bool = True
+    scheme: Scheme = "fixed"
 
     def __post_init__(self) -> None:
         _require("dt", self.dt, math.isfinite(self.dt) and self.dt > 0.0, "a positive, finite time")
@@ -75,6 +80,10 @@ class Settings:
         _require("beta", self.beta, 0.0 < self.beta <= 1.0, "in (0, 1]")
         _require("slop", self.slop, math.isfinite(self.slop) and self.slop >= 0.0, "a length of at least 0")
         _require("solver", self.solver, self.solver in ("scalar", "block"), "'scalar' or 'block'")
+        _require("scheme", self.scheme, self.scheme in ("fixed", "located"), "'fixed' or 'located'")
+        if self.scheme == "located":
+            allowed = ("split", "none")
+            _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
 
     @classmethod

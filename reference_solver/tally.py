@@ -40,11 +40,30 @@ NOT_FINITE = 18
 SOLVES = 19
 #: Contact solves whose answer is the direct solver's (E44), and its factorisations.
 DIRECT, FACTORISATIONS = 20, 21
+#: Events located inside steps: impacts, ends of slides (E19).
+EVENTS_LOCATED = 22
+#: Steps with more events than are located; the rest of them was found a step later.
+EVENTS_MISSED = 23
+#: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
+RELEASED_SPEED = 24
 
-SIZE = 22
+SIZE = 25
 
 #: Entries that add up over a run; of all others the largest counts.
-SUMS = (SWEEPS, UNCONVERGED, KANE, CONTACT_WORK, SURFACE_WORK, LOAD_WORK, NOT_FINITE, SOLVES, DIRECT, FACTORISATIONS)
+SUMS = (
+    SWEEPS,
+    UNCONVERGED,
+    KANE,
+    CONTACT_WORK,
+    SURFACE_WORK,
+    LOAD_WORK,
+    NOT_FINITE,
+    SOLVES,
+    DIRECT,
+    FACTORISATIONS,
+    EVENTS_LOCATED,
+    EVENTS_MISSED,
+)
 
 
 def new_tally() -> Array:

@@ -42,11 +42,16 @@ Indices = NDArray[np.int64]
 HALF_SPACE, DISC, BOX, CAPSULE, POLYGON = 0, 1, 2, 3, 4
 FIXED, FREE, PRESCRIBED = 0, 1, 2
 SCALAR, BLOCK = 0, 1
+FIXED_STEP, LOCATED = 0, 1
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 #: Features per pair: bound of the feature numbers in core_core.py (edge on edge, then vertex on vertex), to pack
 #: (a, b, feature) into one key.
 FEATURES = 5 * MOST_VERTICES**2
+
+#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it.
+LEFT, EVENTS = 0, 1
+CLOCK_SIZE = 2
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
@@ -107,6 +112,7 @@ class Options(NamedTuple):
     friction: int
     restitution: int
     broadphase: int
+    scheme: int
 
 
 class Buffer(NamedTuple):
@@ -230,4 +236,5 @@ def options(settings: Settings, needs: Needs) -> Options:
         friction=int(needs.friction),
         restitution=int(needs.restitution),
         broadphase=int(needs.broadphase),
+        scheme={"fixed": FIXED_STEP, "located": LOCATED}[settings.scheme],
     )

@@ -78,6 +78,8 @@ def solve_in_turn(manifolds: Manifolds, m: int, v: Vector, w: Vector) -> None:
 @inner_kernel
 def solve_point(manifolds: Manifolds, m: int, p: int, u: Vector) -> Vector:
     """Exact solution of one point, all others held; returns the change of its impulse."""
+    if manifolds.open[m, p]:
+        return (0.0, 0.0, 0.0)
     k = manifolds.matrix[m, p]
     old = row(manifolds.impulse[m], p, 0)
     q = (

@@ -194,7 +194,7 @@ def set_matrix(manifolds: Manifolds, m: int, stiffness: float, v: Vector, w: Vec
         zn = manifolds.impulse[m, p, 2] - rho * (u[2] - manifolds.target[m, p])
         trial = manifolds.trial[m, p]
         trial[0], trial[1], trial[2] = 0.0, 0.0, 0.0
-        if zn <= 0.0:
+        if zn <= 0.0 or manifolds.open[m, p]:
             continue
         trial[2] = zn
         bound = manifolds.friction[m] * zn

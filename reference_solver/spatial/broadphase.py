@@ -61,6 +61,12 @@ def add_candidate(bodies: Bodies, detection: Detection, i: int, j: int) -> bool:
 def find_candidates(bodies: Bodies, detection: Detection, options: Options) -> bool:
     """Fill `Detection.candidate` in ascending order; False if there is no room."""
     bound_bodies(bodies, options)
+    return pair_bodies(bodies, detection, options)
+
+
+@inner_kernel
+def pair_bodies(bodies: Bodies, detection: Detection, options: Options) -> bool:
+    """Candidates from the bodies' bounds; False if there is no room."""
     detection.found[CANDIDATES] = 0
     if options.broadphase:
         return sweep_candidates(bodies, detection)

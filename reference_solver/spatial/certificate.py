@@ -99,7 +99,9 @@ def is_finite(bodies: Bodies) -> bool:
 
 @inner_kernel
 def inspect_point(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, tally: Array) -> None:
-    """Law and limits of one point; u is its velocity after the solve, frame."""
+    """Law and limits of one point; u is its velocity after the solve, frame. One that parts carries nothing (E20)."""
+    if manifolds.open[m, p]:
+        return
     k, impulse, mu = manifolds.matrix[m, p], row(manifolds.impulse[m], p, 0), manifolds.friction[m]
     mass = 1.0 / k[5]
     if mu > 0.0:

@@ -21,6 +21,8 @@ def solve_directly(bodies: Bodies, manifolds: Manifolds, options: Options, probl
     for m in range(len(manifolds)):
         force, moment = ZERO, ZERO
         for p in range(manifolds.points[m]):
+            if manifolds.open[m, p]:
+                continue
             best = row(problem.contact.best, c, 0)
             change = sub((best[1], best[2], best[0]), row(manifolds.impulse[m], p, 0))
             for d in range(3):
@@ -52,6 +54,8 @@ def load_contacts(bodies: Bodies, manifolds: Manifolds, options: Options, proble
     contact, c = problem.contact, 0
     for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
+            if manifolds.open[m, p]:
+                continue
             k = manifolds.matrix[m, p]
             contact.friction[c] = manifolds.friction[m]
             contact.target[c], contact.speed[c] = manifolds.target[m, p], manifolds.speed[m, p]

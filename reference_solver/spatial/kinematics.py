@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.state import Options
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import (
     Vector,
@@ -86,9 +85,9 @@ def acceleration_at(bodies: Bodies, i: int, arm: Vector) -> float:
 
 
 @inner_kernel
-def load_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, options: Options) -> float:
-    """Largest relative speed that the loads of one step can give the two bodies at point p [m/s]."""
+def load_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) -> float:
+    """Largest relative speed that the loads can give the two bodies at point p within dt [m/s]."""
     a, b = manifolds.body_a[m], manifolds.body_b[m]
     at_a = acceleration_at(bodies, a, row(manifolds.arm_a[m], p, 0))
     at_b = acceleration_at(bodies, b, row(manifolds.arm_b[m], p, 0))
-    return options.dt * (at_a + at_b)
+    return dt * (at_a + at_b)

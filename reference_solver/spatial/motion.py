@@ -68,16 +68,16 @@ def momentum_of(bodies: Bodies, i: int, w: Vector) -> Vector:
 
 
 @inner_kernel
-def accelerate(bodies: Bodies, options: Options) -> None:
-    """v* = v + h M^-1 f (E5). The gyroscopic term acts while the body turns, in `turn_freely`."""
+def accelerate(bodies: Bodies, dt: float) -> None:
+    """v* = v + h M^-1 f (E5), h being dt. The gyroscopic term acts while the body turns, in `turn_freely`."""
     for i in range(len(bodies)):
         if bodies.motion[i] != FREE:
             continue
         spin = times(bodies.inverse_inertia, i, row(bodies.torque, i, 0))
         for d in range(3):
             bodies.spin_before[i, d] = bodies.twist[i, 3 + d]
-            bodies.twist[i, d] += options.dt * bodies.acceleration[i, d]
-            bodies.twist[i, 3 + d] += options.dt * spin[d]
+            bodies.twist[i, d] += dt * bodies.acceleration[i, d]
+            bodies.twist[i, 3 + d] += dt * spin[d]
 
 
 @inner_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.planar.rows import ROUND_OFF
-from reference_solver.planar.state import SPLIT, Options
+from reference_solver.planar.state import FIXED_STEP, SPLIT, Options
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.sequential_impulses import sweep_pushes
 from reference_solver.spatial.state import Bodies, Manifolds
@@ -27,8 +27,11 @@ def set_push_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -> 
         extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
         for p in range(manifolds.points[m]):
             manifolds.push[m, p] = 0.0
-            # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
-            parting = max(velocity_at(v, w, manifolds, m, p)[2], 0.0)
+            parting = 0.0
+            if options.scheme == FIXED_STEP:
+                # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
+                # Located impacts happen at a gap of zero; an overlap left by turning bodies would outlast the rebound.
+                parting = max(velocity_at(v, w, manifolds, m, p)[2], 0.0)
             excess = -(manifolds.gap[m, p] + options.dt * parting) - options.slop
             if abs(excess) <= ROUND_OFF * extent:
                 excess = 0.0

@@ -26,7 +26,7 @@ def prepare(bodies: Bodies, detection: Detection, manifolds: Manifolds, options:
             set_response(bodies, manifolds, m, p, options)
             u = velocity_at(v, w, manifolds, m, p)
             set_target(bodies, manifolds, m, p, u[2], detection.restitution[a, b], options)
-            set_speed(bodies, manifolds, m, p, u, options)
+            set_speed(bodies, manifolds, m, p, u, options.dt)
 
 
 @inner_kernel
@@ -82,7 +82,7 @@ def set_target(
         extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
         if gap > options.slop + ROUND_OFF * extent + COORDINATE_NOISE * place:
             target = -(gap - options.slop) / options.dt
-    elif u < -RESTING_NOISE * load_speed(bodies, manifolds, m, p, options):
+    elif u < -RESTING_NOISE * load_speed(bodies, manifolds, m, p, options.dt):
         target = -restitution * u
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
@@ -90,20 +90,27 @@ def set_target(
 
 
 @inner_kernel
-def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, options: Options) -> None:
-    """Speed that the residual of this point is measured against (E14).
+def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, dt: float) -> None:
+    """Speed that the residual of this point is measured against (E14), and which impulses may be warm started.
 
     Points that meet or part faster than the loads of one step explain are in an impact: the impulse of the step
     before does not guess this step's, nor this one the next (E9).
     """
-    push = load_speed(bodies, manifolds, m, p, options)
-    moving = length(point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0)))
-    moving += length(point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0)))
-    manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
+    push = measure_speed(bodies, manifolds, m, p, u, dt)
     manifolds.impact[m, p] = 1 if abs(u[2]) > push else 0
     if u[2] > push:
         for k in range(3):
             manifolds.impulse[m, p, k] = 0.0
+
+
+@inner_kernel
+def measure_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, dt: float) -> float:
+    """Set the reference speed of a point (E14); return the speed that loads can give it within dt."""
+    push = load_speed(bodies, manifolds, m, p, dt)
+    moving = length(point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0)))
+    moving += length(point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0)))
+    manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
+    return push
 
 
 @inner_kernel

@@ -25,7 +25,7 @@ def pose_problem(bodies: Bodies, detection: Detection, room: Manifolds, memory: 
     manifolds = room[:found]
     recall(bodies, detection, manifolds, memory, options)
     prepare(bodies, detection, manifolds, options)
-    accelerate(bodies, options)
+    accelerate(bodies, options.dt)
     return found
 
 

@@ -26,7 +26,9 @@ def natural_map(bodies: Bodies, manifolds: Manifolds, options: Options) -> float
 
 @inner_kernel
 def point_residual(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
-    """Larger of the normal and the friction defect of one point, each over its scale."""
+    """Larger of the normal and the friction defect of one point, each over its scale; 0 of a point that parts."""
+    if manifolds.open[m, p]:
+        return 0.0
     k = manifolds.matrix[m, p]
     pressed, speed = manifolds.impulse[m, p, 2], manifolds.speed[m, p]
     defect = abs(pressed - max(pressed - (u[2] - manifolds.target[m, p]) / k[5], 0.0))

@@ -31,6 +31,8 @@ def sweep_points(bodies: Bodies, manifolds: Manifolds, options: Options, relaxat
 @inner_kernel
 def press(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> Vector:
     """Normal row: bring u_n to its target, the total never pulling; returns the change of impulse."""
+    if manifolds.open[m, p]:
+        return (0.0, 0.0, 0.0)
     old = manifolds.impulse[m, p, 2]
     new = max(old - relaxation * (u[2] - manifolds.target[m, p]) / manifolds.matrix[m, p, 5], 0.0)
     manifolds.impulse[m, p, 2] = new

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Sphere, smallest_extent
 from reference_solver.needs import Needs
+from reference_solver.planar.state import CLOCK_SIZE
+from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
 
@@ -47,11 +49,12 @@ BODY = np.dtype(
         ("moments", "f8", 3),  # principal moments of free bodies [kg m^2]
         ("angular_momentum", "f8", 3),  # world axes [kg m^2/s], kept for gyroscopic bodies only
         ("spin_before", "f8", 3),  # angular velocity at the start of the step
-        (
-            "rate",
-            "f8",
-            6,
-        ),  # constant in a located sub-step: acceleration, and torque or angular acceleration (`flight`)
+        ("before", "f8", 6),  # velocities at the start of a located sub-step, after its impacts, and at its end
+        ("first", "f8", 6),
+        ("last", "f8", 6),
+        ("momentum_before", "f8", 3),  # angular momentum at its start
+        ("closing", "i8"),  # 1 where positions follow the velocity at the end of a sub-step, not the mean (E24)
+        ("rate", "f8", 6),  # constant in a sub-step: acceleration, torque or angular acceleration (E30)
         ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
         ("turning", "i8"),  # 1 where the quaternion can change
         ("kind", "i8"),  # shape code
@@ -93,6 +96,13 @@ MANIFOLD = np.dtype(
         ("push_target", "f8", POINTS),  # pseudo-velocity to reach [m/s]
         ("speed", "f8", POINTS),  # reference speed of the residual [m/s]
         ("impact", "i8", POINTS),  # 1 where bodies meet or part faster than loads explain
+        ("open", "i8", POINTS),  # 1 where a point parts and carries nothing in a force phase (E20)
+        ("lasts", "i8", POINTS),  # 1 where a point carried load in the sub-step before (E20)
+        ("ending", "i8", POINTS),  # how a rebound goes on, see `impact`
+        ("hit", "f8", (POINTS, 3)),  # impulse of the impacts of a sub-step, frame [N s]
+        ("force", "f8", (POINTS, 3)),  # remembered from the sub-step before: world axes, then frame [N]
+        ("release", "f8", POINTS),  # speed with which a held rebound is released [m/s]
+        ("slip", "f8", (POINTS, 2)),  # u_t at the start of a force phase, frame [m/s]
         ("feature", "i8", POINTS),
         ("gap", "f8", POINTS),  # [m], < 0 overlap
         ("arm_a", "f8", (POINTS, 3)),  # contact point minus centre of A [m]
@@ -194,6 +204,32 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
         polygon=np.zeros((2, 16, 3)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
+
+
+class SubStep(NamedTuple):
+    """What is left of the step, and room to try poses; velocities of a sub-step stand in `BODY`."""
+
+    clock: Array  # (CLOCK_SIZE,): see LEFT and EVENTS of planar.state
+    trial: Bodies  # (2,): a pair of bodies at another time
+    saved: Array  # (SIZE,): the tally before an attempt
+
+
+class Ledger(NamedTuple):
+    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
+
+    filled: Indices  # (1,): number of entries
+    names: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
+
+
+def allocate_sub_step() -> SubStep:
+    """Return the room for a sub-step."""
+    return SubStep(np.zeros(CLOCK_SIZE), np.zeros(2, BODY).view(np.recarray), np.zeros(TALLY_SIZE))
+
+
+def allocate_ledger(capacity: int) -> Ledger:
+    """Return room for ``capacity`` contacts."""
+    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 10)))
 
 
 def allocate_manifolds(capacity: int) -> Manifolds:

@@ -36,7 +36,7 @@ def step(
     manifolds = room[:found]
     recall(bodies, detection, manifolds, memory, options)
     prepare(bodies, detection, manifolds, options)
-    accelerate(bodies, options)
+    accelerate(bodies, options.dt)
     open_solve(bodies, options.dt, tally)
     pushed = False
     if found > 0:

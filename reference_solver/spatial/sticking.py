@@ -106,6 +106,8 @@ def goal(manifolds: Manifolds, m: int) -> tuple[bool, Vector, Vector]:
     count = manifolds.points[m]
     mean, along, aside, largest, highest = 0.0, 0.0, 0.0, 0.0, 0.0
     for p in range(count):
+        if manifolds.open[m, p]:
+            return False, ZERO, ZERO
         target = manifolds.target[m, p]
         mean += target / count
         along += target * manifolds.offset[m, p, 0]

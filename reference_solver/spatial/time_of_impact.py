@@ -1,4 +1,4 @@
-"""First contact of two moving bodies within a time, never passed (E32, E33, E34).
+"""First contact of two moving bodies within a time, never passed (E32, E33).
 
 Spheres and half-spaces that do not turn have closed forms. All others advance: along the direction n of the present
 separation every corner c of one body keeps clear of every corner of the other at least as long as the parabola
@@ -16,7 +16,7 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
-from reference_solver.spatial.flight import copy_body, first_fall, place_at, reach_of, turning_bounds
+from reference_solver.spatial.flight import copy_body, curvature, first_fall, place_at, reach_of, turning_bounds
 from reference_solver.spatial.separation import core_width, separation
 from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, SPHERE, Bodies
 from reference_solver.spatial.vector import ZERO, Vector, axis, cross, dot, length, row, scale, sub, times
@@ -27,8 +27,8 @@ UNITS = 16.0 * 2.0**-52
 STEPS = 500
 #: Bodies that touch at the start and part are looked for again no earlier than this share of the time.
 FIRST_LOOK = 1.0 / 64.0
-#: A gap below this part of the smaller half width is touching (as in detection).
-TOUCHING = 1e-9
+#: A safe step shorter than this share of the time is none.
+SOON = 1e-11
 
 
 @kernel
@@ -46,7 +46,17 @@ def time_of_impact(bodies: Bodies, trial: Bodies, a: int, b: int, duration: floa
     elif bodies.kind[f] == SPHERE and bodies.kind[s] == SPHERE and same_acceleration(bodies, f, s):
         time = sphere_sphere_time(bodies, f, s)
     else:
-        time = advance(bodies, trial, f, s, duration)
+        time = advance(bodies, trial, f, s, 0, duration)
+    return time if time <= duration else math.inf
+
+
+@inner_kernel
+def return_of_corners(bodies: Bodies, trial: Bodies, a: int, b: int, held: int, duration: float) -> float:
+    """First time at which a corner that is not held comes down on the half-space on which others are held (E33)."""
+    f, s = (a, b) if bodies.kind[a] == HALF_SPACE else (b, a)
+    if bodies.kind[s] == SPHERE or not (bodies.turning[f] or bodies.turning[s]):
+        return math.inf
+    time = advance(bodies, trial, f, s, held, duration)
     return time if time <= duration else math.inf
 
 
@@ -57,12 +67,16 @@ def relative(array: Array, f: int, s: int) -> Vector:
 
 
 @inner_kernel
+def relative_curvature(bodies: Bodies, f: int, s: int) -> Vector:
+    """Second derivative of s's centre seen from f's [m/s^2]."""
+    return sub(curvature(bodies, s, 0), curvature(bodies, f, 0))
+
+
+@inner_kernel
 def same_acceleration(bodies: Bodies, f: int, s: int) -> bool:
     """Whether the centres have no relative acceleration at all."""
-    for d in range(3):
-        if bodies.rate[f, d] != bodies.rate[s, d]:
-            return False
-    return True
+    a = relative_curvature(bodies, f, s)
+    return a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0
 
 
 @inner_kernel
@@ -73,7 +87,10 @@ def plane_sphere_time(bodies: Bodies, f: int, s: int) -> float:
     gap = height - offset - radius
     if gap <= UNITS * (abs(height) + abs(offset) + radius):
         gap = 0.0
-    return first_fall(gap, dot(n, relative(bodies.twist, f, s)), dot(n, relative(bodies.rate, f, s)))
+    rate = dot(n, relative(bodies.twist, f, s))
+    if gap == 0.0 and rate <= 0.0:
+        return math.inf  # it touches: contact points, not the time of impact, keep it from sinking
+    return first_fall(gap, rate, dot(n, relative_curvature(bodies, f, s)))
 
 
 @inner_kernel
@@ -88,23 +105,27 @@ def sphere_sphere_time(bodies: Bodies, f: int, s: int) -> float:
     if closing <= UNITS * length(x) * length(v) or discriminant <= UNITS * reach:
         return math.inf
     gap = (length(x) - radius) * (length(x) + radius)
-    return max(gap, 0.0) / (closing + math.sqrt(discriminant))
+    return gap / (closing + math.sqrt(discriminant)) if gap > 0.0 else math.inf
 
 
 @inner_kernel
-def advance(bodies: Bodies, trial: Bodies, f: int, s: int, duration: float) -> float:
-    """Advance from safe time to safe time until the separation is round-off (E33)."""
+def advance(bodies: Bodies, trial: Bodies, f: int, s: int, held: int, duration: float) -> float:
+    """Advance from safe time to safe time until the separation is round-off (E33).
+
+    ``held``: corners of s, a bit each, that do not count. A pair that parts from an overlap is back when it overlaps
+    as much.
+    """
     copy_body(bodies, f, trial, 0)
     copy_body(bodies, s, trial, 1)
     bend = bend_bound(bodies, f, s, duration)
-    extent = min(bodies.extent[f], bodies.extent[s])
-    gap, n = separation(trial, 0, 1)
-    t, left = 0.0, gap > TOUCHING * extent
+    gap, n = free_separation(trial, held)
+    floor = min(gap, 0.0)
+    t, left = 0.0, gap > rounding(trial)
     for _ in range(STEPS):
-        step = safe_step(trial, gap, n, dot(n, relative(bodies.rate, f, s)), bend)
+        step = safe_step(trial, gap - floor, n, dot(n, relative_curvature(bodies, f, s)), bend, held)
         if not left and step >= duration - t:
             return math.inf
-        if not left and step > FIRST_LOOK * TOUCHING * duration:
+        if not left and step > SOON * duration:
             left = True  # every corner parts faster than it is turned back
         elif not left:
             step = FIRST_LOOK * duration
@@ -112,13 +133,14 @@ def advance(bodies: Bodies, trial: Bodies, f: int, s: int, duration: float) -> f
         if later == t:
             return t
         before = gap
-        gap, n = separation_at(bodies, trial, f, s, later)
-        if gap <= rounding(trial):
+        gap, n = separation_at(bodies, trial, f, s, held, later)
+        if gap - floor <= rounding(trial):
             if left:
-                return later if gap >= -rounding(trial) else crossing(bodies, trial, f, s, t, later)
-            if gap < min(before, 0.0) - rounding(trial):
+                passed = gap - floor < -rounding(trial)
+                return crossing(bodies, trial, f, s, held, floor, t, later) if passed else later
+            if gap < before - rounding(trial):
                 return later
-        left = left or gap > TOUCHING * extent
+        left = left or gap - floor > rounding(trial)
         if later == duration:
             return math.inf
         t = later
@@ -126,11 +148,28 @@ def advance(bodies: Bodies, trial: Bodies, f: int, s: int, duration: float) -> f
 
 
 @inner_kernel
-def separation_at(bodies: Bodies, trial: Bodies, f: int, s: int, t: float) -> tuple[float, Vector]:
+def separation_at(bodies: Bodies, trial: Bodies, f: int, s: int, held: int, t: float) -> tuple[float, Vector]:
     """Separation at time t; the trial records keep the state there."""
     place_at(bodies, f, t, trial, 0)
     place_at(bodies, s, t, trial, 1)
-    return separation(trial, 0, 1)
+    return free_separation(trial, held)
+
+
+@inner_kernel
+def free_separation(trial: Bodies, held: int) -> tuple[float, Vector]:
+    """Separation of the two trial bodies, of the corners that are not held."""
+    gap, n = separation(trial, 0, 1)
+    return (gap + core_width(trial, 1, n) - free_width(trial, n, held) if held else gap), n
+
+
+@inner_kernel
+def free_width(trial: Bodies, n: Vector, held: int) -> float:
+    """How far the corners of the second body that are not held reach against n from its centre [m]."""
+    far = -math.inf
+    for i in range(corners(trial, 1)):
+        if (held >> i) & 1 == 0:
+            far = max(far, -dot(n, corner(trial, 1, i)))
+    return far
 
 
 @inner_kernel
@@ -156,7 +195,7 @@ def bend_bound(bodies: Bodies, f: int, s: int, duration: float) -> float:
     bend = reach_of(bodies, s) * (spin_s * spin_s + change_s)
     if bodies.kind[f] != HALF_SPACE:
         return bend + reach_of(bodies, f) * (spin_f * spin_f + change_f)
-    acceleration = length(relative(bodies.rate, f, s))
+    acceleration = length(relative_curvature(bodies, f, s))
     speed = length(relative(bodies.twist, f, s)) + duration * acceleration
     wide = length(relative(bodies.pose, f, s)) + duration * speed + reach_of(bodies, s)
     # Relative to the half-space the distance to its axis turns at spin_f, and so do its own changes, twice (Coriolis).
@@ -164,10 +203,10 @@ def bend_bound(bodies: Bodies, f: int, s: int, duration: float) -> float:
 
 
 @inner_kernel
-def safe_step(trial: Bodies, gap: float, n: Vector, acceleration: float, bend: float) -> float:
+def safe_step(trial: Bodies, gap: float, n: Vector, acceleration: float, bend: float, held: int) -> float:
     """Time for which no corner can close the gap along n (E33)."""
     gap = max(gap, 0.0)
-    far_f, far_s = core_width(trial, 0, n), core_width(trial, 1, n)
+    far_f, far_s = core_width(trial, 0, n), free_width(trial, n, held) if held else core_width(trial, 1, n)
     spin_f, spin_s = row(trial.twist, 0, 3), row(trial.twist, 1, 3)
     along = dot(n, relative(trial.twist, 0, 1))
     if trial.kind[0] == HALF_SPACE:  # its normal turns with it: seen from there, the other body turns as well
@@ -179,6 +218,8 @@ def safe_step(trial: Bodies, gap: float, n: Vector, acceleration: float, bend: f
         above_f = max(far_f - dot(n, arm_f), 0.0)
         rate_f = along - dot(n, cross(spin_f, arm_f))
         for j in range(corners(trial, 1)):
+            if (held >> j) & 1:
+                continue
             arm_s = corner(trial, 1, j)
             above = above_f + max(far_s + dot(n, arm_s), 0.0)
             step = min(step, first_fall(gap + above, rate_f + dot(n, cross(spin_s, arm_s)), acceleration - bend))
@@ -203,14 +244,16 @@ def corner(trial: Bodies, k: int, i: int) -> Vector:
 
 
 @inner_kernel
-def crossing(bodies: Bodies, trial: Bodies, f: int, s: int, early: float, late: float) -> float:
-    """Last double at which the bodies are apart between `early` (apart) and `late` (overlapping), by halving (E34)."""
+def crossing(
+    bodies: Bodies, trial: Bodies, f: int, s: int, held: int, floor: float, early: float, late: float
+) -> float:
+    """Last double at which the gap is above the floor between `early` (above) and `late` (below), by halving (E33)."""
     while True:
         middle = 0.5 * (early + late)
         if middle <= early or middle >= late:
             return early
-        gap, _ = separation_at(bodies, trial, f, s, middle)
-        if gap >= 0.0:
+        gap, _ = separation_at(bodies, trial, f, s, held, middle)
+        if gap >= floor:
             early = middle
         else:
             late = middle

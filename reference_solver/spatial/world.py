@@ -9,9 +9,10 @@ import numpy as np
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
-from reference_solver.planar.state import options, uses_direct
+from reference_solver.planar.state import LOCATED, options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
+from reference_solver.spatial.located import copy_ledger, run_located
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.problem import assemble, pose_problem
 from reference_solver.spatial.state import (
@@ -21,8 +22,10 @@ from reference_solver.spatial.state import (
     Buffer,
     allocate_bodies,
     allocate_detection,
+    allocate_ledger,
     allocate_manifolds,
     allocate_memory,
+    allocate_sub_step,
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
@@ -39,6 +42,8 @@ class World:
         self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
+        self._sub_step = allocate_sub_step()
+        self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
@@ -62,19 +67,7 @@ class World:
         buffer = self._buffer(samples, room)
         done = 0
         while True:
-            done = run_steps(
-                self._bodies,
-                self._detection,
-                self._manifolds,
-                self._memory,
-                self._problem,
-                self._options,
-                self.tally,
-                buffer,
-                done,
-                steps,
-                stride,
-            )
+            done = self._run(buffer, done, steps, stride)
             if done == steps:
                 break
             if contacts and buffer.offset[done // stride] + self._most_points > len(buffer.real):
@@ -83,9 +76,20 @@ class World:
                 self._grow()
         return Frames(buffer.pose, buffer.twist, buffer.offset, _contacts(buffer, int(buffer.offset[-1])))
 
+    def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
+        state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
+        if self._options.scheme == LOCATED:
+            made = run_located(
+                *state, self._sub_step, self._ledger, self._options, self.tally, buffer, done, steps, stride
+            )
+            return int(made)
+        return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
+
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
         buffer = self._buffer(0, self._most_points)
+        if self._options.scheme == LOCATED:
+            return _contacts(buffer, copy_ledger(self._ledger, buffer, 0))
         return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
 
     def step_problem(self) -> StepProblem:
@@ -99,7 +103,7 @@ class World:
 
     @property
     def _most_points(self) -> int:
-        return POINTS * len(self._manifolds)
+        return max(POINTS * len(self._manifolds), len(self._ledger.real))
 
     def _buffer(self, samples: int, room: int) -> Buffer:
         n = len(self._bodies)
@@ -119,10 +123,16 @@ class World:
         return bigger
 
     def _grow(self) -> None:
-        """Double whatever detection found too small; the step that stopped has not begun."""
+        """Double whatever was found too small; the step that stopped goes on from where it was."""
         if self._detection.found[CANDIDATES] >= len(self._detection.candidate):
             room = np.zeros(2 * len(self._detection.candidate), np.int64)
             self._detection = self._detection._replace(candidate=room)
+            return
+        if self._ledger.filled[0] + POINTS * self._detection.found[MANIFOLDS] > len(self._ledger.real):
+            ledger = allocate_ledger(2 * len(self._ledger.real))
+            for old, new in zip(self._ledger, ledger, strict=True):
+                new[: len(old)] = old
+            self._ledger = ledger
             return
         memory = allocate_memory(2 * len(self._memory))
         memory[: len(self._memory)] = self._memory

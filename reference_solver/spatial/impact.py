@@ -1,0 +1,176 @@
+"""Impacts at one instant, before forces act, and how series of rebounds end (E20 to E22)."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.rows import SPEED_SHARE
+from reference_solver.planar.state import LEFT, Options
+from reference_solver.spatial.certificate import certify, open_solve
+from reference_solver.spatial.iteration import solve_velocities
+from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.motion import collect_momentum
+from reference_solver.spatial.prepare import measure_speed, set_response
+from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
+from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.spatial.vector import Vector, length, row
+from reference_solver.tally import RELEASED_SPEED
+
+#: Velocities below this share of a contact's reference speed are round-off of the solve, whose residual is 1e-13 of it.
+NOISE = 1e-11
+#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
+#: sub-step and released there.
+OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
+#: What an instant brings: nothing, contacts whose normals turned, impacts.
+NO_IMPACT, TURNED, STRUCK = 0, 1, 2
+#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
+BOUNCES = 32
+
+
+@inner_kernel
+def copy_twists(source: Array, target: Array) -> None:
+    """Copy six numbers per body; a slice assignment would allocate."""
+    for i in range(len(source)):
+        for k in range(6):
+            target[i, k] = source[i, k]
+
+
+@inner_kernel
+def clear_point(manifolds: Manifolds, m: int, p: int) -> None:
+    """No impulse and no target."""
+    manifolds.target[m, p] = 0.0
+    manifolds.open[m, p] = 0
+    for k in range(3):
+        manifolds.impulse[m, p, k] = 0.0
+
+
+@inner_kernel
+def set_reference_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, dt: float) -> None:
+    """Speed that the residual of a point in a sub-step is measured against (E14), with the loads of a whole step.
+
+    A body that rolls over the point has a large velocity and a large spin there whose difference is none: their
+    round-off is of the size of the parts. Against loads of a short sub-step it could never be small.
+    """
+    measure_speed(bodies, manifolds, m, p, u, dt)
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    parts = length(row(bodies.twist, a, 0)) + length(row(bodies.twist, b, 0))
+    parts += length(row(bodies.twist, a, 3)) * length(row(manifolds.arm_a[m], p, 0))
+    parts += length(row(bodies.twist, b, 3)) * length(row(manifolds.arm_b[m], p, 0))
+    manifolds.speed[m, p] = max(manifolds.speed[m, p], SPEED_SHARE * parts)
+
+
+@inner_kernel
+def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> int:
+    """Targets -e u- of points that meet (E21), 0 of all others; returns what there is to solve.
+
+    A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
+    but what it approaches with goes at once, and is no force.
+    """
+    found = NO_IMPACT
+    for m in range(len(manifolds)):
+        restitution = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            clear_point(manifolds, m, p)
+            for k in range(3):
+                manifolds.hit[m, p, k] = 0.0
+            manifolds.release[m, p] = 0.0
+            u = velocity_at(v, w, manifolds, m, p)
+            set_reference_speed(bodies, manifolds, m, p, u, options.dt)
+            manifolds.impact[m, p] = 0
+            if u[2] >= -NOISE * manifolds.speed[m, p]:
+                continue
+            if manifolds.lasts[m, p]:
+                found = max(found, TURNED)
+                continue
+            found = STRUCK
+            manifolds.impact[m, p] = 1
+            if options.restitution and manifolds.ending[m, p] == OPEN_ENDED:
+                manifolds.target[m, p] = -restitution * u[2]
+            elif options.restitution and manifolds.ending[m, p] == RELEASED:
+                manifolds.release[m, p] = -restitution * u[2]
+    return found
+
+
+@spliced_kernel
+def collide_now(
+    bodies: Bodies,
+    detection: Detection,
+    manifolds: Manifolds,
+    problem: Problem,
+    options: Options,
+    tally: Array,
+) -> int:
+    """Impacts of all touching points together, from ``before`` to ``first`` (E21); what they were."""
+    copy_twists(bodies.before, bodies.twist)
+    found = set_impact_targets(bodies, detection, manifolds, options)
+    if found != NO_IMPACT:
+        open_solve(bodies, 0.0, tally)
+        solve_velocities(bodies, manifolds, problem, options, tally)
+        certify(bodies, manifolds, options, tally)
+        for m in range(len(manifolds)):
+            for p in range(manifolds.points[m]):
+                for k in range(3):
+                    manifolds.hit[m, p, k] = manifolds.impulse[m, p, k]
+    copy_twists(bodies.twist, bodies.first)
+    return found
+
+
+@inner_kernel
+def end_series(
+    bodies: Bodies, detection: Detection, manifolds: Manifolds, sub: SubStep, options: Options, time: float
+) -> bool:
+    """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
+
+    ``bodies.twist`` are the velocities after ``time`` of it.
+    """
+    left = sub.clock[LEFT]
+    new = False
+    for m in range(len(manifolds)):
+        e = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
+        v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
+        v_last, w_last = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            if manifolds.impact[m, p] == 0 or manifolds.ending[m, p] != OPEN_ENDED or e == 0.0:
+                continue
+            leaves = velocity_at(v, w, manifolds, m, p)[2]
+            pull = (leaves - velocity_at(v_last, w_last, manifolds, m, p)[2]) / time
+            if leaves <= 0.0 or pull <= 0.0:
+                continue
+            if 2.0 * leaves <= pull * left * (1.0 - e):
+                manifolds.ending[m, p] = SERIES_ENDS
+                new = True
+            elif 2.0 * leaves * BOUNCES < pull * left:
+                manifolds.ending[m, p] = RELEASED
+                new = True
+    return new
+
+
+@spliced_kernel
+def release(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> bool:
+    """Give held rebounds their speed at the end of the sub-step, as impacts (E22); False if there are none."""
+    fastest = 0.0
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            fastest = max(fastest, manifolds.release[m, p])
+    if fastest == 0.0:
+        return False
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            clear_point(manifolds, m, p)
+            manifolds.target[m, p] = manifolds.release[m, p]
+            set_response(bodies, manifolds, m, p, options)
+            for k in range(3):
+                manifolds.hit[m, p, k] = 0.0
+    prepare_wrenches(bodies, manifolds, options)
+    copy_twists(bodies.twist, bodies.before)
+    open_solve(bodies, 0.0, tally)
+    solve_velocities(bodies, manifolds, problem, options, tally)
+    certify(bodies, manifolds, options, tally)
+    for i in range(len(bodies)):
+        if bodies.gyroscopic[i]:
+            before: Vector = row(bodies.before, i, 3)
+            collect_momentum(bodies, i, before)
+    tally[RELEASED_SPEED] = max(tally[RELEASED_SPEED], fastest)
+    return True

@@ -1,0 +1,257 @@
+"""The step that is cut where bodies meet and where slides end, and the loop over such steps (E19 to E27, E30 to E34).
+
+sub-step:  detect what touches -> impacts -> force phase up to the first end of a slide -> next impact -> move
+
+What is left of the step after a cut is the next sub-step. A step without events is one sub-step.
+"""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.state import EVENTS, LEFT, Options
+from reference_solver.spatial.certificate import open_solve, point_work
+from reference_solver.spatial.impact import STRUCK, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.ledger import enter_contacts
+from reference_solver.spatial.motion import accelerate, displace
+from reference_solver.spatial.next_impact import begin_flight, move_along, next_impact, undo
+from reference_solver.spatial.position import correct_positions
+from reference_solver.spatial.slide import certify_press, press_until_stick
+from reference_solver.spatial.state import (
+    POINTS,
+    REMEMBERED,
+    Bodies,
+    Buffer,
+    Detection,
+    Ledger,
+    Manifolds,
+    Memory,
+    SubStep,
+)
+from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.spatial.touching import detect_touching
+from reference_solver.spatial.vector import add, row, times_transposed
+from reference_solver.tally import (
+    CONTACT_WORK,
+    EVENTS_LOCATED,
+    EVENTS_MISSED,
+    LOAD_WORK,
+    SURFACE_WORK,
+    SWEEPS,
+    UNCONVERGED,
+    WORST_SWEEPS,
+)
+
+#: Events located in one step, and as many more per body; what happens after them in that step is found a step later.
+MOST_EVENTS = 64
+EVENTS_PER_BODY = 4
+#: What is left of a step below this share of it is nothing.
+NOTHING_LEFT = 1e-14
+#: A sub-step shorter than this share of a step tells nothing about forces.
+SHORT = 1e-3
+#: Passes that mark ending series of rebounds; each marks at least one point more.
+SERIES_PASSES = 4
+
+
+@spliced_kernel
+def located_step(
+    bodies: Bodies,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+) -> bool:
+    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
+    if sub.clock[LEFT] == 0.0:
+        sub.clock[LEFT], sub.clock[EVENTS] = options.dt, 0.0
+        ledger.filled[0] = 0
+    while sub.clock[LEFT] > 0.0:
+        if not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
+            return False
+    return True
+
+
+@spliced_kernel
+def sub_step(
+    bodies: Bodies,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+) -> bool:
+    """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
+    left = sub.clock[LEFT]
+    found = detect_touching(bodies, detection, room, memory, options, left)
+    if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
+        return False
+    manifolds = room[:found]
+    length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
+    pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
+    begin_flight(bodies, manifolds, options, length)
+    end = length
+    if sub.clock[EVENTS] < MOST_EVENTS + EVENTS_PER_BODY * len(bodies):
+        end = next_impact(bodies, detection, manifolds, sub, options, length)
+        if end < 0.0:
+            undo(bodies)
+            return False
+    elif length == left:
+        tally[EVENTS_MISSED] += 1.0
+    remember_forces(bodies, detection, manifolds, memory, length, options.dt)
+    if end < length:
+        cut_work(bodies, manifolds, sub, options, tally, end, end / length)
+    enter_contacts(manifolds, ledger)
+    move_along(bodies, end, end == length)
+    if pushed:
+        displace(bodies, options.dt)
+    if options.restitution and release(bodies, manifolds, problem, options, tally):
+        enter_contacts(manifolds, ledger)
+    if end < left:
+        sub.clock[EVENTS] += 1.0
+        tally[EVENTS_LOCATED] += 1.0
+    sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
+    return True
+
+
+@spliced_kernel
+def solve_sub_step(
+    bodies: Bodies,
+    detection: Detection,
+    manifolds: Manifolds,
+    problem: Problem,
+    sub: SubStep,
+    options: Options,
+    tally: Array,
+) -> float:
+    """Impacts and force phase; return the length of the sub-step, ``twist`` being the velocities at its end.
+
+    An attempt that is made again leaves its sweeps in the tally and nothing else.
+    """
+    copy_twists(bodies.twist, bodies.before)
+    prepare_wrenches(bodies, manifolds, options)
+    length = sub.clock[LEFT]
+    for k in range(len(tally)):
+        sub.saved[k] = tally[k]
+    for _ in range(SERIES_PASSES):
+        for k in range(len(tally)):
+            if k != SWEEPS and k != WORST_SWEEPS and k != UNCONVERGED:
+                tally[k] = sub.saved[k]
+        struck = collide_now(bodies, detection, manifolds, problem, options, tally) == STRUCK
+        length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck)
+        if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
+            break
+    for k in range(len(tally)):
+        sub.saved[k] = tally[k]
+    certify_press(bodies, manifolds, options, tally, length)
+    return length
+
+
+@inner_kernel
+def cut_work(
+    bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, tally: Array, end: float, share: float
+) -> None:
+    """Impulses, and work in the tally, of a sub-step that was solved at full length and cut at ``end``."""
+    for entry in (CONTACT_WORK, SURFACE_WORK, LOAD_WORK):
+        tally[entry] = sub.saved[entry]
+    accelerate(bodies, end)
+    open_solve(bodies, end, tally)
+    for i in range(len(bodies)):
+        for k in range(6):
+            bodies.twist[i, k] = bodies.first[i, k] + share * (bodies.last[i, k] - bodies.first[i, k])
+    for m in range(len(manifolds)):
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        v_start, w_start = relative_twist(bodies.start, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            for k in range(3):
+                manifolds.impulse[m, p, k] *= share
+            both = add(velocity_at(v, w, manifolds, m, p), velocity_at(v_start, w_start, manifolds, m, p))
+            done, moved, _ = point_work(bodies, manifolds, m, p, both)
+            tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
+    copy_twists(bodies.first, bodies.twist)
+
+
+@inner_kernel
+def remember_forces(
+    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, length: float, dt: float
+) -> None:
+    """Keep the forces of the sub-step: they start the next solve, and tell which contacts last (E20).
+
+    In a very short sub-step the impulses stem from round-off and turning normals rather than from forces; what was
+    known before is the better guess.
+    """
+    n = len(bodies)
+    for m in range(len(manifolds)):
+        memory.pair[m] = manifolds.body_a[m] * n + manifolds.body_b[m]
+        memory.points[m] = manifolds.points[m]
+        for p in range(manifolds.points[m]):
+            memory.feature[m, p] = manifolds.feature[m, p]
+            known, divisor = row(manifolds.impulse[m], p, 0), max(length, SHORT * dt)
+            ends = manifolds.release[m, p] > 0.0 or known[2] <= 0.0
+            if length < SHORT * dt and manifolds.force[m, p, 2] > 0.0:
+                known, divisor = row(manifolds.force[m], p, 0), 1.0
+            force = times_transposed(manifolds.frame, m, known)
+            for d in range(3):
+                memory.impulse[m, p, d] = 0.0 if ends else force[d] / divisor
+    detection.found[REMEMBERED] = len(manifolds)
+
+
+@kernel
+def run_located(
+    bodies: Bodies,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+    buffer: Buffer,
+    first: int,
+    steps: int,
+    stride: int,
+) -> int:
+    """Like `run_steps` in step.py, for located steps."""
+    for k in range(first, steps):
+        sampled = stride > 0 and (k + 1) % stride == 0
+        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(ledger.real) > len(buffer.real):
+            return k
+        if not located_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
+            return k
+        if sampled:
+            sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
+    return steps
+
+
+@inner_kernel
+def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
+    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+    for i in range(len(bodies)):
+        for d in range(7):
+            buffer.pose[s, i, d] = bodies.pose[i, d]
+        for d in range(6):
+            buffer.twist[s, i, d] = bodies.twist[i, d]
+    start = buffer.offset[s]
+    buffer.offset[s + 1] = start
+    if len(buffer.real) > 0:
+        buffer.offset[s + 1] = start + copy_ledger(ledger, buffer, start)
+
+
+@kernel
+def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> int:
+    """Write the contacts of the last step from index ``start`` on; return how many."""
+    for c in range(ledger.filled[0]):
+        for d in range(3):
+            buffer.names[start + c, d] = ledger.names[c, d]
+        for d in range(10):
+            buffer.real[start + c, d] = ledger.real[c, d]
+    return ledger.filled[0]

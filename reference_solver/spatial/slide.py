@@ -1,0 +1,143 @@
+"""The force phase of a sub-step, and the instant inside it at which a slide ends (E19, E20, E34)."""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.state import Options
+from reference_solver.spatial.certificate import certify, open_solve
+from reference_solver.spatial.impact import NOISE, clear_point, copy_twists, set_reference_speed
+from reference_solver.spatial.iteration import solve_velocities
+from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.motion import accelerate
+from reference_solver.spatial.prepare import warm_start
+from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.spatial.touching import gap_noise
+from reference_solver.spatial.vector import Vector
+
+#: Solves in search of the end of a slide; where contacts keep their modes the second is exact.
+STICK_SOLVES = 30
+#: Share of the end told by a point that stuck which is tried next, to be on the slipping side of it.
+SHORTER = 0.9
+#: Slip below this share of a contact's reference speed is none: the residual leaves as much.
+AT_END = 1e-13
+#: Relative accuracy of that instant: some ten units in the last place.
+SAME_TIME = 1e-14
+
+
+@spliced_kernel
+def press(
+    bodies: Bodies,
+    manifolds: Manifolds,
+    problem: Problem,
+    options: Options,
+    tally: Array,
+    length: float,
+    struck: bool,
+) -> None:
+    """Velocities at the end of a sub-step of ``length``: from ``first`` to ``twist`` (E20).
+
+    ``struck``: impacts came first, so that lasting contacts may part as well. v* is kept for the certificate.
+    """
+    copy_twists(bodies.first, bodies.twist)
+    for m in range(len(manifolds)):
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            u = velocity_at(v, w, manifolds, m, p)
+            set_reference_speed(bodies, manifolds, m, p, u, options.dt)
+            clear_point(manifolds, m, p)
+            manifolds.slip[m, p, 0], manifolds.slip[m, p, 1] = u[0], u[1]
+            if u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0):
+                manifolds.open[m, p] = 1
+                continue
+            for k in range(3):
+                manifolds.impulse[m, p, k] = length * manifolds.force[m, p, k] if options.warm_starting else 0.0
+            if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
+                manifolds.target[m, p] = -manifolds.gap[m, p] / length
+    accelerate(bodies, length)
+    copy_twists(bodies.twist, bodies.start)
+    warm_start(bodies, manifolds, options)
+    solve_velocities(bodies, manifolds, problem, options, tally)
+
+
+@inner_kernel
+def certify_press(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array, length: float) -> None:
+    """Certify the force phase that is used, among those that were tried."""
+    copy_twists(bodies.twist, bodies.last)
+    copy_twists(bodies.start, bodies.twist)
+    open_solve(bodies, length, tally)
+    copy_twists(bodies.last, bodies.twist)
+    if len(manifolds) > 0:
+        certify(bodies, manifolds, options, tally)
+
+
+@inner_kernel
+def slip_left(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
+    """Slip that point p would have left at the end with its whole friction, < 0 if it came to its end before (E34).
+
+    A point that still slips goes on linearly. One that stuck, or turned, would with its whole friction have gone on
+    past zero; how far, is told by its own collision matrix.
+    """
+    k = manifolds.matrix[m, p]
+    s1, s2 = manifolds.slip[m, p, 0], manifolds.slip[m, p, 1]
+    size = math.sqrt(s1 * s1 + s2 * s2)
+    d1, d2 = s1 / size, s2 / size
+    softness = k[0] * d1 * d1 + 2.0 * k[1] * d1 * d2 + k[3] * d2 * d2
+    t1, t2 = manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1]
+    whole = manifolds.friction[m] * manifolds.impulse[m, p, 2]
+    along = u[0] * d1 + u[1] * d2
+    if along < 0.0:  # it turned round: along the old direction it would have gone on as it began
+        return along - (whole + t1 * d1 + t2 * d2) * softness
+    return math.sqrt(u[0] * u[0] + u[1] * u[1]) - (whole - math.sqrt(t1 * t1 + t2 * t2)) * softness
+
+
+@inner_kernel
+def slip_end(bodies: Bodies, manifolds: Manifolds, options: Options, length: float) -> float:
+    """First time at which a slide of the solved sub-step comes to its end, inf if none does (E34)."""
+    first = math.inf
+    for m in range(len(manifolds)):
+        if manifolds.friction[m] == 0.0:
+            continue
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            slip = math.sqrt(manifolds.slip[m, p, 0] ** 2 + manifolds.slip[m, p, 1] ** 2)
+            if manifolds.impulse[m, p, 2] <= 0.0 or slip <= NOISE * manifolds.speed[m, p]:
+                continue
+            rest = slip_left(manifolds, m, p, velocity_at(v, w, manifolds, m, p))
+            lost = slip - rest
+            if abs(rest) <= AT_END * manifolds.speed[m, p]:
+                first = min(first, length)
+            elif lost > 0.0:
+                first = min(first, length * (slip / lost))
+    return first
+
+
+@spliced_kernel
+def press_until_stick(
+    bodies: Bodies,
+    manifolds: Manifolds,
+    problem: Problem,
+    options: Options,
+    tally: Array,
+    left: float,
+    struck: bool,
+) -> float:
+    """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length."""
+    if len(manifolds) == 0:
+        copy_twists(bodies.first, bodies.twist)
+        accelerate(bodies, left)
+        copy_twists(bodies.twist, bodies.start)
+        return left
+    press(bodies, manifolds, problem, options, tally, left, struck)
+    length = left
+    for _ in range(STICK_SOLVES if options.friction else 0):
+        end = slip_end(bodies, manifolds, options, length)
+        if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
+            break
+        # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
+        length = end if end > length else SHORTER * end
+        press(bodies, manifolds, problem, options, tally, length, struck)
+    return length

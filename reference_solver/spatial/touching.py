@@ -1,0 +1,107 @@
+"""Detection for located steps: the points that touch, and those that carried load a moment ago (E20)."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF
+from reference_solver.planar.state import Options
+from reference_solver.spatial.broadphase import find_candidates
+from reference_solver.spatial.kinematics import point_velocity
+from reference_solver.spatial.manifolds import set_frame, set_world_points, sort_points
+from reference_solver.spatial.narrowphase import collide
+from reference_solver.spatial.prepare import set_response
+from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Detection, Manifolds, Memory
+from reference_solver.spatial.vector import dot, row, sub, times
+
+#: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
+#: the time of impact.
+LATE = 1e-15
+
+
+@inner_kernel
+def detect_touching(
+    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options, left: float
+) -> int:
+    """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room."""
+    if not find_candidates(bodies, detection, options):
+        return -1
+    n = len(bodies)
+    m, old = 0, 0
+    for k in range(detection.found[CANDIDATES]):
+        if m == len(manifolds):
+            return -1
+        key = detection.candidate[k]
+        while old < detection.found[REMEMBERED] and memory.pair[old] < key:
+            old += 1
+        known = old if old < detection.found[REMEMBERED] and memory.pair[old] == key else -1
+        if collide(bodies, detection, key // n, key % n, options.margin, manifolds, m) == 0:
+            continue
+        sort_points(manifolds, m)
+        set_world_points(bodies, manifolds, m)
+        keep_points(bodies, manifolds, m, memory, known, left)
+        if manifolds.points[m] > 0:
+            describe(bodies, detection, manifolds, m, options)
+            m += 1
+    detection.found[MANIFOLDS] = m
+    return m
+
+
+@inner_kernel
+def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
+    """Gap of a point that is round-off, not geometry [m]."""
+    point = row(manifolds.point[m], p, 0)
+    place = max(abs(point[0]), abs(point[1]), abs(point[2]))
+    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+    return ROUND_OFF * extent + COORDINATE_NOISE * place
+
+
+@inner_kernel
+def keep_points(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, left: float) -> None:
+    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap."""
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    kept = 0
+    for p in range(manifolds.points[m]):
+        at_a = point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0))
+        at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
+        approach = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
+        lasts = recall_force(manifolds, m, p, memory, known)
+        if lasts or manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + LATE * left * abs(approach):
+            for d in range(3):
+                manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
+                manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
+                manifolds.point[m, kept, d] = manifolds.point[m, p, d]
+                manifolds.force[m, kept, d] = manifolds.force[m, p, d]
+            manifolds.gap[m, kept] = manifolds.gap[m, p]
+            manifolds.feature[m, kept] = manifolds.feature[m, p]
+            manifolds.lasts[m, kept] = 1 if lasts else 0
+            kept += 1
+    manifolds.points[m] = kept
+
+
+@inner_kernel
+def recall_force(manifolds: Manifolds, m: int, p: int, memory: Memory, known: int) -> bool:
+    """Give point p the force of the same feature in the sub-step before (world axes); whether there was any."""
+    for d in range(3):
+        manifolds.force[m, p, d] = 0.0
+    if known < 0:
+        return False
+    for o in range(memory.points[known]):
+        if memory.feature[known, o] == manifolds.feature[m, p]:
+            for d in range(3):
+                manifolds.force[m, p, d] = memory.impulse[known, o, d]
+            return dot(row(manifolds.force[m], p, 0), row(manifolds.frame[m], 2, 0)) > 0.0
+    return False
+
+
+@inner_kernel
+def describe(bodies: Bodies, detection: Detection, manifolds: Manifolds, m: int, options: Options) -> None:
+    """Frame, responses and laws of manifold m, forces turned into its frame."""
+    set_frame(bodies, manifolds, m)
+    friction = detection.friction[manifolds.body_a[m], manifolds.body_b[m]]
+    manifolds.friction[m] = friction if options.friction else 0.0
+    for p in range(manifolds.points[m]):
+        set_response(bodies, manifolds, m, p, options)
+        force = times(manifolds.frame, m, row(manifolds.force[m], p, 0))
+        for d in range(3):
+            manifolds.force[m, p, d] = force[d]
+        manifolds.ending[m, p] = 0
