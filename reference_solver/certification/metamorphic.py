@@ -99,7 +99,7 @@ def predictability(space: Space) -> Iterator[Gate]:
     """Growth of a disturbance of 1e-9 m/s up to the horizon, which the bound of all relations rests on (E73)."""
     rng = np.random.default_rng(SEED)
     for scene in SCENES:
-        worst = max(growth(scene, space, "reference", drawn(rng, space)) for _ in range(TRIALS))
+        worst = max(growth(scene, space, "reference", drawn(rng, space)) for _ in range(3 * TRIALS))
         yield Gate.at_most("growth of a disturbance", scene, worst, GROWTH, made_by(space, "reference"))
 
 
