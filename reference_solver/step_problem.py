@@ -108,7 +108,7 @@ class StepProblem:
     def solutions(self) -> list[ContactSolution]:
         """Return every solution of a planar problem of at most six contacts (O9), one per distinct velocity.
 
-        None, one or several: the certificate's question of uniqueness.
+        None, one or several: the certificate's question of uniqueness. Two may be the ends of a continuum.
 
         Raises
         ------

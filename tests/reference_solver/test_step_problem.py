@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, StepProblem
+from reference_solver.cone import cone_defect
 
 DT, G = 1.0 / 240.0, 9.81
 UP = (1.0, 0.0, 0.0, 0.0)
@@ -125,6 +126,56 @@ def test_enumeration_says_whether_a_problem_has_one_solution():
     (found,) = problem.solutions()
     assert problem.pair_sums(found.impulse) == pytest.approx(np.array([[0.0, G * DT]]), abs=1e-15)
     assert found.velocity == pytest.approx(np.zeros((2, 2)), abs=1e-15)
+
+
+def three_discs(seed, friction):
+    """One disc on two, on a floor, all touching; masses and motions at random, of a few times g dt."""
+    random, bodies = np.random.default_rng(seed), [Body(HalfSpace((0.0, 1.0)), motion="fixed")]
+    for x, height in ((0.0, 0.5), (1.0, 0.5), (0.5, 0.5 + 0.5 * np.sqrt(3.0))):
+        mass = random.uniform(0.5, 2.0)
+        motion = tuple(random.normal(size=3) * 3.0 * G * DT)
+        bodies.append(Body(Disc(0.5), mass, 0.125 * mass, (x, height, 0.0), motion))
+    settings = Settings(DT, solver="block", residual=1e-13, relaxation=None, beta=1.0, slop=0.0)
+    return Simulation(Model(2, bodies, (0.0, -G), 0.0, friction), settings)
+
+
+def missed(problem, impulse):
+    """Largest distance from complementarity on the friction cone (E60), over the largest impulse."""
+    step, both = 1.0 / problem.matrix.diagonal().max(), zip(impulse, problem.velocity(impulse), strict=True)
+    defects = [cone_defect((p[1], 0.0, p[0]), (u[1], 0.0, u[0]), 0.0, problem.friction[0], step) for p, u in both]
+    return max(defects) / np.abs(impulse).max()
+
+
+@pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 3), (2, 1)])
+def test_the_solver_finds_one_of_the_solutions_that_enumeration_finds(seed, count):
+    """Coulomb's law in coupled contacts may have several solutions: of 120 such triples 5 have, at mu = 0.5."""
+    simulation = three_discs(seed, 0.5)
+    problem = simulation.step_problem()
+    solutions = problem.solutions()
+    assert problem.contacts == 5 and len(solutions) == count
+    simulation.advance(1)
+    ours = problem.velocity(in_frame(problem, simulation.contacts()))
+    scale = np.abs(problem.free).max()
+    assert min(np.abs(ours - found.velocity).max() for found in solutions) <= 1e-11 * scale
+    apart = [np.abs(a.velocity - b.velocity).max() for a in solutions for b in solutions if a is not b]
+    assert min(apart, default=scale) > 1e-2 * scale  # they are different motions, not one at a border of modes
+
+
+@pytest.mark.parametrize("seed", [15, 17])
+def test_two_solutions_may_be_the_ends_of_a_continuum(seed):
+    """Discs that jam: everything between the two solutions found is one as well, and the solver's lies among them."""
+    simulation = three_discs(seed, 0.5)
+    problem = simulation.step_problem()
+    first, last = problem.solutions()
+    for share in (0.25, 0.5, 0.75):
+        assert missed(problem, (1.0 - share) * first.impulse + share * last.impulse) <= 1e-14
+    simulation.advance(1)
+    impulse = in_frame(problem, simulation.contacts())
+    assert missed(problem, impulse) <= 1e-13
+    ours, whole = problem.velocity(impulse), last.velocity - first.velocity
+    share = np.vdot(ours - first.velocity, whole) / np.vdot(whole, whole)
+    assert 0.0 < share < 1.0
+    assert ours == pytest.approx(first.velocity + share * whole, abs=1e-11 * np.abs(problem.free).max())
 
 
 def test_enumeration_is_planar():
