@@ -50,8 +50,8 @@ REASONS = {
     "solver": "scalar: row after row, the textbook; block: the rows of a manifold together, which does not stall",
     "direct": "where sweeps turn out to be slow (mass ratios, tall columns) Newton's method ends a step; it needs a "
     "residual stop, fixed sweeps never hand over",
-    "scheme": "fixed: impacts are found at the start of the step after, as engines do; located: steps are cut where bodies "
-    "meet and where a slide ends",
+    "scheme": "fixed: impacts are found at the start of the step after, as engines do; located: steps are cut where "
+    "bodies meet and where a slide ends",
     "margin": "pairs with e = 0 are contacts within this share of the smallest half width, closed by at most the gap; "
     "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
 }
