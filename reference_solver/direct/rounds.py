@@ -40,10 +40,11 @@ GROWTH, LEAST_GROWTH, RETREAT = 10.0, 1.5, 0.1
 
 
 @inner_kernel
-def solve_problem(problem: Problem, tolerance: float, budget: int) -> float:
+def solve_problem(problem: Problem, tolerance: float, budget: int, fresh: bool) -> float:
     """Improve impulses and twists until the residual (E14) is at most `tolerance`; returns the best residual.
 
-    `best` then holds the impulses that have it. At most `budget` factorisations, and a few more to finish a round.
+    `best` then holds the impulses that have it, those given if there are none better. At most `budget` factorisations,
+    and a few more to finish a round. `fresh`: rounds start from zero impulses.
     """
     problem.size[FACTORISATIONS] = 0
     set_excess(problem)
@@ -51,7 +52,10 @@ def solve_problem(problem: Problem, tolerance: float, budget: int) -> float:
     keep(problem)
     if not order_bodies(problem):
         return best
-    stiffness = min(max(FIRST_STIFFNESS, SETTLED / best), LARGEST_STIFFNESS) if best > 0.0 else FIRST_STIFFNESS
+    if fresh:
+        withdraw(problem)
+        residual = scaled_map(problem)
+    stiffness = min(max(FIRST_STIFFNESS, SETTLED / max(residual, 1.0 / LARGEST_STIFFNESS)), LARGEST_STIFFNESS)
     growth, standing = GROWTH, False
     while problem.size[FACTORISATIONS] < budget:
         spent = problem.size[FACTORISATIONS]
@@ -91,6 +95,16 @@ def set_excess(problem: Problem) -> None:
                 at_a = contact.jacobian[c, 0, r, k] * problem.body.twist[contact.body[c, 0], k]
                 excess += at_a + contact.jacobian[c, 1, r, k] * problem.body.twist[contact.body[c, 1], k]
             contact.excess[c, r] = excess
+
+
+@inner_kernel
+def withdraw(problem: Problem) -> None:
+    """Take all impulses back."""
+    contact = problem.contact
+    for c in range(problem.size[CONTACTS]):
+        for r in range(problem.size[ROW_COUNT]):
+            contact.change[c, r] = -contact.impulse[c, r]
+    commit(problem, 1.0)
 
 
 @inner_kernel

@@ -30,10 +30,10 @@ from reference_solver.planar.state import Bodies, Options, Rows
 
 
 @inner_kernel
-def solve_directly(bodies: Bodies, rows: Rows, options: Options, problem: Problem, budget: int) -> float:
+def solve_directly(bodies: Bodies, rows: Rows, options: Options, problem: Problem, budget: int, fresh: bool) -> float:
     """Set the impulses that the direct solver finds within `budget` factorisations; returns their residual."""
     load(bodies, rows, options, problem)
-    residual = solve_problem(problem, options.residual, budget)
+    residual = solve_problem(problem, options.residual, budget, fresh)
     for c in range(rows.counts[ROW_COUNT]):
         normal, tangent = problem.contact.best[c, 0], problem.contact.best[c, 1]
         apply_normal(bodies, bodies.twist, rows, c, normal - rows.real[c, PN])

@@ -29,7 +29,7 @@ DIRECT_AFTER = 32
 #: It is asked if the measured rate predicts more sweeps than this: what its usual 5 to 10 factorisations cost (6 sweeps
 #: each in a column, 20 in a pyramid of 465 boxes).
 DIRECT_WORTH = 100.0
-#: Factorisations it may make before sweeps go on.
+#: Factorisations it may make before sweeps go on, times the number of times it was asked in the step.
 DIRECT_BUDGET = 100
 #: After a step of its own it is asked before any sweep, and already at this part of the residual allowed: what needed
 #: it once is ill-conditioned, and leftovers of many steps add up.
@@ -72,9 +72,9 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
     limit = LARGEST_RELAXATION
     residual = natural_map(bodies, rows, options)
     if options.direct and problem.size[HELD] and residual > DIRECT_KEEP * options.residual:
-        residual = hand_over(bodies, rows, problem, options, tally)
+        residual = hand_over(bodies, rows, problem, options, tally, 1)
     before = best = residual
-    sweeps, best_at, next_direct = 0, 0, DIRECT_AFTER
+    sweeps, best_at, asked, next_direct = 0, 0, 0, DIRECT_AFTER
     while residual > options.residual and sweeps < options.max_sweeps:
         sweep(bodies, rows, options, relaxation)
         problem.size[HELD] = 0
@@ -86,7 +86,8 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
             best, best_at = residual, sweeps
         if options.direct and sweeps >= next_direct and sweeps % RATE_INTERVAL == 0:
             if sweeps_ahead(options.residual, residual, before) > DIRECT_WORTH:
-                residual = hand_over(bodies, rows, problem, options, tally)
+                asked += 1
+                residual = hand_over(bodies, rows, problem, options, tally, asked)
                 before, best, best_at, next_direct = residual, residual, sweeps, 2 * sweeps
                 continue
         if options.relaxation <= 0.0:
@@ -113,9 +114,13 @@ def sweeps_ahead(goal: float, residual: float, before: float) -> float:
 
 
 @inner_kernel
-def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array) -> float:
-    """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer."""
-    solve_directly(bodies, rows, options, problem, DIRECT_BUDGET)
+def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array, times: int) -> float:
+    """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer.
+
+    Asked again in the same step (`times`) it may do more, and every second time it starts from zero impulses: what the
+    last start led to was no answer.
+    """
+    solve_directly(bodies, rows, options, problem, DIRECT_BUDGET * times, times % 2 == 0)
     residual = natural_map(bodies, rows, options)
     enter_direct(problem, residual, options, tally)
     return residual

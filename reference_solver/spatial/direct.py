@@ -12,11 +12,13 @@ from reference_solver.spatial.vector import ZERO, add, cross, row, scale, sub, t
 
 
 @inner_kernel
-def solve_directly(bodies: Bodies, manifolds: Manifolds, options: Options, problem: Problem, budget: int) -> float:
+def solve_directly(
+    bodies: Bodies, manifolds: Manifolds, options: Options, problem: Problem, budget: int, fresh: bool
+) -> float:
     """Set the impulses that the direct solver finds within `budget` factorisations; returns their residual."""
     load_bodies(bodies, problem)
     load_contacts(bodies, manifolds, options, problem)
-    residual = solve_problem(problem, options.residual, budget)
+    residual = solve_problem(problem, options.residual, budget, fresh)
     c = 0
     for m in range(len(manifolds)):
         force, moment = ZERO, ZERO

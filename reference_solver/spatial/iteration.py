@@ -49,9 +49,9 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
     limit = LARGEST_RELAXATION
     residual = natural_map(bodies, manifolds, options)
     if options.direct and problem.size[HELD] and residual > DIRECT_KEEP * options.residual:
-        residual = hand_over(bodies, manifolds, problem, options, tally)
+        residual = hand_over(bodies, manifolds, problem, options, tally, 1)
     before = best = residual
-    sweeps, best_at, next_direct = 0, 0, DIRECT_AFTER
+    sweeps, best_at, asked, next_direct = 0, 0, 0, DIRECT_AFTER
     while residual > options.residual and sweeps < options.max_sweeps:
         sweep(bodies, manifolds, options, relaxation)
         problem.size[HELD] = 0
@@ -63,7 +63,8 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
             best, best_at = residual, sweeps
         if options.direct and sweeps >= next_direct and sweeps % RATE_INTERVAL == 0:
             if sweeps_ahead(options.residual, residual, before) > DIRECT_WORTH:
-                residual = hand_over(bodies, manifolds, problem, options, tally)
+                asked += 1
+                residual = hand_over(bodies, manifolds, problem, options, tally, asked)
                 before, best, best_at, next_direct = residual, residual, sweeps, 2 * sweeps
                 continue
         if options.relaxation <= 0.0:
@@ -80,9 +81,15 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
 
 
 @inner_kernel
-def hand_over(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> float:
-    """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer."""
-    solve_directly(bodies, manifolds, options, problem, DIRECT_BUDGET)
+def hand_over(
+    bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array, times: int
+) -> float:
+    """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer.
+
+    Asked again in the same step (`times`) it may do more, and every second time it starts from zero impulses: what the
+    last start led to was no answer.
+    """
+    solve_directly(bodies, manifolds, options, problem, DIRECT_BUDGET * times, times % 2 == 0)
     residual = natural_map(bodies, manifolds, options)
     enter_direct(problem, residual, options, tally)
     return residual

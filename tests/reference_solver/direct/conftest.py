@@ -11,8 +11,8 @@ from reference_solver.direct.rounds import solve_problem
 
 
 @kernel
-def run_solver(problem, tolerance, budget):
-    return solve_problem(problem, tolerance, budget)
+def run_solver(problem, tolerance, budget, fresh=False):
+    return solve_problem(problem, tolerance, budget, fresh)
 
 
 @kernel

@@ -129,6 +129,25 @@ def test_painleve_rod_gets_one_of_its_answers(direct, target, slide, spin):
     assert min(np.abs(velocity - solution.velocity[0]).max() for solution in solutions) <= 1e-11
 
 
+def test_a_fresh_start_forgets_the_impulses_and_nothing_else(direct):
+    """From wrong impulses: the same velocities, and without a factorisation to spend those impulses stay the best."""
+    twists = []
+    for spoilt in (False, True):
+        problem = random_problem(direct, 7, 5)
+        if spoilt:
+            contact, body = problem.contact, problem.body
+            contact.impulse[:, :2] = [1.0, 0.1]
+            for c in range(5):
+                for side in range(2):
+                    body.twist[contact.body[c, side]] += contact.impulse[c] @ contact.response[c, side]
+            before = contact.impulse.copy()
+            direct.solve(problem, SOLVED, 0, False)
+            assert np.array_equal(contact.best, before)
+        assert direct.solve(problem, SOLVED, 200, spoilt) <= SOLVED
+        twists.append(problem.body.twist.copy())
+    assert twists[0] == pytest.approx(twists[1], abs=1e-10)
+
+
 def test_units_change_nothing_but_units(direct):
     """Lengths by 2^7, masses by 2^-5, times by 2^3: impulses by the same powers, to the last bit."""
     length, mass, time = 2.0**7, 2.0**-5, 2.0**3
