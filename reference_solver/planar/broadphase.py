@@ -72,6 +72,12 @@ def add_candidate(bodies: Bodies, pairs: Pairs, rows: Rows, i: int, j: int) -> b
 def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill `Pairs.candidate` in ascending order; False if there is no room."""
     bound_bodies(bodies, pairs, options)
+    return pair_bodies(bodies, pairs, rows, options)
+
+
+@inner_kernel
+def pair_bodies(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
+    """Candidates from `Pairs.bounds`; False if there is no room."""
     rows.counts[CANDIDATES] = 0
     n = len(bodies.kind)
     if options.broadphase:

@@ -40,7 +40,11 @@ A, B = 0, 1
 FEATURE = 2
 #: 1 where bodies meet or part faster than the loads of one step explain.
 IMPACT = 3
-ROW_INTEGERS = 4
+#: 1 where the contact carried load in the sub-step before: it lasts (E20).
+LASTS = 4
+#: How a rebound ends: OPEN_ENDED, SERIES_ENDS or RELEASED, see impact.py (E22).
+ENDING = 5
+ROW_INTEGERS = 6
 
 # Rows.real.
 #: Normal from A to B; the tangent is the normal turned by +90 degrees.
@@ -69,4 +73,12 @@ GAP = 17
 ARM_A, ARM_B = 18, 20
 #: Contact point in world axes, for records only [m]: two columns.
 POINT = 22
-ROW_REALS = 24
+#: Normal and tangential impulse of the impacts of a sub-step (E21) [N s].
+IMPACT_N, IMPACT_T = 24, 25
+#: Normal and tangential force remembered from the sub-step before [N].
+FORCE_N, FORCE_T = 26, 27
+#: Speed with which a held rebound is released at the end of its sub-step (E22) [m/s].
+RELEASE = 28
+#: u_t at the start of the force phase (E23) [m/s].
+SLIP = 29
+ROW_REALS = 30

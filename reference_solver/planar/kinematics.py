@@ -21,7 +21,7 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.state import Bodies, Options, Rows
+from reference_solver.planar.state import Bodies, Rows
 
 
 @inner_kernel
@@ -76,16 +76,26 @@ def acceleration_at(bodies: Bodies, i: int, x: float, y: float) -> float:
 
 @inner_kernel
 def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
-    """Speed of a point of body i at arm (x, y) [m/s]."""
-    vx = bodies.twist[i, 0] - bodies.twist[i, 2] * y
-    vy = bodies.twist[i, 1] + bodies.twist[i, 2] * x
-    return math.sqrt(vx * vx + vy * vy)
+    """Size of the velocities that the speed of a point of body i at arm (x, y) is the sum of [m/s].
+
+    At the foot of a rolling disc they cancel; their round-off does not.
+    """
+    vx, vy, w = bodies.twist[i, 0], bodies.twist[i, 1], bodies.twist[i, 2]
+    return math.sqrt(vx * vx + vy * vy) + abs(w) * math.sqrt(x * x + y * y)
 
 
 @inner_kernel
-def load_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> float:
-    """Largest relative speed that the loads of one step can give the two points of row c [m/s]."""
+def load_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
+    """Largest relative speed that the loads can give the two points of row c within dt [m/s]."""
     a, b = rows.integer[c, A], rows.integer[c, B]
     speed = acceleration_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     speed += acceleration_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
-    return options.dt * speed
+    return dt * speed
+
+
+@inner_kernel
+def copy_vectors(source: Array, target: Array) -> None:
+    """Copy three numbers per body; a slice assignment would allocate."""
+    for i in range(len(source)):
+        for k in range(3):
+            target[i, k] = source[i, k]

@@ -10,6 +10,7 @@ from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
     FEATURES,
+    FIXED_STEP,
     MANIFOLDS,
     REMEMBERED,
     Bodies,
@@ -39,7 +40,7 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
             return False
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
         # What flies towards a rebound must not be slowed down before it gets there (E8).
-        bounces = options.restitution and pairs.restitution[a, b] > 0.0
+        bounces = options.scheme == FIXED_STEP and options.restitution and pairs.restitution[a, b] > 0.0
         found = collide(bodies, a, b, TOUCHING if bounces else options.margin, rows, contacts)
         if found > 0:
             rows.manifold[manifolds] = contacts

@@ -9,7 +9,7 @@ from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, A, B
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.rows import ROUND_OFF
 from reference_solver.planar.sequential_impulses import sweep_pushes
-from reference_solver.planar.state import BLOCK, CONTACTS, SPLIT, Bodies, Options, Rows
+from reference_solver.planar.state import BLOCK, CONTACTS, FIXED_STEP, SPLIT, Bodies, Options, Rows
 from reference_solver.tally import PROJECTED
 
 #: With a residual stop, sweeps end when no row misses its correction by more than this share of the largest.
@@ -26,8 +26,11 @@ def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PUSH] = 0.0
         extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
-        # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
-        after = rows.real[c, GAP] + options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
+        after = rows.real[c, GAP]
+        if options.scheme == FIXED_STEP:
+            # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
+            # Located impacts happen at a gap of zero; an overlap left by turning bodies would outlast the rebound.
+            after += options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
         excess = -after - options.slop
         if abs(excess) <= ROUND_OFF * extent:
             excess = 0.0

@@ -64,7 +64,7 @@ def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
         rows.real[c, FRICTION] = pairs.friction[a, b]
         rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
         set_target(bodies, pairs, rows, c, options)
-        set_speed(bodies, rows, c, options)
+        set_speed(bodies, rows, c, options.dt)
 
 
 @inner_kernel
@@ -106,22 +106,30 @@ def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Option
 
 
 @inner_kernel
-def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
-    """Speed that the residual of this contact is measured against (E14); which impulses may be warm started.
+def set_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> None:
+    """Speed that the residual is measured against (E14), and which impulses may be warm started.
 
     A contact whose bodies part or meet faster than the loads of one step explain is an impact: the impulse of the
     step before does not guess this step's, nor this one the next (E9).
     """
+    push = measure_speed(bodies, rows, c, dt)
+    approach = rows.real[c, APPROACH]
+    rows.integer[c, IMPACT] = 1 if abs(approach) > push else 0
+    if approach > push:
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
+
+
+@inner_kernel
+def measure_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
+    """Set the reference speed of row c (E14); return the speed that loads can give it within dt."""
     a, b = rows.integer[c, A], rows.integer[c, B]
-    push = load_speed(bodies, rows, c, options)
+    push = load_speed(bodies, rows, c, dt)
     approach, slip = rows.real[c, APPROACH], tangent_velocity(bodies.twist, rows, c)
     meeting = math.sqrt(approach * approach + slip * slip)
     moving = speed_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
     rows.real[c, SPEED] = max(meeting, push, SPEED_SHARE * moving)
-    rows.integer[c, IMPACT] = 1 if abs(approach) > push else 0
-    if approach > push:
-        rows.real[c, PN] = rows.real[c, PT] = 0.0
+    return push
 
 
 @inner_kernel

@@ -35,6 +35,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
 
@@ -91,6 +92,28 @@ class Rows(NamedTuple):
     local: Array  # (LOCAL_ROWS, LOCAL_COLUMNS): scratch of the block being solved, see pair_modes.py
     old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
     old_impulse: Array  # (c, 2)
+
+
+class SubStep(NamedTuple):
+    """One sub-step of the located scheme, in which accelerations are constant (E19)."""
+
+    clock: Array  # (CLOCK_SIZE,): see LEFT, EVENTS
+    before: Array  # (n, 3): velocities at its start
+    start: Array  # (n, 3): after its impacts
+    gain: Array  # (n, 3): accelerations in it
+    pose: Array  # (n, 3): poses at its start
+    turn: Array  # (n, 2): cosine and sine of the angle there
+    tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
+    closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
+    probe: Rows  # room for the contacts of one pair at another time
+
+
+class Ledger(NamedTuple):
+    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
+
+    count: Indices  # (1,)
+    integer: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 
 
 class Options(NamedTuple):
@@ -201,6 +224,19 @@ def allocate_rows(capacity: int) -> Rows:
         old_key=np.zeros(capacity, np.int64),
         old_impulse=np.zeros((capacity, 2)),
     )
+
+
+def allocate_sub_step(n: int) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies."""
+    before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
+    turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
+    tally = np.zeros((2, TALLY_SIZE))
+    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4))
+
+
+def allocate_ledger(capacity: int) -> Ledger:
+    """Return room for ``capacity`` contacts."""
+    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 7)))
 
 
 def grown(rows: Rows) -> Rows:

@@ -9,14 +9,19 @@ import numpy as np
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
+from reference_solver.planar.located import copy_ledger, run_located
 from reference_solver.planar.problem import assemble, pose_problem
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
+    FIXED_STEP,
+    LOCATED,
     Buffer,
     allocate_bodies,
+    allocate_ledger,
     allocate_pairs,
     allocate_rows,
+    allocate_sub_step,
     grown,
     options,
     uses_direct,
@@ -38,6 +43,8 @@ class World:
         # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
         self._pairs = allocate_pairs(model, 8 * n + 64)
         self._rows = allocate_rows(8 * n + 64)
+        self._sub = allocate_sub_step(n)
+        self._ledger = allocate_ledger(8 * n + 64)
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
@@ -56,25 +63,14 @@ class World:
         """Make ``steps`` steps, sampling after every ``stride`` (0: never)."""
         samples = steps // stride if stride else 0
         # Two points per body are typical; at most a million rows (80 MB) before it is known that they are needed.
-        room = len(self._rows.real) + min(2 * samples * len(self.pose), 1_000_000) if contacts else 0
+        room = self._most_contacts() + min(2 * samples * len(self.pose), 1_000_000) if contacts else 0
         buffer = self._buffer(samples, room)
         done = 0
         while True:
-            done = run_steps(
-                self._bodies,
-                self._pairs,
-                self._rows,
-                self._problem,
-                self._options,
-                self.tally,
-                buffer,
-                done,
-                steps,
-                stride,
-            )
+            done = self._run(buffer, done, steps, stride)
             if done == steps:
                 break
-            if contacts and buffer.offset[done // stride] + len(self._rows.real) > len(buffer.real):
+            if contacts and buffer.offset[done // stride] + self._most_contacts() > len(buffer.real):
                 buffer = self._doubled(buffer)
             else:
                 self._grow()
@@ -83,17 +79,33 @@ class World:
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
-        count = int(self._rows.counts[CONTACTS])
+        located = self._options.scheme == LOCATED
+        count = int(self._ledger.count[0] if located else self._rows.counts[CONTACTS])
         buffer = self._buffer(0, count)
-        copy_contacts(self._rows, buffer, 0)
+        if located:
+            copy_ledger(self._ledger, buffer, 0)
+        else:
+            copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
 
     def step_problem(self) -> StepProblem:
-        """Contact problem of the next step; the world stays what it is."""
+        """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
         trial = deepcopy(self)
+        trial._options = self._options._replace(scheme=FIXED_STEP)
         while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
             trial._grow()
         return assemble(trial._bodies, trial._rows, trial._options)
+
+    def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
+        state = (self._bodies, self._pairs, self._rows, self._problem)
+        if self._options.scheme == LOCATED:
+            return int(
+                run_located(*state, self._sub, self._ledger, self._options, self.tally, buffer, done, steps, stride)
+            )
+        return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
+
+    def _most_contacts(self) -> int:
+        return max(len(self._rows.real), len(self._ledger.real))
 
     def _buffer(self, samples: int, room: int) -> Buffer:
         frames = np.zeros((samples, len(self.pose), 3))
@@ -102,15 +114,20 @@ class World:
 
     def _doubled(self, buffer: Buffer) -> Buffer:
         """Twice the room for contacts, and what has been recorded so far."""
-        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + len(self._rows.real)))
+        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + self._most_contacts()))
         for old, new in zip(buffer, bigger, strict=True):
             new[: len(old)] = old
         return bigger
 
     def _grow(self) -> None:
-        """Double whatever detection found too small; the step that stopped has not begun."""
+        """Double whatever was found too small; the step that stopped goes on from where it was."""
         if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
+        elif self._ledger.count[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
+            bigger = allocate_ledger(2 * len(self._ledger.real))
+            for old, new in zip(self._ledger, bigger, strict=True):
+                new[: len(old)] = old
+            self._ledger = bigger
         else:
             self._rows = grown(self._rows)
             self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))

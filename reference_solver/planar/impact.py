@@ -1,0 +1,196 @@
+"""What happens at one instant: which rows touch, impacts before forces act, ends of bounce series (E20 to E22)."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.certificate import certify, open_solve
+from reference_solver.planar.columns import (
+    APPROACH,
+    ARM_A,
+    ENDING,
+    EXTENT,
+    FORCE_N,
+    FORCE_T,
+    FRICTION,
+    GAP,
+    IMPACT,
+    IMPACT_N,
+    IMPACT_T,
+    LASTS,
+    PN,
+    POINT,
+    PT,
+    RELEASE,
+    ROW_INTEGERS,
+    ROW_REALS,
+    SPEED,
+    TARGET,
+    A,
+    B,
+)
+from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.kinematics import copy_vectors, normal_velocity
+from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
+from reference_solver.planar.state import CONTACTS, LEFT, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.tally import RELEASED_SPEED
+
+#: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
+#: residual is 1e-13 of it: neither an approach, nor a parting, nor a slip.
+NOISE = 1e-11
+#: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
+#: the time of impact.
+LATE = 1e-15
+
+#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
+#: sub-step and released there.
+OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
+#: What an instant brings: nothing, contacts whose normals turned, impacts.
+NO_IMPACT, TURNED, STRUCK = 0, 1, 2
+#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
+BOUNCES = 32
+
+
+@inner_kernel
+def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
+    """Gap of row c that is round-off, not geometry [m]."""
+    a, b = rows.integer[c, A], rows.integer[c, B]
+    place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
+    return ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
+
+
+@inner_kernel
+def describe(bodies: Bodies, rows: Rows, c: int) -> None:
+    """Levers, masses, place and approach of row c at the start of a sub-step."""
+    prepare_masses(bodies, rows, c)
+    a = rows.integer[c, A]
+    for k in range(2):
+        rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
+    rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
+
+
+@inner_kernel
+def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, left: float) -> None:
+    """Drop all rows but those that touch, and those that carried load a moment ago: they may close their gap (E20)."""
+    kept, manifolds = 0, 0
+    for m in range(rows.counts[MANIFOLDS]):
+        first = kept
+        for c in range(rows.manifold[m], rows.manifold[m + 1]):
+            describe(bodies, rows, c)
+            reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
+            if rows.real[c, GAP] <= reach or rows.real[c, PN] > 0.0:
+                copy_row(rows, c, kept)
+                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.integer[kept, LASTS] = 1 if rows.real[kept, PN] > 0.0 else 0
+                rows.integer[kept, ENDING] = OPEN_ENDED
+                rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.real[kept, PN], rows.real[kept, PT]
+                kept += 1
+        if kept > first:
+            rows.manifold[manifolds] = first
+            manifolds += 1
+    rows.manifold[manifolds] = kept
+    rows.counts[CONTACTS], rows.counts[MANIFOLDS] = kept, manifolds
+
+
+@inner_kernel
+def copy_row(rows: Rows, source: int, target: int) -> None:
+    """Move a row up the list."""
+    if source != target:
+        for k in range(ROW_INTEGERS):
+            rows.integer[target, k] = rows.integer[source, k]
+        for k in range(ROW_REALS):
+            rows.real[target, k] = rows.real[source, k]
+
+
+@inner_kernel
+def set_impact_targets(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, left: float) -> int:
+    """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve.
+
+    A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
+    but what it approaches with goes at once, and is no force.
+    """
+    found = NO_IMPACT
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
+        rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
+        rows.real[c, TARGET] = rows.real[c, RELEASE] = 0.0
+        u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
+        measure_speed(bodies, rows, c, left)
+        rows.integer[c, IMPACT] = 0
+        if u >= -NOISE * rows.real[c, SPEED]:
+            continue
+        if rows.integer[c, LASTS]:
+            found = max(found, TURNED)
+            continue
+        found = STRUCK
+        rows.integer[c, IMPACT] = 1
+        if options.restitution:
+            rebound = -pairs.restitution[rows.integer[c, A], rows.integer[c, B]] * u
+            if rows.integer[c, ENDING] == OPEN_ENDED:
+                rows.real[c, TARGET] = rebound
+            elif rows.integer[c, ENDING] == RELEASED:
+                rows.real[c, RELEASE] = rebound
+    return found
+
+
+@inner_kernel
+def collide_now(
+    bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array
+) -> int:
+    """Impacts of all touching rows together, from ``sub.before`` to ``sub.start`` (E21); what they were."""
+    copy_vectors(sub.before, bodies.twist)
+    found = set_impact_targets(bodies, pairs, rows, options, sub.clock[LEFT])
+    if found != NO_IMPACT:
+        open_solve(bodies, 0.0, tally)
+        solve_velocities(bodies, rows, problem, options, tally)
+        certify(bodies, rows, options, tally)
+        for c in range(rows.counts[CONTACTS]):
+            rows.real[c, IMPACT_N], rows.real[c, IMPACT_T] = rows.real[c, PN], rows.real[c, PT]
+    copy_vectors(bodies.twist, sub.start)
+    return found
+
+
+@inner_kernel
+def end_series(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, length: float) -> bool:
+    """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
+
+    ``bodies.twist`` are the velocities after ``length`` of it.
+    """
+    left = sub.clock[LEFT]
+    new = False
+    for c in range(rows.counts[CONTACTS]):
+        if rows.integer[c, IMPACT] == 0 or rows.integer[c, ENDING] != OPEN_ENDED:
+            continue
+        e = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
+        leaves = normal_velocity(sub.start, rows, c)
+        pull = (leaves - normal_velocity(bodies.twist, rows, c)) / length
+        if e == 0.0 or leaves <= 0.0 or pull <= 0.0:
+            continue
+        returns = 2.0 * leaves / pull
+        if returns <= left * (1.0 - e):
+            rows.integer[c, ENDING] = SERIES_ENDS
+            new = True
+        elif returns * BOUNCES < left:
+            rows.integer[c, ENDING] = RELEASED
+            new = True
+    return new
+
+
+@inner_kernel
+def release(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array) -> bool:
+    """Give held rebounds their speed at the end of the sub-step, as impacts (E22); False if there are none."""
+    fastest = 0.0
+    for c in range(rows.counts[CONTACTS]):
+        fastest = max(fastest, rows.real[c, RELEASE])
+    if fastest == 0.0:
+        return False
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, TARGET] = rows.real[c, RELEASE]
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
+        rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
+    open_solve(bodies, 0.0, tally)
+    solve_velocities(bodies, rows, problem, options, tally)
+    certify(bodies, rows, options, tally)
+    tally[RELEASED_SPEED] = max(tally[RELEASED_SPEED], fastest)
+    return True

@@ -1,0 +1,148 @@
+"""The force phase of a sub-step, and the instant inside it at which a slide ends (E23)."""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.certificate import certify, open_solve
+from reference_solver.planar.columns import (
+    APPROACH,
+    FORCE_N,
+    FORCE_T,
+    FRICTION,
+    GAP,
+    LASTS,
+    LOAD,
+    MOTION,
+    PN,
+    PT,
+    SLIP,
+    SPEED,
+    TANGENT_MASS,
+    TARGET,
+)
+from reference_solver.planar.impact import NOISE, gap_noise
+from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
+from reference_solver.planar.rows import measure_speed, warm_start
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows, SubStep
+from reference_solver.tally import SWEEPS
+
+#: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
+#: it carries no impulse.
+FAR = 1e3
+#: Solves in search of the end of a slide; where contacts keep their modes the second is exact.
+STICK_SOLVES = 30
+#: Share of the end told by a row that stuck which is tried next, to be on the slipping side of it.
+SHORTER = 0.9
+#: Relative accuracy of that instant: some ten units in the last place.
+SAME_TIME = 1e-14
+
+
+@inner_kernel
+def press(
+    bodies: Bodies,
+    rows: Rows,
+    problem: Problem,
+    sub: SubStep,
+    options: Options,
+    tally: Array,
+    length: float,
+    struck: bool,
+) -> None:
+    """Velocities at the end of a sub-step of ``length``: from ``sub.start`` to ``bodies.twist`` (E19, E20).
+
+    ``struck``: impacts came first, so that lasting contacts may part as well.
+    """
+    copy_vectors(sub.start, bodies.twist)
+    for c in range(rows.counts[CONTACTS]):
+        u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
+        measure_speed(bodies, rows, c, length)
+        speed = rows.real[c, SPEED]
+        rows.real[c, SLIP] = tangent_velocity(bodies.twist, rows, c)
+        rows.real[c, PN], rows.real[c, PT] = length * rows.real[c, FORCE_N], length * rows.real[c, FORCE_T]
+        if u > NOISE * speed and (struck or rows.integer[c, LASTS] == 0):
+            rows.real[c, TARGET] = -FAR * (speed + u)
+            rows.real[c, PN] = rows.real[c, PT] = 0.0
+        elif rows.real[c, GAP] > gap_noise(bodies, rows, c):
+            rows.real[c, TARGET] = -rows.real[c, GAP] / length
+        else:
+            rows.real[c, TARGET] = 0.0
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            for k in range(3):
+                bodies.twist[i, k] += length * bodies.real[i, LOAD + k]
+    open_solve(bodies, length, tally)
+    if rows.counts[CONTACTS] > 0:
+        warm_start(bodies, rows, options)
+        solve_velocities(bodies, rows, problem, options, tally)
+        certify(bodies, rows, options, tally)
+
+
+@inner_kernel
+def slip_end(bodies: Bodies, rows: Rows, length: float) -> float:
+    """First time at which a slide of the solved sub-step comes to its end, inf if none does (E23).
+
+    A row that still slips the same way goes on linearly. One that stuck or turned would, with its whole friction,
+    have gone on past zero; how far, is told by its own effective mass.
+    """
+    first = math.inf
+    for c in range(rows.counts[CONTACTS]):
+        slip, pressed = rows.real[c, SLIP], rows.real[c, PN]
+        if pressed <= 0.0 or rows.real[c, FRICTION] == 0.0 or abs(slip) <= NOISE * rows.real[c, SPEED]:
+            continue
+        whole = -math.copysign(rows.real[c, FRICTION] * pressed, slip)
+        after = tangent_velocity(bodies.twist, rows, c) + (whole - rows.real[c, PT]) / rows.real[c, TANGENT_MASS]
+        lost = slip - after
+        if abs(after) <= NOISE * rows.real[c, SPEED]:
+            first = min(first, length)
+        elif lost * slip > 0.0:
+            first = min(first, length * (slip / lost))
+    return first
+
+
+@inner_kernel
+def keep(tally: Array, kept: Array) -> None:
+    """Remember a tally."""
+    for k in range(len(tally)):
+        kept[k] = tally[k]
+
+
+@inner_kernel
+def go_back(tally: Array, kept: Array) -> None:
+    """Forget what solves that are made again entered since `keep`, but for the sweeps they cost."""
+    sweeps = tally[SWEEPS]
+    for k in range(len(tally)):
+        tally[k] = kept[k]
+    tally[SWEEPS] = sweeps
+
+
+@inner_kernel
+def press_until_stick(
+    bodies: Bodies,
+    rows: Rows,
+    problem: Problem,
+    sub: SubStep,
+    options: Options,
+    tally: Array,
+    left: float,
+    struck: bool,
+) -> float:
+    """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length."""
+    keep(tally, sub.tally[1])
+    press(bodies, rows, problem, sub, options, tally, left, struck)
+    if not options.friction:
+        return left
+    length = left
+    for _ in range(STICK_SOLVES):
+        end = slip_end(bodies, rows, length)
+        if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
+            break
+        # What a row that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
+        length = end if end > length else SHORTER * end
+        go_back(tally, sub.tally[1])
+        press(bodies, rows, problem, sub, options, tally, length, struck)
+    return length
