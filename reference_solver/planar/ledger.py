@@ -17,9 +17,9 @@ def enter_contacts(bodies: Bodies, rows: Rows, ledger: Ledger) -> None:
     k = 0
     for c in range(rows.counts[CONTACTS]):
         key = row_key(bodies, rows, c)
-        while k < ledger.count[0] and entry_key(bodies, ledger, k) < key:
+        while k < ledger.used[0] and entry_key(bodies, ledger, k) < key:
             k += 1
-        if k == ledger.count[0] or entry_key(bodies, ledger, k) != key:
+        if k == ledger.used[0] or entry_key(bodies, ledger, k) != key:
             insert(rows, ledger, c, k)
         nx, ny = rows.real[c, NX], rows.real[c, NY]
         pn = rows.real[c, IMPACT_N] + rows.real[c, PN]
@@ -37,7 +37,7 @@ def entry_key(bodies: Bodies, ledger: Ledger, k: int) -> int:
 @inner_kernel
 def insert(rows: Rows, ledger: Ledger, c: int, k: int) -> None:
     """Make room at entry k for row c, without impulse."""
-    for j in range(ledger.count[0], k, -1):
+    for j in range(ledger.used[0], k, -1):
         for d in range(3):
             ledger.integer[j, d] = ledger.integer[j - 1, d]
         for d in range(7):
@@ -48,4 +48,4 @@ def insert(rows: Rows, ledger: Ledger, c: int, k: int) -> None:
     ledger.real[k, 2], ledger.real[k, 3] = rows.real[c, NX], rows.real[c, NY]
     ledger.real[k, 4] = ledger.real[k, 5] = 0.0
     ledger.real[k, 6] = rows.real[c, GAP]
-    ledger.count[0] += 1
+    ledger.used[0] += 1

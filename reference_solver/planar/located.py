@@ -74,7 +74,7 @@ def located_step(
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
     if sub.clock[LEFT] == 0.0:
         sub.clock[LEFT], sub.clock[EVENTS] = options.dt, 0.0
-        ledger.count[0] = 0
+        ledger.used[0] = 0
     while sub.clock[LEFT] > 0.0:
         if not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
@@ -97,7 +97,7 @@ def sub_step(
     if not detect(bodies, pairs, rows, options):
         return False
     keep_touching(bodies, pairs, rows, left)
-    if ledger.count[0] + rows.counts[CONTACTS] > len(ledger.real):
+    if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
@@ -220,14 +220,14 @@ def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> No
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + ledger.count[0]
+        buffer.offset[s + 1] = start + ledger.used[0]
         copy_ledger(ledger, buffer, start)
 
 
 @kernel
 def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> None:
     """Contacts of the last step, from index ``start`` on."""
-    for c in range(ledger.count[0]):
+    for c in range(ledger.used[0]):
         for d in range(3):
             buffer.integer[start + c, d] = ledger.integer[c, d]
         for d in range(7):

@@ -111,7 +111,7 @@ class SubStep(NamedTuple):
 class Ledger(NamedTuple):
     """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
 
-    count: Indices  # (1,)
+    used: Indices  # (1,): number of contacts
     integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 

@@ -80,7 +80,7 @@ class World:
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
         located = self._options.scheme == LOCATED
-        count = int(self._ledger.count[0] if located else self._rows.counts[CONTACTS])
+        count = int(self._ledger.used[0] if located else self._rows.counts[CONTACTS])
         buffer = self._buffer(0, count)
         if located:
             copy_ledger(self._ledger, buffer, 0)
@@ -123,7 +123,7 @@ class World:
         """Double whatever was found too small; the step that stopped goes on from where it was."""
         if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
-        elif self._ledger.count[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
+        elif self._ledger.used[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
             bigger = allocate_ledger(2 * len(self._ledger.real))
             for old, new in zip(self._ledger, bigger, strict=True):
                 new[: len(old)] = old
