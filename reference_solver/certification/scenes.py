@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference_solver.certification.relations import turned
+from reference_solver.certification.rotation import rotation_matrix
 from reference_solver.certification.space import GRAVITY, Space
 from reference_solver.model import Body, Model, Sphere
 
@@ -17,6 +19,8 @@ DT = 1 / 240
 #: Height from which things fall [m]: no round number of steps at round speeds. Where an impact coincides with a sample
 #: round-off decides whether the velocity sampled is the one before or after it.
 GAP = 0.0617
+#: How far the box on its edge is rolled out of the level in space [rad].
+ROLL = 0.2
 
 
 @dataclass(frozen=True)
@@ -106,11 +110,20 @@ def two_balls(space: Space, numbers: Numbers) -> Model:
 
 
 def box_on_edge(space: Space, numbers: Numbers) -> Model:
-    """A leaning box falls on its edge; the horizon ends before it rocks on to another."""
+    """A leaning box falls on its edge; the horizon ends before it rocks on to another.
+
+    In space it is rolled as well, so that one corner strikes: of a level edge the least disturbance lets one corner be
+    the first, and two impacts one after the other end elsewhere than both at once.
+    """
     half = (0.5, 0.25)
+    box = space.box(0.0, 0.0, space.twist(0.25, -numbers.speed, 0.5), half, angle=numbers.lean)
     low = half[0] * math.sin(numbers.lean) + half[1] * math.cos(numbers.lean)
-    box = space.box(0.0, low + 0.5 * GAP, space.twist(0.25, -numbers.speed, 0.5), half, angle=numbers.lean)
-    return model(space, [space.floor(), box], numbers)
+    pose = (0.0, low + 0.5 * GAP, numbers.lean)
+    if space.dimension == 3:
+        turn = turned(np.array(box.pose[3:]), np.array([math.cos(0.5 * ROLL), math.sin(0.5 * ROLL), 0.0, 0.0]))
+        low = float(np.abs(rotation_matrix(turn)[2]) @ np.array([half[0], half[0], half[1]]))
+        pose = (0.0, 0.0, low + 0.5 * GAP, *turn)
+    return model(space, [space.floor(), dataclasses.replace(box, pose=pose)], numbers)
 
 
 SCENES = {

@@ -19,6 +19,8 @@ IN_BOTH = [
     (columns.column, 200, 1000),
     (columns.heavy_on_light, 1e2, 1e-12),
     (columns.alternating, 1e2, 1e-12),
+    (columns.heavy_on_light, 1e4, 1e-10),
+    (columns.alternating, 1e4, 1e-10),
     (columns.pyramid,),
 ]
 ALONE = [
@@ -26,7 +28,6 @@ ALONE = [
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    (columns.alternating, SPACES[0], 1e4, 1e-10),
     (columns.heavy_on_light, SPACES[1], 1e6, 1e-8),
 ]
 
