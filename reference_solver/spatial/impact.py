@@ -37,6 +37,16 @@ def copy_twists(source: Array, target: Array) -> None:
 
 
 @inner_kernel
+def carries(manifolds: Manifolds, m: int, p: int, share: float) -> bool:
+    """Whether a point carried more than round-off in a force phase of this share of a step.
+
+    Bodies that fall together still touch, with impulses of a few units in the last place of their speeds.
+    """
+    speed = manifolds.impulse[m, p, 2] * manifolds.matrix[m, p, 5]
+    return bool(speed > NOISE * share * manifolds.speed[m, p])
+
+
+@inner_kernel
 def clear_point(manifolds: Manifolds, m: int, p: int) -> None:
     """No impulse and no target."""
     manifolds.target[m, p] = 0.0

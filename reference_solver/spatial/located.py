@@ -12,7 +12,7 @@ from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.state import EVENTS, LEFT, Options
 from reference_solver.spatial.certificate import open_solve, point_work
-from reference_solver.spatial.impact import STRUCK, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.impact import STRUCK, carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
@@ -195,7 +195,7 @@ def remember_forces(
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]
             known, divisor = row(manifolds.impulse[m], p, 0), max(length, SHORT * dt)
-            ends = manifolds.release[m, p] > 0.0 or known[2] <= 0.0
+            ends = manifolds.release[m, p] > 0.0 or not carries(manifolds, m, p, length / dt)
             if length < SHORT * dt and manifolds.force[m, p, 2] > 0.0:
                 known, divisor = row(manifolds.force[m], p, 0), 1.0
             force = times_transposed(manifolds.frame, m, known)

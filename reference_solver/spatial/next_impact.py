@@ -8,7 +8,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.state import Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
 from reference_solver.spatial.flight import place_at, reach_of
-from reference_solver.spatial.impact import NOISE
+from reference_solver.spatial.impact import NOISE, carries
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import momentum_of, spin_of
 from reference_solver.spatial.separation import radius_of
@@ -27,7 +27,7 @@ def begin_flight(bodies: Bodies, manifolds: Manifolds, options: Options, length:
 
     What only its loads accelerate has exactly their rates, so that bodies which fall alike move straight to each other.
     """
-    mark_closing(bodies, manifolds, options)
+    mark_closing(bodies, manifolds, options, length)
     for i in range(len(bodies)):
         loaded = bodies.motion[i] == FREE
         for k in range(6):
@@ -66,14 +66,14 @@ def undo(bodies: Bodies) -> None:
 
 
 @inner_kernel
-def mark_closing(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
+def mark_closing(bodies: Bodies, manifolds: Manifolds, options: Options, length: float) -> None:
     """Bodies of loaded contacts whose normals turn or whose gaps close follow the velocity at the end (E24)."""
     for i in range(len(bodies)):
         bodies.closing[i] = 0
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
-            if manifolds.impulse[m, p, 2] <= 0.0:
+            if not carries(manifolds, m, p, length / options.dt):
                 continue
             drifts = abs(velocity_at(v, w, manifolds, m, p)[2]) > NOISE * manifolds.speed[m, p]
             if drifts or manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
