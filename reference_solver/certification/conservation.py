@@ -74,7 +74,7 @@ def spatial_spin(body: Body, pose: Array, twist: Array) -> Array:
 def free_collisions(space: Space, count: int = 40, steps: int = 10_000, dt: float = 1 / 240) -> Iterator[Gate]:
     """Change of both momenta over the sum of their parts' sizes, with friction and restitution."""
     bodies = swarm(space, count, steps * dt)
-    simulation = space.simulation(bodies, Settings.reference(dt), 0.0, 0.6, 0.4)
+    simulation = space.simulation(bodies, Settings.located(dt), 0.0, 0.6, 0.4)
     record = simulation.record(steps, stride=100, contacts=True)
     start = momenta(bodies, record.pose[0], record.twist[0], space)
     linear = angular = size = 0.0
@@ -85,6 +85,6 @@ def free_collisions(space: Space, count: int = 40, steps: int = 10_000, dt: floa
         size = max(size, now[3])
     changed = int((np.abs(np.diff(record.twist, axis=0)).max(axis=2) > 1e-6).sum())
     case = f"{steps} steps, {changed} changes of velocity"
-    name = made_by(space, "reference")
+    name = made_by(space, "located")
     yield Gate.at_most("momentum, relative", case, linear / start[2], 1e-12, name)
     yield Gate.at_most("angular momentum, relative", case, angular / size, 1e-12, name)

@@ -22,7 +22,7 @@ RESTITUTIONS = (0.0, 0.2, 0.5, 0.8, 0.95, 1.0)
 def gates() -> Iterator[Gate]:
     """Yield every row of impacts."""
     for space in SPACES:
-        for profile in ("classical", "reference"):
+        for profile in ("classical", "located"):
             yield from single_rebound(space, profile)
         yield from flat_rebound(space)
         yield from apexes(space)
@@ -36,7 +36,8 @@ def gates() -> Iterator[Gate]:
 
 def settings_of(profile: str, dt: float) -> Settings:
     """Return the settings of a profile named."""
-    return Settings.classical(dt) if profile == "classical" else Settings.reference(dt)
+    made: Settings = getattr(Settings, profile)(dt)
+    return made
 
 
 def single_rebound(space: Space, profile: str) -> Iterator[Gate]:
@@ -44,7 +45,7 @@ def single_rebound(space: Space, profile: str) -> Iterator[Gate]:
     name = made_by(space, profile)
     for case, measure in (("no gravity, any phase", rebound_free), ("gravity, from touch", rebound_from_touch)):
         yield Gate.at_most("rebound, of max(v-, g dt)", case, measure(space, profile), 1e-14, name)
-    if profile == "reference":
+    if profile == "located":
         error = rebound_falling(space)
         yield Gate.at_most("rebound, of max(v-, g dt)", "gravity, any phase, v >= 1 m/s", error, 1e-14, name)
 
@@ -72,7 +73,7 @@ def rebound_from_touch(space: Space, profile: str) -> float:
         ball = space.ball(0.0, 0.5, space.twist(0.0, -v))
         simulation = space.simulation([space.floor(), ball], settings_of(profile, dt), GRAVITY, e)
         simulation.advance(1)
-        slowed = GRAVITY * dt if profile == "reference" else 0.0
+        slowed = GRAVITY * dt if profile == "located" else 0.0
         worst = max(worst, abs(simulation.twist[1, space.up] + slowed - e * v) / max(v, GRAVITY * dt))
     return worst
 
@@ -91,7 +92,7 @@ def rebound_falling(space: Space) -> float:
         if 2.0 * e * arrives < GRAVITY * left:
             continue
         ball = space.ball(0.0, height, space.twist(0.0, -v))
-        simulation = space.simulation([space.floor(), ball], Settings.reference(dt), GRAVITY, e)
+        simulation = space.simulation([space.floor(), ball], Settings.located(dt), GRAVITY, e)
         simulation.advance(1)
         error = simulation.twist[1, space.up] - (e * arrives - GRAVITY * left)
         worst = max(worst, abs(error) / max(v, GRAVITY * dt))
@@ -118,7 +119,7 @@ def flat_rebound(space: Space) -> Iterator[Gate]:
 def apexes(space: Space, restitution: float = 0.8, height: float = 1.0, dt: float = 1 / 240) -> Iterator[Gate]:
     """Apexes of a bouncing ball, e^2n h (O16): in flight, height + v^2 / 2g is the apex of that flight."""
     simulation = space.simulation(
-        [space.floor(), space.ball(0.0, 0.5 + height)], Settings.reference(dt), GRAVITY, restitution
+        [space.floor(), space.ball(0.0, 0.5 + height)], Settings.located(dt), GRAVITY, restitution
     )
     fall = math.sqrt(2.0 * height / GRAVITY)
     lands = fall * np.cumsum([1.0, *(2.0 * restitution**n for n in range(1, 21))])
@@ -131,7 +132,7 @@ def apexes(space: Space, restitution: float = 0.8, height: float = 1.0, dt: floa
         worst = max(worst, float(np.abs(found - restitution ** (2 * n) * height).max(initial=0.0)) / height)
         worst = worst if len(found) else math.inf
     case = f"e = {restitution:g}, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("20 apexes, of h0", case, worst, 1e-12, made_by(space, "reference"))
+    yield Gate.at_most("20 apexes, of h0", case, worst, 1e-12, made_by(space, "located"))
 
 
 def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> Iterator[Gate]:
@@ -145,24 +146,24 @@ def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> It
     for steps in (1000, 1001):
         for share in 10.0 ** np.arange(-15.0, 0.0):
             for sign in (1.0, -1.0):
-                settings = Settings.reference(end / steps * (1.0 + sign * share))
+                settings = Settings.located(end / steps * (1.0 + sign * share))
                 bodies = [space.floor(), space.ball(0.0, 0.5 + height)]
                 simulation = space.simulation(bodies, settings, GRAVITY, restitution)
                 simulation.advance(steps)
                 # what one step's weight leaves after a solve to 1e-13 is rest
                 rests = abs(simulation.twist[1, space.up]) <= 1e-13 * GRAVITY * settings.dt
                 worst = worst if rests == (sign > 0.0) else max(worst, float(share))
-    yield Gate.at_most("rest time, relative", f"e = {restitution:g}", worst, 1e-12, made_by(space, "reference"))
+    yield Gate.at_most("rest time, relative", f"e = {restitution:g}", worst, 1e-12, made_by(space, "located"))
 
 
 def elastic_bounces(space: Space, count: int = 10_000, dt: float = 1 / 240) -> Iterator[Gate]:
     """Energy after many elastic bounces of the scheme that locates impacts."""
-    simulation = space.simulation([space.floor(), space.ball(0.0, 1.5)], Settings.reference(dt), GRAVITY, 1.0)
+    simulation = space.simulation([space.floor(), space.ball(0.0, 1.5)], Settings.located(dt), GRAVITY, 1.0)
     simulation.advance(math.ceil(2.0 * count * math.sqrt(2.0 / GRAVITY) / dt))
     height, speed = simulation.pose[1, space.up] - 0.5, simulation.twist[1, space.up]
     energy = (height + speed**2 / (2.0 * GRAVITY)) / 1.0
     case = f"e = 1, {count} bounces, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("energy, relative", case, energy - 1.0, 1e-9, made_by(space, "reference"))
+    yield Gate.at_most("energy, relative", case, energy - 1.0, 1e-9, made_by(space, "located"))
 
 
 def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: float = 1 / 256) -> Iterator[Gate]:
@@ -174,7 +175,7 @@ def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: floa
     """
     radius = 0.25
     bodies = [space.wall(1.0, 0.0), space.ball(1.0, 0.0, space.twist(1.0), radius), space.wall(-1.0, -4.0, -speed)]
-    simulation = space.simulation(bodies, Settings.reference(dt), 0.0, 1.0)
+    simulation = space.simulation(bodies, Settings.located(dt), 0.0, 1.0)
     record = simulation.record(100_000)
     velocity, place = record.twist[:, 1, 0], record.pose[:, 1, 0]
     constants: list[float] = []
@@ -185,7 +186,7 @@ def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: floa
         constants.append((after - speed) * room)
     spread = (max(constants) - min(constants)) / constants[0] if len(constants) == hits else math.inf
     case = f"{len(constants)} hits, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("(v - V) L, relative spread", case, spread, 1e-12, made_by(space, "reference"))
+    yield Gate.at_most("(v - V) L, relative spread", case, spread, 1e-12, made_by(space, "located"))
 
 
 def deep_overlap(space: Space, dt: float = 1 / 240) -> Iterator[Gate]:
@@ -244,10 +245,10 @@ def thin_wall(space: Space, dt: float = 1 / 60) -> Iterator[Gate]:
         speed = lengths * 1.0  # body length: 1 m
         wall = space.box(0.0, 0.0, half=(0.005, 2.0), motion="fixed")
         ball = space.ball(-0.505 - (0.1 + phase) * speed * dt, 0.0, space.twist(speed))
-        simulation = space.simulation([wall, ball], Settings.reference(dt), 0.0, e)
+        simulation = space.simulation([wall, ball], Settings.located(dt), 0.0, e)
         record = simulation.record(4)
         passed += int((record.pose[:, 1, 0] > 0.0).any())
         worst = max(worst, abs(record.twist[-1, 1, 0] / speed + e))
-    name = made_by(space, "reference")
+    name = made_by(space, "located")
     yield Gate.exactly("thin wall: passages", "1..1e6 lengths per second", passed, 0, name)
     yield Gate.at_most("thin wall: speed after, of v-", "1..1e6 lengths per second", worst, 0.0, name)

@@ -62,12 +62,12 @@ def fitted(errors: tuple[float, ...], rates: tuple[int, ...] = RATES) -> float |
 
 
 def orders() -> Iterator[Order]:
-    """Yield every case in both dimensions, with both profiles."""
+    """Yield every case in both dimensions, with every profile."""
     for space in SPACES:
         for case, error in CASES.items():
-            for profile in ("classical", "reference"):
+            for profile in ("classical", "reference", "located"):
                 yield observed(case, error, space, profile)
-    for profile in ("classical", "reference"):
+    for profile in ("classical", "reference", "located"):
         yield observed("free rotation [rad]", rotation, SPACES[1], profile)
 
 
