@@ -26,7 +26,7 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.impact import NOISE, gap_noise
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.rows import measure_speed, warm_start
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows, SubStep
 from reference_solver.tally import SWEEPS
@@ -64,7 +64,7 @@ def press(
         speed = rows.real[c, SPEED]
         rows.real[c, SLIP] = tangent_velocity(bodies.twist, rows, c)
         rows.real[c, PN], rows.real[c, PT] = length * rows.real[c, FORCE_N], length * rows.real[c, FORCE_T]
-        if u > NOISE * speed and (struck or rows.integer[c, LASTS] == 0):
+        if u > NOISE * speed and (struck or rows.integer[c, LASTS] == 0) and flies(bodies, rows, c, u, length):
             rows.real[c, TARGET] = -FAR * (speed + u)
             rows.real[c, PN] = rows.real[c, PT] = 0.0
         elif rows.real[c, GAP] > gap_noise(bodies, rows, c):
@@ -80,6 +80,13 @@ def press(
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+
+
+@inner_kernel
+def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
+    """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise."""
+    pull = load_speed(bodies, rows, c, 1.0)
+    return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
 
 
 @inner_kernel
@@ -100,7 +107,9 @@ def slip_end(bodies: Bodies, rows: Rows, length: float) -> float:
         if abs(after) <= NOISE * rows.real[c, SPEED]:
             first = min(first, length)
         elif lost * slip > 0.0:
-            first = min(first, length * (slip / lost))
+            end = length * (slip / lost)
+            if abs(slip) * end > gap_noise(bodies, rows, c):  # else it ends at once: a sticking contact that turned
+                first = min(first, end)
     return first
 
 

@@ -200,3 +200,13 @@ def test_energy_counts_height_speed_and_spin_of_free_bodies():
     run = played(HARD_CASES["three discs, row, N-SIM"])
     total = energy(run.model, run.record.pose, run.record.twist)
     assert total == pytest.approx([0.5, 0.5], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in HARD_CASES if name.startswith(("overhang", "arch", "thin wall", "box"))]
+)
+def test_case_holds_with_located_events(name):
+    case = HARD_CASES[name]
+    verdict = case.run(Settings.located(case.settings.dt))
+    assert verdict.certified, verdict.reason
+    assert all(verdict.answer[key] == count for key, count in case.expects.items())
