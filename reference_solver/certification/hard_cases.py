@@ -15,12 +15,17 @@ def gates() -> Iterator[Gate]:
         yield from of_case(case)
 
 
+def made_by(case: HardCase) -> str:
+    """Name of the settings that the case is meant for."""
+    return f"{'located' if case.settings.scheme == 'located' else 'reference'}, hard case"
+
+
 def of_case(case: HardCase) -> Iterator[Gate]:
     """Yield the rows of one case; where the run as such is void, one row that says why and does not hold."""
     verdict = case.run()
     for name, limit in verdict.limits.items():
-        yield Gate.at_most(name, case.name, verdict.measured[name], limit, "reference, hard case")
+        yield Gate.at_most(name, case.name, verdict.measured[name], limit, made_by(case))
     for name, count in case.expects.items():
-        yield Gate.exactly(name, case.name, verdict.answer.get(name, math.nan), count, "reference, hard case")
+        yield Gate.exactly(name, case.name, verdict.answer.get(name, math.nan), count, made_by(case))
     if not verdict.certified and not verdict.limits:
-        yield Gate.at_most(f"DIVERGED: {verdict.reason}", case.name, math.nan, 0.0, "reference, hard case")
+        yield Gate.at_most(f"DIVERGED: {verdict.reason}", case.name, math.nan, 0.0, made_by(case))
