@@ -52,6 +52,25 @@ def separation(a, b, directions):
 
 RANDOM = np.random.default_rng(7).standard_normal((3000, 3))
 SPHERE_OF_DIRECTIONS = RANDOM / np.linalg.norm(RANDOM, axis=1)[:, None]
+
+
+def largest_separation(a, b):
+    """Largest over all directions: the five best of the sphere, each followed uphill in ever smaller cones.
+
+    The directions of the sphere alone are .05 apart, over which the separation of bodies of this size changes by .04.
+    """
+    best = []
+    for start in np.argsort(separation(a, b, SPHERE_OF_DIRECTIONS))[-5:]:
+        direction, size = SPHERE_OF_DIRECTIONS[start], 0.1
+        while size > 1e-5:
+            cone = np.vstack([direction, direction + size * RANDOM[:300]])
+            cone /= np.linalg.norm(cone, axis=1)[:, None]
+            found = separation(a, b, cone)
+            direction, size = cone[found.argmax()], 0.7 * size
+        best.append(found.max())
+    return max(best)
+
+
 numbers = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
 turns = st.tuples(numbers, numbers, numbers, numbers).filter(lambda q: math.hypot(*q) > 0.1)
 SHAPES = {"sphere": Sphere(0.3), "capsule": Capsule(0.5, 0.25), "box": Box((0.5, 0.3, 0.4))}
@@ -69,7 +88,7 @@ def test_contacts_lie_along_the_axis_of_least_overlap(name, swapped, place, turn
     other = body(shapes[0 if swapped else 1], np.multiply(place, 1.2) + (0.1, -0.2, 0.3), turn_b)
     contacts = touch(one, other)
     if len(contacts) == 0:
-        assert separation(one, other, SPHERE_OF_DIRECTIONS).max() > -0.01
+        assert largest_separation(one, other) > 0.0
         return
     assert len(contacts) <= 2
     normal = contacts.normal[0]
