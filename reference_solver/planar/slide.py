@@ -14,6 +14,7 @@ from reference_solver.planar.columns import (
     FORCE_T,
     FRICTION,
     GAP,
+    IMPACT,
     LASTS,
     LOAD,
     MOTION,
@@ -84,7 +85,12 @@ def press(
 
 @inner_kernel
 def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
-    """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise."""
+    """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
+
+    A rebound always does, however low: its series ends when it ends (E22).
+    """
+    if rows.integer[c, IMPACT]:
+        return True
     pull = load_speed(bodies, rows, c, 1.0)
     return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
 
