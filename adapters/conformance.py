@@ -122,8 +122,9 @@ def facts(engine: Engine) -> str:
         return "facts need a name and the package to install"
     if not stated.dimensions or not stated.dimensions <= {2, 3}:
         return f"facts.dimensions: {set(stated.dimensions)} must be out of 2 and 3"
-    if stated.scheme.position_offset not in (-1, 0, 1):
-        return f"facts.scheme.position_offset: {stated.scheme.position_offset!r} must be -1, 0 or 1"
+    for scheme in (stated.scheme, *map(engine.scheme, engine.profiles)):
+        if scheme.position_offset not in (-1, 0, 1):
+            return f"scheme.position_offset: {scheme.position_offset!r} must be -1, 0 or 1"
     if not (math.isfinite(stated.customary_dt) and stated.customary_dt > 0.0):
         return f"facts.customary_dt: {stated.customary_dt!r} must be a positive number of seconds"
     return "" if isinstance(engine.version(), str) and engine.version() else "version() must say which"

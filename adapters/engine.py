@@ -166,6 +166,10 @@ class Engine(ABC):
         """Short name used on the command line."""
         return self.facts.name
 
+    def scheme(self, profile: str) -> Scheme:
+        """How ``profile`` moves bodies: as the facts say, unless the engine has a profile that steps differently."""
+        return self.facts.scheme
+
     @abstractmethod
     def version(self) -> str:
         """Version of the engine that is installed."""

@@ -80,7 +80,7 @@ def receipts(
     """
     settings = engine.settings(profile, needs, dt, iterations)
     values = tuple((setting.name, _frozen(setting.value)) for setting in settings)
-    case = Case(needs.dimension, needs.restitution, needs.friction, dt, engine.facts.scheme.position_offset)
+    case = Case(needs.dimension, needs.restitution, needs.friction, dt, engine.scheme(profile).position_offset)
     names = tuple(name for name in PROBES if _applies(name, needs))
     declared = engine.declares(profile, needs, dt)
     for quantity in declared:

@@ -56,6 +56,9 @@ REASONS = {
     "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
 }
 
+#: The profile `reference` steps so; the engine's own scheme is the textbook's.
+LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
+
 
 def classical_profile(needs: Needs, dt: float) -> list[Setting]:
     """Fixed sweeps."""
@@ -91,18 +94,22 @@ class ReferenceEngine(Engine):
         customary_dt=1.0 / 60.0,
         quirks=(
             Quirk(
-                "velocity is advanced before position: free fall from rest is ahead by g t dt / 2",
-                "nothing: it is the scheme, and tolerances allow for a step",
+                "classical advances velocity before position: free fall from rest is ahead by g t dt / 2",
+                "nothing: it is the scheme, and tolerances allow for a step; reference falls exactly",
                 SOURCE,
             ),
             Quirk(
-                "contact is found at the start of a step, so a bounce is found late by up to v dt",
-                "nothing: it is the scheme, and tolerances allow for a step",
+                "classical finds contact at the start of a step, so a bounce is found late by up to v dt",
+                "nothing: it is the scheme, and tolerances allow for a step; reference cuts its steps at events",
                 SOURCE,
             ),
         ),
     )
     profiles = MappingProxyType({"classical": classical_profile, "reference": reference_profile})
+
+    def scheme(self, profile: str) -> Scheme:
+        """Reference cuts its steps at events, with constant accelerations between them."""
+        return LOCATED if profile == "reference" else self.facts.scheme
 
     def version(self) -> str:
         """Package version and eight hex digits over the solver's sources.

@@ -54,7 +54,7 @@ def summary(tally: Array) -> dict[str, Any]:
         "direct": int(tally[entries.DIRECT]),
         "factorisations": int(tally[entries.FACTORISATIONS]),
         "events": int(tally[entries.EVENTS_LOCATED]),
-        "missed_events": int(tally[entries.EVENTS_MISSED]),
+        "held_steps": int(tally[entries.STEPS_HELD]),
         "held_rebound": float(tally[entries.RELEASED_SPEED]),
     }
     values |= {gate.name: float(tally[gate.entry]) for gate in GATES}

@@ -104,7 +104,12 @@ class Settings:
 
     @classmethod
     def reference(cls, dt: float) -> Settings:
-        """Return the discrete contact problem solved to round-off."""
+        """Return contact problems solved to round-off, in steps that are cut where bodies meet and slides end."""
+        return replace(cls.fixed_step(dt), scheme="located")
+
+    @classmethod
+    def fixed_step(cls, dt: float) -> Settings:
+        """Return `reference` without located events: one discrete contact problem per step, solved to round-off."""
         return cls(
             dt=dt,
             solver="block",  # scalar rows stall on two-point manifolds at 1e-4
@@ -117,11 +122,6 @@ class Settings:
             warm_starting=True,
             margin=0.01,  # as above; what falls onto a floor with e = 0 slower than 5 mm per step lands on it exactly
         )
-
-    @classmethod
-    def located(cls, dt: float) -> Settings:
-        """Return `reference` with steps that are cut where bodies meet and where slides end (E19 to E27)."""
-        return replace(cls.reference(dt), scheme="located")
 
 
 def _is_count(value: object) -> bool:

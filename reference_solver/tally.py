@@ -42,8 +42,8 @@ SOLVES = 19
 DIRECT, FACTORISATIONS = 20, 21
 #: Events located inside steps: impacts, ends of slides (E19).
 EVENTS_LOCATED = 22
-#: Steps with more events than are located; the rest of them was found a step later.
-EVENTS_MISSED = 23
+#: Steps with more events than are located; what was left of them went by the fixed-step law (E28).
+STEPS_HELD = 23
 #: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
 RELEASED_SPEED = 24
 
@@ -62,7 +62,7 @@ SUMS = (
     DIRECT,
     FACTORISATIONS,
     EVENTS_LOCATED,
-    EVENTS_MISSED,
+    STEPS_HELD,
 )
 
 

@@ -74,7 +74,7 @@ def spatial_spin(body: Body, pose: Array, twist: Array) -> Array:
 def free_collisions(space: Space, count: int = 40, steps: int = 10_000, dt: float = 1 / 240) -> Iterator[Gate]:
     """Change of both momenta over the sum of their parts' sizes, with friction and restitution."""
     bodies = swarm(space, count, steps * dt)
-    simulation = space.simulation(bodies, Settings.located(dt), 0.0, 0.6, 0.4)
+    simulation = space.simulation(bodies, Settings.reference(dt), 0.0, 0.6, 0.4)
     record = simulation.record(steps, stride=100, contacts=True)
     start = momenta(bodies, record.pose[0], record.twist[0], space)
     linear = angular = size = 0.0

@@ -77,7 +77,7 @@ def stopping(space: Space, speed: float = 3.0, friction: float = 0.5) -> Iterato
     for dt, phase in itertools.product(STEPS, (0.0, 0.31, 0.77)):
         v = speed + phase * friction * GRAVITY * dt
         box = space.box(0.0, 0.25, space.twist(v), half=(1.0, 0.25))
-        simulation = space.simulation([space.floor(), box], Settings.located(dt), GRAVITY, 0.0, friction)
+        simulation = space.simulation([space.floor(), box], Settings.reference(dt), GRAVITY, 0.0, friction)
         simulation.advance(math.ceil(v / (friction * GRAVITY) / dt) + 2)
         worst = max(worst, abs(simulation.pose[1, 0] / (v * v / (2.0 * friction * GRAVITY)) - 1.0))
     yield Gate.at_most("stopping distance, relative", "any dt and phase", worst, 1e-10, made_by(space, "located"))
@@ -92,7 +92,7 @@ def time_to_roll(space: Space, speed: float = 3.0, friction: float = 0.2) -> Ite
     rolls, truth = speed / (1.0 + k), speed * k / ((1.0 + k) * friction * GRAVITY)
     for dt in STEPS:
         ball = space.ball(0.0, 0.5, space.twist(speed))
-        simulation = space.simulation([space.floor(), ball], Settings.located(dt), GRAVITY, 0.0, friction)
+        simulation = space.simulation([space.floor(), ball], Settings.reference(dt), GRAVITY, 0.0, friction)
         steps = math.ceil(truth / dt) + 2
         simulation.advance(steps)
         measured = 2.0 * (simulation.pose[1, 0] - rolls * steps * dt) / (speed - rolls)

@@ -92,7 +92,7 @@ def rebound_falling(space: Space) -> float:
         if 2.0 * e * arrives < GRAVITY * left:
             continue
         ball = space.ball(0.0, height, space.twist(0.0, -v))
-        simulation = space.simulation([space.floor(), ball], Settings.located(dt), GRAVITY, e)
+        simulation = space.simulation([space.floor(), ball], Settings.reference(dt), GRAVITY, e)
         simulation.advance(1)
         error = simulation.twist[1, space.up] - (e * arrives - GRAVITY * left)
         worst = max(worst, abs(error) / max(v, GRAVITY * dt))
@@ -119,7 +119,7 @@ def flat_rebound(space: Space) -> Iterator[Gate]:
 def apexes(space: Space, restitution: float = 0.8, height: float = 1.0, dt: float = 1 / 240) -> Iterator[Gate]:
     """Apexes of a bouncing ball, e^2n h (O16): in flight, height + v^2 / 2g is the apex of that flight."""
     simulation = space.simulation(
-        [space.floor(), space.ball(0.0, 0.5 + height)], Settings.located(dt), GRAVITY, restitution
+        [space.floor(), space.ball(0.0, 0.5 + height)], Settings.reference(dt), GRAVITY, restitution
     )
     fall = math.sqrt(2.0 * height / GRAVITY)
     lands = fall * np.cumsum([1.0, *(2.0 * restitution**n for n in range(1, 21))])
@@ -146,7 +146,7 @@ def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> It
     for steps in (1000, 1001):
         for share in 10.0 ** np.arange(-15.0, 0.0):
             for sign in (1.0, -1.0):
-                settings = Settings.located(end / steps * (1.0 + sign * share))
+                settings = Settings.reference(end / steps * (1.0 + sign * share))
                 bodies = [space.floor(), space.ball(0.0, 0.5 + height)]
                 simulation = space.simulation(bodies, settings, GRAVITY, restitution)
                 simulation.advance(steps)
@@ -158,7 +158,7 @@ def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> It
 
 def elastic_bounces(space: Space, count: int = 10_000, dt: float = 1 / 240) -> Iterator[Gate]:
     """Energy after many elastic bounces of the scheme that locates impacts."""
-    simulation = space.simulation([space.floor(), space.ball(0.0, 1.5)], Settings.located(dt), GRAVITY, 1.0)
+    simulation = space.simulation([space.floor(), space.ball(0.0, 1.5)], Settings.reference(dt), GRAVITY, 1.0)
     simulation.advance(math.ceil(2.0 * count * math.sqrt(2.0 / GRAVITY) / dt))
     height, speed = simulation.pose[1, space.up] - 0.5, simulation.twist[1, space.up]
     energy = (height + speed**2 / (2.0 * GRAVITY)) / 1.0
@@ -175,7 +175,7 @@ def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: floa
     """
     radius = 0.25
     bodies = [space.wall(1.0, 0.0), space.ball(1.0, 0.0, space.twist(1.0), radius), space.wall(-1.0, -4.0, -speed)]
-    simulation = space.simulation(bodies, Settings.located(dt), 0.0, 1.0)
+    simulation = space.simulation(bodies, Settings.reference(dt), 0.0, 1.0)
     record = simulation.record(100_000)
     velocity, place = record.twist[:, 1, 0], record.pose[:, 1, 0]
     constants: list[float] = []
@@ -245,7 +245,7 @@ def thin_wall(space: Space, dt: float = 1 / 60) -> Iterator[Gate]:
         speed = lengths * 1.0  # body length: 1 m
         wall = space.box(0.0, 0.0, half=(0.005, 2.0), motion="fixed")
         ball = space.ball(-0.505 - (0.1 + phase) * speed * dt, 0.0, space.twist(speed))
-        simulation = space.simulation([wall, ball], Settings.located(dt), 0.0, e)
+        simulation = space.simulation([wall, ball], Settings.reference(dt), 0.0, e)
         record = simulation.record(4)
         passed += int((record.pose[:, 1, 0] > 0.0).any())
         worst = max(worst, abs(record.twist[-1, 1, 0] / speed + e))

@@ -67,7 +67,7 @@ def rocking(dt: float = 1e-4) -> HardCase:
         "rocking block",
         "The corner that lets go must not pull, the other must stop dead: any other impulse changes the decay",
         model,
-        Settings.located(dt),
+        Settings.reference(dt),
         3.0,
         judge,
     )
@@ -116,7 +116,7 @@ def edge_drop(spin: float = 100.0, dt: float = 1.0 / 240.0, height: float = 1.0)
         f"box dropped on its edge at {spin:g} rad/s",
         "It turns by a quarter of a radian per step: which corner hits, when and how fast is decided inside a step",
         model,
-        Settings.located(dt),
+        Settings.reference(dt),
         2.0,
         judge,
     )

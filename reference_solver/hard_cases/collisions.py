@@ -74,7 +74,7 @@ def elastic_pile(count: int = 12) -> HardCase:
         "pile with e = 1",
         "Simultaneous impacts and contacts at rest among them must neither gain nor lose energy",
         model,
-        Settings.located(DT),
+        Settings.reference(DT),
         2.0,
         judge,
         stride=4,

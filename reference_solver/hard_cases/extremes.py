@@ -63,7 +63,7 @@ def thin_wall(lengths: float) -> HardCase:
         f"thin wall, {lengths:g} lengths/s",
         "Between two steps a fast body is first before the wall and then behind it",
         model,
-        Settings.located(DT),
+        Settings.reference(DT),
         3 * DT,
         judge,
     )

@@ -142,8 +142,13 @@ def inspect_row(bodies: Bodies, rows: Rows, c: int, options: Options, tally: Arr
 
 @inner_kernel
 def row_work(bodies: Bodies, rows: Rows, c: int) -> tuple[float, float, float]:
-    """Work on the relative motion, work of surfaces that move as prescribed, and the size of both (E62) [J]."""
+    """Work on the relative motion, work of surfaces that move as prescribed, and the size of both (E62) [J].
+
+    The size is at least what a contact of this mass and speed usually does: where impulses came and went during the
+    solve, all work is round-off.
+    """
     pn, pt = rows.real[c, PN], rows.real[c, PT]
+    usual = rows.real[c, NORMAL_MASS] * rows.real[c, SPEED] ** 2
     normal = 0.5 * pn * (normal_velocity(bodies.twist, rows, c) + normal_velocity(bodies.start, rows, c))
     tangent = 0.5 * pt * (tangent_velocity(bodies.twist, rows, c) + tangent_velocity(bodies.start, rows, c))
     px, py = pn * rows.real[c, NX] - pt * rows.real[c, NY], pn * rows.real[c, NY] + pt * rows.real[c, NX]
@@ -153,7 +158,7 @@ def row_work(bodies: Bodies, rows: Rows, c: int) -> tuple[float, float, float]:
         by_a = surface_power(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1], px, py)
     if bodies.kind[b, MOTION] != FREE:
         by_b = -surface_power(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1], px, py)
-    return normal + tangent, by_a + by_b, abs(normal) + abs(tangent) + abs(by_a) + abs(by_b)
+    return normal + tangent, by_a + by_b, usual + abs(normal) + abs(tangent) + abs(by_a) + abs(by_b)
 
 
 @inner_kernel
@@ -188,7 +193,8 @@ def check_momentum(bodies: Bodies, rows: Rows, options: Options, tally: Array) -
         apply_normal(bodies, bodies.start, rows, c, pn)
         if options.friction:
             apply_tangent(bodies, bodies.start, rows, c, pt)
-        size = abs(pn) + abs(pt)
+        # Impulses that came and went during the solve leave round-off of the contact's usual ones.
+        size = abs(pn) + abs(pt) + rows.real[c, NORMAL_MASS] * rows.real[c, SPEED]
         for side in range(2):
             i = rows.integer[c, A + side]
             lever = max(abs(rows.real[c, ARM_A + 2 * side]), abs(rows.real[c, ARM_A + 2 * side + 1]))

@@ -44,7 +44,9 @@ IMPACT = 3
 LASTS = 4
 #: How a rebound ends: OPEN_ENDED, SERIES_ENDS or RELEASED, see impact.py (E22).
 ENDING = 5
-ROW_INTEGERS = 6
+#: 1 where the points touch, 0 where a gap is left to close.
+MEETS = 6
+ROW_INTEGERS = 7
 
 # Rows.real.
 #: Normal from A to B; the tangent is the normal turned by +90 degrees.
@@ -81,4 +83,6 @@ FORCE_N, FORCE_T = 26, 27
 RELEASE = 28
 #: u_t at the start of the force phase (E23) [m/s].
 SLIP = 29
-ROW_REALS = 30
+#: e.
+RESTITUTION = 30
+ROW_REALS = 31

@@ -24,7 +24,7 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.kinematics import apply_normal, apply_tangent
+from reference_solver.planar.kinematics import apply_normal, apply_tangent, copy_vectors
 from reference_solver.planar.state import CONTACTS as ROW_COUNT
 from reference_solver.planar.state import Bodies, Options, Rows
 
@@ -35,13 +35,25 @@ def solve_directly(bodies: Bodies, rows: Rows, options: Options, problem: Proble
     load(bodies, rows, options, problem)
     residual = solve_problem(problem, options.residual, budget, fresh)
     for c in range(rows.counts[ROW_COUNT]):
-        normal, tangent = problem.contact.best[c, 0], problem.contact.best[c, 1]
-        apply_normal(bodies, bodies.twist, rows, c, normal - rows.real[c, PN])
-        rows.real[c, PN] = normal
+        rows.real[c, PN] = problem.contact.best[c, 0]
         if options.friction:
-            apply_tangent(bodies, bodies.twist, rows, c, tangent - rows.real[c, PT])
-            rows.real[c, PT] = tangent
+            rows.real[c, PT] = problem.contact.best[c, 1]
+    rebuild_velocities(bodies, rows, options)
     return residual
+
+
+@inner_kernel
+def rebuild_velocities(bodies: Bodies, rows: Rows, options: Options) -> None:
+    """Velocities once more from v*, kept in ``start``, and the impulses.
+
+    The direct solver may move very large loads along redundant contacts on its way; of what came and went the
+    round-off stays.
+    """
+    copy_vectors(bodies.start, bodies.twist)
+    for c in range(rows.counts[ROW_COUNT]):
+        apply_normal(bodies, bodies.twist, rows, c, rows.real[c, PN])
+        if options.friction:
+            apply_tangent(bodies, bodies.twist, rows, c, rows.real[c, PT])
 
 
 @inner_kernel

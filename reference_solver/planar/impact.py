@@ -19,10 +19,12 @@ from reference_solver.planar.columns import (
     IMPACT_N,
     IMPACT_T,
     LASTS,
+    MEETS,
     PN,
     POINT,
     PT,
     RELEASE,
+    RESTITUTION,
     ROW_INTEGERS,
     ROW_REALS,
     SPEED,
@@ -31,9 +33,9 @@ from reference_solver.planar.columns import (
     B,
 )
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, normal_velocity
+from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import CONTACTS, LEFT, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, HELD, LEFT, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
 from reference_solver.tally import RELEASED_SPEED
 
 #: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
@@ -46,8 +48,9 @@ LATE = 1e-15
 #: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
 #: sub-step and released there.
 OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts.
-NO_IMPACT, TURNED, STRUCK = 0, 1, 2
+#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step,
+#: faster ones.
+NO_IMPACT, TURNED, STRUCK_SOFTLY, STRUCK = 0, 1, 2, 3
 #: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
 BOUNCES = 32
 
@@ -71,18 +74,25 @@ def describe(bodies: Bodies, rows: Rows, c: int) -> None:
 
 
 @inner_kernel
-def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, left: float) -> None:
-    """Drop all rows but those that touch, and those that carried load a moment ago: they may close their gap (E20)."""
+def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> None:
+    """Drop all rows but those that touch, and those that carried load a moment ago: they may close their gap (E20).
+
+    Where what is left goes by the fixed-step law, all gaps with e = 0 may be closed (E28).
+    """
+    left = sub.clock[LEFT]
     kept, manifolds = 0, 0
     for m in range(rows.counts[MANIFOLDS]):
         first = kept
         for c in range(rows.manifold[m], rows.manifold[m + 1]):
             describe(bodies, rows, c)
+            rows.real[c, RESTITUTION] = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
             reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
-            if rows.real[c, GAP] <= reach or rows.real[c, PN] > 0.0:
+            may_close = rows.real[c, PN] > 0.0 or (sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0)
+            if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
                 rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
                 rows.integer[kept, LASTS] = 1 if rows.real[kept, PN] > 0.0 else 0
+                rows.integer[kept, MEETS] = 1 if rows.real[kept, GAP] <= reach else 0
                 rows.integer[kept, ENDING] = OPEN_ENDED
                 rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.real[kept, PN], rows.real[kept, PT]
                 kept += 1
@@ -104,7 +114,7 @@ def copy_row(rows: Rows, source: int, target: int) -> None:
 
 
 @inner_kernel
-def set_impact_targets(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, left: float) -> int:
+def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float) -> int:
     """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve.
 
     A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
@@ -116,17 +126,19 @@ def set_impact_targets(bodies: Bodies, pairs: Pairs, rows: Rows, options: Option
         rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
         rows.real[c, TARGET] = rows.real[c, RELEASE] = 0.0
         u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
-        measure_speed(bodies, rows, c, left)
+        measure_speed(bodies, rows, c, options.dt)
         rows.integer[c, IMPACT] = 0
         if u >= -NOISE * rows.real[c, SPEED]:
             continue
         if rows.integer[c, LASTS]:
             found = max(found, TURNED)
             continue
-        found = STRUCK
+        if rows.integer[c, MEETS] == 0:
+            continue
+        found = max(found, STRUCK_SOFTLY if -u <= load_speed(bodies, rows, c, options.dt) else STRUCK)
         rows.integer[c, IMPACT] = 1
         if options.restitution:
-            rebound = -pairs.restitution[rows.integer[c, A], rows.integer[c, B]] * u
+            rebound = -rows.real[c, RESTITUTION] * u
             if rows.integer[c, ENDING] == OPEN_ENDED:
                 rows.real[c, TARGET] = rebound
             elif rows.integer[c, ENDING] == RELEASED:
@@ -135,12 +147,10 @@ def set_impact_targets(bodies: Bodies, pairs: Pairs, rows: Rows, options: Option
 
 
 @inner_kernel
-def collide_now(
-    bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array
-) -> int:
+def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> int:
     """Impacts of all touching rows together, from ``sub.before`` to ``sub.start`` (E21); what they were."""
     copy_vectors(sub.before, bodies.twist)
-    found = set_impact_targets(bodies, pairs, rows, options, sub.clock[LEFT])
+    found = set_impact_targets(bodies, rows, options, sub.clock[LEFT])
     if found != NO_IMPACT:
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
@@ -152,7 +162,7 @@ def collide_now(
 
 
 @inner_kernel
-def end_series(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, length: float) -> bool:
+def end_series(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
     ``bodies.twist`` are the velocities after ``length`` of it.
@@ -162,7 +172,7 @@ def end_series(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, length: f
     for c in range(rows.counts[CONTACTS]):
         if rows.integer[c, IMPACT] == 0 or rows.integer[c, ENDING] != OPEN_ENDED:
             continue
-        e = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
+        e = rows.real[c, RESTITUTION]
         leaves = normal_velocity(sub.start, rows, c)
         pull = (leaves - normal_velocity(bodies.twist, rows, c)) / length
         if e == 0.0 or leaves <= 0.0 or pull <= 0.0:

@@ -24,7 +24,7 @@ from reference_solver.planar.columns import (
     RELEASE,
 )
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import STRUCK, collide_now, end_series, keep_touching, release
+from reference_solver.planar.impact import STRUCK, STRUCK_SOFTLY, collide_now, end_series, keep_touching, release
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
@@ -35,8 +35,11 @@ from reference_solver.planar.state import (
     CONTACTS,
     EVENTS,
     FREE,
+    HELD,
     LEFT,
+    PATIENCE,
     REMEMBERED,
+    SOFT,
     Bodies,
     Buffer,
     Ledger,
@@ -47,11 +50,13 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
-from reference_solver.tally import CONTACT_WORK, EVENTS_LOCATED, EVENTS_MISSED, LOAD_WORK, SURFACE_WORK
+from reference_solver.tally import CONTACT_WORK, EVENTS_LOCATED, LOAD_WORK, STEPS_HELD, SURFACE_WORK
 
-#: Events located in one step, and as many more per body; what happens after them in that step is found a step later.
+#: Events located in one step, and as many more per body; what is left after them goes by the fixed-step law (E28).
 MOST_EVENTS = 64
 EVENTS_PER_BODY = 4
+#: Soft events located in a step, and one more per body: ends of slides, impacts no faster than what loads do in a step.
+MOST_SOFT = 16
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
 #: A sub-step shorter than this share of a step tells nothing about forces.
@@ -73,12 +78,26 @@ def located_step(
 ) -> bool:
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
     if sub.clock[LEFT] == 0.0:
-        sub.clock[LEFT], sub.clock[EVENTS] = options.dt, 0.0
+        open_step(sub, len(bodies.kind), options.dt)
         ledger.used[0] = 0
     while sub.clock[LEFT] > 0.0:
         if not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
     return True
+
+
+@inner_kernel
+def open_step(sub: SubStep, bodies: int, dt: float) -> None:
+    """Start the clock of a step: half the patience after one that was held, twice as much after any other (E28)."""
+    most = MOST_SOFT + bodies
+    if sub.clock[PATIENCE] == 0.0:
+        sub.clock[PATIENCE] = most
+    elif sub.clock[HELD] > 0.0:
+        sub.clock[PATIENCE] = max(0.5 * sub.clock[PATIENCE], 1.0)
+    else:
+        sub.clock[PATIENCE] = min(2.0 * sub.clock[PATIENCE], most)
+    sub.clock[LEFT] = dt
+    sub.clock[EVENTS] = sub.clock[SOFT] = sub.clock[HELD] = 0.0
 
 
 @inner_kernel
@@ -96,13 +115,13 @@ def sub_step(
     left = sub.clock[LEFT]
     if not detect(bodies, pairs, rows, options):
         return False
-    keep_touching(bodies, pairs, rows, left)
+    keep_touching(bodies, pairs, rows, sub)
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
-    length = solve_sub_step(bodies, pairs, rows, problem, sub, options, tally)
+    length = solve_sub_step(bodies, rows, problem, sub, options, tally)
     begin_flight(bodies, rows, sub, length)
     end = length
     if sub.clock[EVENTS] < MOST_EVENTS + EVENTS_PER_BODY * len(bodies.kind):
@@ -110,8 +129,6 @@ def sub_step(
         if end < 0.0:
             copy_vectors(sub.before, bodies.twist)
             return False
-    elif length == left:
-        tally[EVENTS_MISSED] += 1.0
     if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move_along(bodies, sub, end, end == length)
         move(bodies, bodies.pseudo, options.dt)
@@ -125,7 +142,12 @@ def sub_step(
         enter_contacts(bodies, rows, ledger)
     if end < left:
         sub.clock[EVENTS] += 1.0
+        sub.clock[SOFT] += 1.0
         tally[EVENTS_LOCATED] += 1.0
+        most = MOST_EVENTS + EVENTS_PER_BODY * len(bodies.kind)
+        if sub.clock[HELD] == 0.0 and (sub.clock[SOFT] > sub.clock[PATIENCE] or sub.clock[EVENTS] >= most):
+            sub.clock[HELD] = 1.0
+            tally[STEPS_HELD] += 1.0
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -149,9 +171,7 @@ def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float,
 
 
 @inner_kernel
-def solve_sub_step(
-    bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array
-) -> float:
+def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> float:
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
     length = left
@@ -159,10 +179,13 @@ def solve_sub_step(
     for k in range(SERIES_PASSES):
         if k > 0:
             go_back(tally, sub.tally[0])
-        struck = collide_now(bodies, pairs, rows, problem, sub, options, tally) == STRUCK
+        found = collide_now(bodies, rows, problem, sub, options, tally)
+        struck = found >= STRUCK_SOFTLY
         length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
-        if not (struck and options.restitution and end_series(bodies, pairs, rows, sub, length)):
+        if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
             break
+    if found == STRUCK and sub.clock[SOFT] > 0.0:
+        sub.clock[SOFT] -= 1.0  # what led here was a hard one
     return length
 
 

@@ -29,7 +29,7 @@ from reference_solver.planar.impact import NOISE, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.rows import measure_speed, warm_start
-from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FREE, HELD, Bodies, Options, Rows, SubStep
 from reference_solver.tally import SWEEPS
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
@@ -56,16 +56,17 @@ def press(
 ) -> None:
     """Velocities at the end of a sub-step of ``length``: from ``sub.start`` to ``bodies.twist`` (E19, E20).
 
-    ``struck``: impacts came first, so that lasting contacts may part as well.
+    ``struck``: impacts came first, so that lasting contacts may part as well. None does by the fixed-step law (E28).
     """
     copy_vectors(sub.start, bodies.twist)
     for c in range(rows.counts[CONTACTS]):
         u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
-        measure_speed(bodies, rows, c, length)
+        measure_speed(bodies, rows, c, options.dt)
         speed = rows.real[c, SPEED]
         rows.real[c, SLIP] = tangent_velocity(bodies.twist, rows, c)
         rows.real[c, PN], rows.real[c, PT] = length * rows.real[c, FORCE_N], length * rows.real[c, FORCE_T]
-        if u > NOISE * speed and (struck or rows.integer[c, LASTS] == 0) and flies(bodies, rows, c, u, length):
+        leaves = sub.clock[HELD] == 0.0 and u > NOISE * speed and (struck or rows.integer[c, LASTS] == 0)
+        if leaves and flies(bodies, rows, c, u, length):
             rows.real[c, TARGET] = -FAR * (speed + u)
             rows.real[c, PN] = rows.real[c, PT] = 0.0
         elif rows.real[c, GAP] > gap_noise(bodies, rows, c):
@@ -149,7 +150,7 @@ def press_until_stick(
     """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length."""
     keep(tally, sub.tally[1])
     press(bodies, rows, problem, sub, options, tally, left, struck)
-    if not options.friction:
+    if not options.friction or sub.clock[HELD] > 0.0:
         return left
     length = left
     for _ in range(STICK_SOLVES):

@@ -50,9 +50,10 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 #: (a, b, feature) into one key.
 FEATURES = 5 * MOST_VERTICES**2
 
-#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it.
-LEFT, EVENTS = 0, 1
-CLOCK_SIZE = 2
+#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
+#: them were soft, how many soft ones it may have, and 1 where what is left of it goes by the fixed-step law (E28).
+LEFT, EVENTS, SOFT, PATIENCE, HELD = 0, 1, 2, 3, 4
+CLOCK_SIZE = 5
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
@@ -97,7 +98,7 @@ class Rows(NamedTuple):
 class SubStep(NamedTuple):
     """One sub-step of the located scheme, in which accelerations are constant (E19)."""
 
-    clock: Array  # (CLOCK_SIZE,): see LEFT, EVENTS
+    clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD
     before: Array  # (n, 3): velocities at its start
     start: Array  # (n, 3): after its impacts
     gain: Array  # (n, 3): accelerations in it

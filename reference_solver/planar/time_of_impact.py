@@ -10,13 +10,16 @@ from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.columns import FEATURE, GAP, NX, NY, PN, REACH, ROUNDING, SHAPE, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, curvature, fastest, place, put_back
 from reference_solver.planar.impact import gap_noise
+from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.narrowphase import collide
+from reference_solver.planar.rows import prepare_masses
 from reference_solver.planar.separating_axis import distance
 from reference_solver.planar.state import (
     BOX,
     CANDIDATES,
     CAPSULE,
     HALF_SPACE,
+    HELD,
     MANIFOLDS,
     Bodies,
     Options,
@@ -220,6 +223,23 @@ def pair_impact(bodies: Bodies, rows: Rows, sub: SubStep, a: int, b: int, m: int
 
 
 @inner_kernel
+def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int, t: float) -> bool:
+    """Whether a pair that meets at time t does so faster than what loads do in a step (E28)."""
+    place(bodies, sub, a, t)
+    place(bodies, sub, b, t)
+    nearest, approach, push = math.inf, 0.0, 0.0
+    for c in range(collide(bodies, a, b, UNLIMITED, sub.probe, 0)):
+        if sub.probe.real[c, GAP] < nearest:
+            prepare_masses(bodies, sub.probe, c)
+            nearest = sub.probe.real[c, GAP]
+            approach = normal_velocity(sub.start, sub.probe, c) + t * normal_velocity(sub.gain, sub.probe, c)
+            push = load_speed(bodies, sub.probe, c, options.dt)
+    put_back(bodies, sub, a)
+    put_back(bodies, sub, b)
+    return approach < -push
+
+
+@inner_kernel
 def next_impact(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options: Options, end: float) -> float:
     """First time before ``end`` at which any two bodies meet, ``end`` if none do; -1 if there is no room (E27)."""
     if not bound_flight(bodies, pairs, sub, options, end):
@@ -233,7 +253,9 @@ def next_impact(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options:
         while m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) < key:
             m += 1
         own = m if m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) == key else -1
-        end = min(end, pair_impact(bodies, rows, sub, key // n, key % n, own, end))
+        t = pair_impact(bodies, rows, sub, key // n, key % n, own, end)
+        if t < end and (sub.clock[HELD] == 0.0 or strikes_hard(bodies, sub, options, key // n, key % n, t)):
+            end = t
     return end
 
 

@@ -122,8 +122,10 @@ def inspect_point(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vecto
 def point_work(bodies: Bodies, manifolds: Manifolds, m: int, p: int, both: Vector) -> tuple[float, float, float]:
     """Work on the relative motion, work of surfaces that move as prescribed, and the size of both (E62) [J].
 
-    ``both`` is the point's velocity before the solve plus that after it, frame.
+    ``both`` is the point's velocity before the solve plus that after it, frame. The size is at least what a contact of
+    this mass and speed usually does: where impulses came and went during the solve, all work is round-off.
     """
+    usual = manifolds.speed[m, p] ** 2 / manifolds.matrix[m, p, 5]
     impulse = row(manifolds.impulse[m], p, 0)
     normal, tangent = 0.5 * impulse[2] * both[2], 0.5 * (impulse[0] * both[0] + impulse[1] * both[1])
     world = times_transposed(manifolds.frame, m, impulse)
@@ -133,7 +135,7 @@ def point_work(bodies: Bodies, manifolds: Manifolds, m: int, p: int, both: Vecto
         by_a = dot(world, point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0)))
     if bodies.motion[b] != FREE:
         by_b = -dot(world, point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0)))
-    return normal + tangent, by_a + by_b, abs(normal) + abs(tangent) + abs(by_a) + abs(by_b)
+    return normal + tangent, by_a + by_b, usual + abs(normal) + abs(tangent) + abs(by_a) + abs(by_b)
 
 
 @inner_kernel
@@ -176,7 +178,8 @@ def check_momentum(bodies: Bodies, manifolds: Manifolds, options: Options, tally
             impulse = row(manifolds.impulse[m], p, 0)
             force = add(force, impulse)
             moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))
-            size = length(impulse)
+            # Impulses that came and went during the solve leave round-off of the point's usual ones.
+            size = length(impulse) + manifolds.speed[m, p] / manifolds.matrix[m, p, 5]
             add_pressure(bodies, manifolds.body_a[m], size, length(row(manifolds.arm_a[m], p, 0)))
             add_pressure(bodies, manifolds.body_b[m], size, length(row(manifolds.arm_b[m], p, 0)))
         apply_wrench(bodies, bodies.start, manifolds, m, options.rotation, force, moment)

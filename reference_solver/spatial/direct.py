@@ -8,7 +8,7 @@ from reference_solver.direct.rounds import solve_problem
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import apply_wrench
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
-from reference_solver.spatial.vector import ZERO, add, cross, row, scale, sub, times
+from reference_solver.spatial.vector import ZERO, add, cross, row, scale, times
 
 
 @inner_kernel
@@ -21,19 +21,33 @@ def solve_directly(
     residual = solve_problem(problem, options.residual, budget, fresh)
     c = 0
     for m in range(len(manifolds)):
-        force, moment = ZERO, ZERO
         for p in range(manifolds.points[m]):
             if manifolds.open[m, p]:
                 continue
-            best = row(problem.contact.best, c, 0)
-            change = sub((best[1], best[2], best[0]), row(manifolds.impulse[m], p, 0))
             for d in range(3):
-                manifolds.impulse[m, p, d] = best[(d + 1) % 3]
-            force = add(force, change)
-            moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
+                manifolds.impulse[m, p, d] = problem.contact.best[c, (d + 1) % 3]
             c += 1
-        apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
+    rebuild_velocities(bodies, manifolds, options)
     return residual
+
+
+@inner_kernel
+def rebuild_velocities(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
+    """Velocities once more from v*, kept in ``start``, and the impulses.
+
+    The direct solver may move very large loads along redundant contacts on its way; of what came and went the
+    round-off stays.
+    """
+    for i in range(len(bodies)):
+        for d in range(6):
+            bodies.twist[i, d] = bodies.start[i, d]
+    for m in range(len(manifolds)):
+        force, moment = ZERO, ZERO
+        for p in range(manifolds.points[m]):
+            impulse = row(manifolds.impulse[m], p, 0)
+            force = add(force, impulse)
+            moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))
+        apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
 
 
 @inner_kernel

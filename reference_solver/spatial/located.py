@@ -36,8 +36,8 @@ from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.tally import (
     CONTACT_WORK,
     EVENTS_LOCATED,
-    EVENTS_MISSED,
     LOAD_WORK,
+    STEPS_HELD,
     SURFACE_WORK,
     SWEEPS,
     UNCONVERGED,
@@ -105,7 +105,7 @@ def sub_step(
             undo(bodies)
             return False
     elif length == left:
-        tally[EVENTS_MISSED] += 1.0
+        tally[STEPS_HELD] += 1.0
     remember_forces(bodies, detection, manifolds, memory, length, options.dt)
     if end < length:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)

@@ -207,6 +207,6 @@ def test_energy_counts_height_speed_and_spin_of_free_bodies():
 )
 def test_case_holds_with_located_events(name):
     case = HARD_CASES[name]
-    verdict = case.run(Settings.located(case.settings.dt))
+    verdict = case.run(Settings.reference(case.settings.dt))
     assert verdict.certified, verdict.reason
     assert all(verdict.answer[key] == count for key, count in case.expects.items())

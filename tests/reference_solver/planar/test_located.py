@@ -28,7 +28,7 @@ def bounce_height(t, height, e):
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
 def test_a_dropped_disc_follows_its_parabolas_until_it_rests(build, dt, e):
     height = 0.93
-    simulation = build.simulation([build.floor(), build.disc(0.0, 0.5 + height)], Settings.located(dt), DOWN, e)
+    simulation = build.simulation([build.floor(), build.disc(0.0, 0.5 + height)], Settings.reference(dt), DOWN, e)
     record = simulation.record(round(5.0 / dt))
     truth = np.array([0.5 + bounce_height(t, height, e) for t in record.t])
     # Each of some hundred events rounds position and time once: 1e2 units in the last place of a metre.
@@ -37,7 +37,7 @@ def test_a_dropped_disc_follows_its_parabolas_until_it_rests(build, dt, e):
 
 
 def test_ten_thousand_elastic_bounces_keep_energy(build):
-    simulation = build.simulation([build.floor(), build.disc(0.0, 1.5)], Settings.located(build.dt), DOWN, 1.0)
+    simulation = build.simulation([build.floor(), build.disc(0.0, 1.5)], Settings.reference(build.dt), DOWN, 1.0)
     simulation.advance(math.ceil(20_000 * math.sqrt(2.0 / G) / build.dt))
     energy = 0.5 * simulation.twist[1, 1] ** 2 + G * (simulation.pose[1, 1] - 0.5)
     assert simulation.certificate["events"] >= 10_000
@@ -49,7 +49,7 @@ def test_ten_thousand_elastic_bounces_keep_energy(build):
 def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, mu):
     speed = 3.0
     box = build.box(0.0, 0.5, (speed, 0.0, 0.0), half=(0.7, 0.5))
-    simulation = build.simulation([build.floor(), box], Settings.located(dt), DOWN, 0.0, mu)
+    simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.0, mu)
     simulation.advance(math.ceil(speed / (mu * G) / dt) + 10)
     assert simulation.pose[1, 0] == pytest.approx(speed**2 / (2.0 * mu * G), rel=1e-12)
     assert np.abs(simulation.twist[1]).max() < 1e-13
@@ -59,7 +59,7 @@ def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, mu):
 def test_a_sliding_disc_rolls_from_the_instant_its_slip_ends(build, dt):
     mu, speed, steps = 0.3, 3.0, 400
     ball = build.disc(0.0, 0.5, (speed, 0.0, 0.0))
-    simulation = build.simulation([build.floor(), ball], Settings.located(dt), DOWN, 0.0, mu)
+    simulation = build.simulation([build.floor(), ball], Settings.reference(dt), DOWN, 0.0, mu)
     simulation.advance(steps)
     slides = speed / (3.0 * mu * G)  # v - mu g t = mu g t (m r^2 / I), I = m r^2 / 2
     rolls = 2.0 / 3.0 * speed
@@ -72,7 +72,7 @@ def test_a_sliding_disc_rolls_from_the_instant_its_slip_ends(build, dt):
 def test_nothing_passes_a_thin_wall(build, speed):
     wall = Body(Box((0.0005, 5.0)), motion="fixed", pose=(2.0, 0.0, 0.0))
     shot = build.disc(0.0, 0.0, (speed, 0.0, 0.0))
-    simulation = build.simulation([wall, shot], Settings.located(build.dt), (0.0, 0.0), 1.0)
+    simulation = build.simulation([wall, shot], Settings.reference(build.dt), (0.0, 0.0), 1.0)
     simulation.advance(1)
     assert simulation.twist[1, 0] == -speed
     way = 2.0 - 0.0005 - 0.5
@@ -83,7 +83,7 @@ def test_nothing_passes_a_thin_wall(build, speed):
 @pytest.mark.parametrize("spin", [0.0, 3.0, 100.0])
 def test_a_tumbling_box_never_gains_energy_and_comes_to_rest_on_a_face(build, spin):
     box = build.box(0.0, 3.0, (0.0, 0.0, spin), angle=0.3)
-    simulation = build.simulation([build.floor(), box], Settings.located(build.dt), DOWN, 0.5, 0.4)
+    simulation = build.simulation([build.floor(), box], Settings.reference(build.dt), DOWN, 0.5, 0.4)
     record = simulation.record(2400)
     twist, pose = record.twist[:, 1], record.pose[:, 1]
     energy = 0.5 * (twist[:, 0] ** 2 + twist[:, 1] ** 2 + twist[:, 2] ** 2 / 6.0) + G * pose[:, 1]
@@ -98,7 +98,7 @@ def test_a_tumbling_box_never_gains_energy_and_comes_to_rest_on_a_face(build, sp
 def test_impulses_of_a_step_are_those_of_all_its_sub_steps(build):
     """Momentum is what contacts and weight gave, in every step, also where a step is cut."""
     bodies = [build.floor(), build.box(0.0, 1.2, (1.0, 0.0, 4.0), angle=0.4), build.disc(0.3, 2.6, mass=2.0)]
-    simulation = build.simulation(bodies, Settings.located(build.dt), DOWN, 0.4, 0.5)
+    simulation = build.simulation(bodies, Settings.reference(build.dt), DOWN, 0.4, 0.5)
     record = simulation.record(480, contacts=True)
     for k in range(480):
         gained = np.zeros((3, 2))
