@@ -12,6 +12,7 @@ from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import row_work
+from reference_solver.planar.clock import count_event, most_events, open_step, uncount_soft
 from reference_solver.planar.columns import (
     FORCE_N,
     FORCE_T,
@@ -24,7 +25,15 @@ from reference_solver.planar.columns import (
     RELEASE,
 )
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import STRUCK, STRUCK_SOFTLY, collide_now, end_series, keep_touching, release
+from reference_solver.planar.impact import (
+    NO_IMPACT,
+    STRUCK,
+    STRUCK_SOFTLY,
+    collide_now,
+    end_series,
+    keep_touching,
+    release,
+)
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
@@ -35,11 +44,8 @@ from reference_solver.planar.state import (
     CONTACTS,
     EVENTS,
     FREE,
-    HELD,
     LEFT,
-    PATIENCE,
     REMEMBERED,
-    SOFT,
     Bodies,
     Buffer,
     Ledger,
@@ -50,13 +56,8 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
-from reference_solver.tally import CONTACT_WORK, EVENTS_LOCATED, LOAD_WORK, STEPS_HELD, SURFACE_WORK
+from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
-#: Events located in one step, and as many more per body; what is left after them goes by the fixed-step law (E28).
-MOST_EVENTS = 64
-EVENTS_PER_BODY = 4
-#: Soft events located in a step, and one more per body: ends of slides, impacts no faster than what loads do in a step.
-MOST_SOFT = 16
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
 #: A sub-step shorter than this share of a step tells nothing about forces.
@@ -78,26 +79,12 @@ def located_step(
 ) -> bool:
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
     if sub.clock[LEFT] == 0.0:
-        open_step(sub, len(bodies.kind), options.dt)
+        open_step(sub.clock, len(bodies.kind), options.dt)
         ledger.used[0] = 0
     while sub.clock[LEFT] > 0.0:
         if not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
     return True
-
-
-@inner_kernel
-def open_step(sub: SubStep, bodies: int, dt: float) -> None:
-    """Start the clock of a step: half the patience after one that was held, twice as much after any other (E28)."""
-    most = MOST_SOFT + bodies
-    if sub.clock[PATIENCE] == 0.0:
-        sub.clock[PATIENCE] = most
-    elif sub.clock[HELD] > 0.0:
-        sub.clock[PATIENCE] = max(0.5 * sub.clock[PATIENCE], 1.0)
-    else:
-        sub.clock[PATIENCE] = min(2.0 * sub.clock[PATIENCE], most)
-    sub.clock[LEFT] = dt
-    sub.clock[EVENTS] = sub.clock[SOFT] = sub.clock[HELD] = 0.0
 
 
 @inner_kernel
@@ -124,7 +111,7 @@ def sub_step(
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
     begin_flight(bodies, rows, sub, length)
     end = length
-    if sub.clock[EVENTS] < MOST_EVENTS + EVENTS_PER_BODY * len(bodies.kind):
+    if sub.clock[EVENTS] < most_events(len(bodies.kind)):
         end = next_impact(bodies, pairs, rows, sub, options, length)
         if end < 0.0:
             copy_vectors(sub.before, bodies.twist)
@@ -141,13 +128,7 @@ def sub_step(
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
     if end < left:
-        sub.clock[EVENTS] += 1.0
-        sub.clock[SOFT] += 1.0
-        tally[EVENTS_LOCATED] += 1.0
-        most = MOST_EVENTS + EVENTS_PER_BODY * len(bodies.kind)
-        if sub.clock[HELD] == 0.0 and (sub.clock[SOFT] > sub.clock[PATIENCE] or sub.clock[EVENTS] >= most):
-            sub.clock[HELD] = 1.0
-            tally[STEPS_HELD] += 1.0
+        count_event(sub.clock, len(bodies.kind), tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -174,7 +155,7 @@ def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float,
 def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> float:
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
-    length = left
+    length, found = left, NO_IMPACT
     keep(tally, sub.tally[0])
     for k in range(SERIES_PASSES):
         if k > 0:
@@ -184,8 +165,8 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
         if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
             break
-    if found == STRUCK and sub.clock[SOFT] > 0.0:
-        sub.clock[SOFT] -= 1.0  # what led here was a hard one
+    if found == STRUCK:
+        uncount_soft(sub.clock)
     return length
 
 

@@ -9,7 +9,7 @@ from reference_solver.planar.rows import SPEED_SHARE
 from reference_solver.planar.state import LEFT, Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.iteration import solve_velocities
-from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import collect_momentum
 from reference_solver.spatial.prepare import measure_speed, set_response
 from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
@@ -22,8 +22,9 @@ NOISE = 1e-11
 #: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
 #: sub-step and released there.
 OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts.
-NO_IMPACT, TURNED, STRUCK = 0, 1, 2
+#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step,
+#: faster ones.
+NO_IMPACT, TURNED, STRUCK_SOFTLY, STRUCK = 0, 1, 2, 3
 #: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
 BOUNCES = 32
 
@@ -94,7 +95,10 @@ def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifold
             if manifolds.lasts[m, p]:
                 found = max(found, TURNED)
                 continue
-            found = STRUCK
+            if manifolds.meets[m, p] == 0:
+                continue
+            soft = -u[2] <= load_speed(bodies, manifolds, m, p, options.dt)
+            found = max(found, STRUCK_SOFTLY if soft else STRUCK)
             manifolds.impact[m, p] = 1
             if options.restitution and manifolds.ending[m, p] == OPEN_ENDED:
                 manifolds.target[m, p] = -restitution * u[2]

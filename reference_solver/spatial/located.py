@@ -10,9 +10,19 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.state import EVENTS, LEFT, Options
+from reference_solver.planar.clock import count_event, most_events, open_step, uncount_soft
+from reference_solver.planar.state import EVENTS, HELD, LEFT, Options
 from reference_solver.spatial.certificate import open_solve, point_work
-from reference_solver.spatial.impact import STRUCK, carries, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.impact import (
+    NO_IMPACT,
+    STRUCK,
+    STRUCK_SOFTLY,
+    carries,
+    collide_now,
+    copy_twists,
+    end_series,
+    release,
+)
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
@@ -35,18 +45,13 @@ from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.tally import (
     CONTACT_WORK,
-    EVENTS_LOCATED,
     LOAD_WORK,
-    STEPS_HELD,
     SURFACE_WORK,
     SWEEPS,
     UNCONVERGED,
     WORST_SWEEPS,
 )
 
-#: Events located in one step, and as many more per body; what happens after them in that step is found a step later.
-MOST_EVENTS = 64
-EVENTS_PER_BODY = 4
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
 #: A sub-step shorter than this share of a step tells nothing about forces.
@@ -69,7 +74,7 @@ def located_step(
 ) -> bool:
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
     if sub.clock[LEFT] == 0.0:
-        sub.clock[LEFT], sub.clock[EVENTS] = options.dt, 0.0
+        open_step(sub.clock, len(bodies), options.dt)
         ledger.filled[0] = 0
     while sub.clock[LEFT] > 0.0:
         if not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
@@ -91,7 +96,7 @@ def sub_step(
 ) -> bool:
     """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
     left = sub.clock[LEFT]
-    found = detect_touching(bodies, detection, room, memory, options, left)
+    found = detect_touching(bodies, detection, room, memory, options, sub.clock)
     if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
         return False
     manifolds = room[:found]
@@ -99,13 +104,11 @@ def sub_step(
     pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
     begin_flight(bodies, manifolds, options, length)
     end = length
-    if sub.clock[EVENTS] < MOST_EVENTS + EVENTS_PER_BODY * len(bodies):
+    if sub.clock[EVENTS] < most_events(len(bodies)):
         end = next_impact(bodies, detection, manifolds, sub, options, length)
         if end < 0.0:
             undo(bodies)
             return False
-    elif length == left:
-        tally[STEPS_HELD] += 1.0
     remember_forces(bodies, detection, manifolds, memory, length, options.dt)
     if end < length:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
@@ -116,8 +119,7 @@ def sub_step(
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
     if end < left:
-        sub.clock[EVENTS] += 1.0
-        tally[EVENTS_LOCATED] += 1.0
+        count_event(sub.clock, len(bodies), tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -138,17 +140,20 @@ def solve_sub_step(
     """
     copy_twists(bodies.twist, bodies.before)
     prepare_wrenches(bodies, manifolds, options)
-    length = sub.clock[LEFT]
+    length, found = sub.clock[LEFT], NO_IMPACT
     for k in range(len(tally)):
         sub.saved[k] = tally[k]
     for _ in range(SERIES_PASSES):
         for k in range(len(tally)):
             if k != SWEEPS and k != WORST_SWEEPS and k != UNCONVERGED:
                 tally[k] = sub.saved[k]
-        struck = collide_now(bodies, detection, manifolds, problem, options, tally) == STRUCK
-        length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck)
+        found = collide_now(bodies, detection, manifolds, problem, options, tally)
+        struck, held = found >= STRUCK_SOFTLY, sub.clock[HELD] > 0.0
+        length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck, held)
         if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
             break
+    if found == STRUCK:
+        uncount_soft(sub.clock)
     for k in range(len(tally)):
         sub.saved[k] = tally[k]
     certify_press(bodies, manifolds, options, tally, length)

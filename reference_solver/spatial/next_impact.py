@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.state import Options
+from reference_solver.planar.state import HELD, Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
 from reference_solver.spatial.flight import place_at, reach_of
 from reference_solver.spatial.impact import NOISE, carries
@@ -13,7 +13,7 @@ from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import momentum_of, spin_of
 from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import CANDIDATES, FIXED, FREE, HALF_SPACE, Bodies, Detection, Manifolds, SubStep
-from reference_solver.spatial.time_of_impact import return_of_corners, time_of_impact
+from reference_solver.spatial.time_of_impact import return_of_corners, strikes_hard, time_of_impact
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import add_scaled, row, sub
 
@@ -127,8 +127,10 @@ def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
 
 
 @inner_kernel
-def pair_impact(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, a: int, b: int, m: int, end: float) -> float:
-    """Next impact of one pair, whose manifold is m (-1: none).
+def pair_impact(
+    bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, a: int, b: int, m: int, end: float
+) -> float:
+    """Next impact of one pair, whose manifold is m (-1: none); only hard ones where the step is held (E28).
 
     A pair that is held by some points is not looked at again before the next sub-step, but for the free corners of a
     body that turns on a half-space.
@@ -138,11 +140,14 @@ def pair_impact(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, a: int,
         if manifolds.open[m, p] == 0:
             held += 1
             corners |= 1 << manifolds.feature[m, p]
+    time = math.inf
     if held == 0:
-        return time_of_impact(bodies, sub_step.trial, a, b, end)
-    if bodies.kind[a] == HALF_SPACE or bodies.kind[b] == HALF_SPACE:
-        return return_of_corners(bodies, sub_step.trial, a, b, corners, end)
-    return math.inf
+        time = time_of_impact(bodies, sub_step.trial, a, b, end)
+    elif bodies.kind[a] == HALF_SPACE or bodies.kind[b] == HALF_SPACE:
+        time = return_of_corners(bodies, sub_step.trial, a, b, corners, end)
+    if time < end and sub_step.clock[HELD] > 0.0:
+        return time if strikes_hard(bodies, sub_step.trial, a, b, corners, options.dt, time) else math.inf
+    return time
 
 
 @inner_kernel
@@ -161,5 +166,5 @@ def next_impact(
         while m < len(manifolds) and manifolds.body_a[m] * n + manifolds.body_b[m] < key:
             m += 1
         own = m if m < len(manifolds) and manifolds.body_a[m] * n + manifolds.body_b[m] == key else -1
-        end = min(end, pair_impact(bodies, manifolds, sub_step, key // n, key % n, own, end))
+        end = min(end, pair_impact(bodies, manifolds, sub_step, options, key // n, key % n, own, end))
     return end

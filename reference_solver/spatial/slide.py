@@ -37,10 +37,12 @@ def press(
     tally: Array,
     length: float,
     struck: bool,
+    held: bool,
 ) -> None:
     """Velocities at the end of a sub-step of ``length``: from ``first`` to ``twist`` (E20).
 
-    ``struck``: impacts came first, so that lasting contacts may part as well. v* is kept for the certificate.
+    ``struck``: impacts came first, so that lasting contacts may part as well; ``held``: none does, by the fixed-step
+    law (E28). v* is kept for the certificate.
     """
     copy_twists(bodies.first, bodies.twist)
     for m in range(len(manifolds)):
@@ -50,7 +52,8 @@ def press(
             set_reference_speed(bodies, manifolds, m, p, u, options.dt)
             clear_point(manifolds, m, p)
             manifolds.slip[m, p, 0], manifolds.slip[m, p, 1] = u[0], u[1]
-            if u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0):
+            leaves = u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0)
+            if leaves and not held:
                 manifolds.open[m, p] = 1
                 continue
             for k in range(3):
@@ -124,6 +127,7 @@ def press_until_stick(
     tally: Array,
     left: float,
     struck: bool,
+    held: bool,
 ) -> float:
     """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length."""
     if len(manifolds) == 0:
@@ -131,13 +135,13 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
-    press(bodies, manifolds, problem, options, tally, left, struck)
+    press(bodies, manifolds, problem, options, tally, left, struck, held)
     length = left
-    for _ in range(STICK_SOLVES if options.friction else 0):
+    for _ in range(STICK_SOLVES if options.friction and not held else 0):
         end = slip_end(bodies, manifolds, options, length)
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
-        press(bodies, manifolds, problem, options, tally, length, struck)
+        press(bodies, manifolds, problem, options, tally, length, struck, held)
     return length

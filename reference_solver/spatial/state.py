@@ -98,6 +98,7 @@ MANIFOLD = np.dtype(
         ("impact", "i8", POINTS),  # 1 where bodies meet or part faster than loads explain
         ("open", "i8", POINTS),  # 1 where a point parts and carries nothing in a force phase (E20)
         ("lasts", "i8", POINTS),  # 1 where a point carried load in the sub-step before (E20)
+        ("meets", "i8", POINTS),  # 1 where bodies touch, 0 where a gap is left to close
         ("ending", "i8", POINTS),  # how a rebound goes on, see `impact`
         ("hit", "f8", (POINTS, 3)),  # impulse of the impacts of a sub-step, frame [N s]
         ("force", "f8", (POINTS, 3)),  # remembered from the sub-step before: world axes, then frame [N]
@@ -209,7 +210,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
 class SubStep(NamedTuple):
     """What is left of the step, and room to try poses; velocities of a sub-step stand in `BODY`."""
 
-    clock: Array  # (CLOCK_SIZE,): see LEFT and EVENTS of planar.state
+    clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD of planar.state
     trial: Bodies  # (2,): a pair of bodies at another time
     saved: Array  # (SIZE,): the tally before an attempt
 

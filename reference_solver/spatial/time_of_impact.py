@@ -29,6 +29,8 @@ STEPS = 500
 FIRST_LOOK = 1.0 / 64.0
 #: A safe step shorter than this share of the time is none.
 SOON = 1e-11
+#: The moment before an impact over which its speed is measured, as a share of a step.
+MOMENT = 1e-3
 
 
 @kernel
@@ -58,6 +60,22 @@ def return_of_corners(bodies: Bodies, trial: Bodies, a: int, b: int, held: int, 
         return math.inf
     time = advance(bodies, trial, f, s, held, duration)
     return time if time <= duration else math.inf
+
+
+@kernel
+def strikes_hard(bodies: Bodies, trial: Bodies, a: int, b: int, held: int, dt: float, t: float) -> bool:
+    """Whether a pair that meets at time t does so faster than what loads do in a step (E28).
+
+    The speed is the separation a moment before the impact, less that at it, over that moment.
+    """
+    f, s = (a, b) if bodies.kind[a] <= bodies.kind[b] else (b, a)
+    moment = min(MOMENT * dt, t)
+    if moment <= 0.0:
+        return False
+    copy_body(bodies, f, trial, 0)
+    copy_body(bodies, s, trial, 1)
+    closed = separation_at(bodies, trial, f, s, held, t - moment)[0] - separation_at(bodies, trial, f, s, held, t)[0]
+    return closed > moment * dt * (length(row(bodies.acceleration, f, 0)) + length(row(bodies.acceleration, s, 0)))
 
 
 @inner_kernel

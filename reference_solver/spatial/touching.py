@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.model import Array
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF
-from reference_solver.planar.state import Options
+from reference_solver.planar.state import HELD, LEFT, Options
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_frame, set_world_points, sort_points
@@ -20,9 +21,12 @@ LATE = 1e-15
 
 @inner_kernel
 def detect_touching(
-    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options, left: float
+    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options, clock: Array
 ) -> int:
-    """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room."""
+    """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room.
+
+    Where what is left goes by the fixed-step law, all gaps with e = 0 may be closed (E28). ``clock``: of the sub-step.
+    """
     if not find_candidates(bodies, detection, options):
         return -1
     n = len(bodies)
@@ -38,7 +42,8 @@ def detect_touching(
             continue
         sort_points(manifolds, m)
         set_world_points(bodies, manifolds, m)
-        keep_points(bodies, manifolds, m, memory, known, left)
+        close_all = clock[HELD] > 0.0 and detection.restitution[key // n, key % n] == 0.0
+        keep_points(bodies, manifolds, m, memory, known, clock[LEFT], close_all)
         if manifolds.points[m] > 0:
             describe(bodies, detection, manifolds, m, options)
             m += 1
@@ -56,8 +61,10 @@ def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 
 
 @inner_kernel
-def keep_points(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, left: float) -> None:
-    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap."""
+def keep_points(
+    bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, left: float, close_all: bool
+) -> None:
+    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap; or all."""
     a, b = manifolds.body_a[m], manifolds.body_b[m]
     kept = 0
     for p in range(manifolds.points[m]):
@@ -65,7 +72,8 @@ def keep_points(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, kn
         at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
         approach = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
         lasts = recall_force(manifolds, m, p, memory, known)
-        if lasts or manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + LATE * left * abs(approach):
+        meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + LATE * left * abs(approach)
+        if lasts or meets or close_all:
             for d in range(3):
                 manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
                 manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
@@ -74,6 +82,7 @@ def keep_points(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, kn
             manifolds.gap[m, kept] = manifolds.gap[m, p]
             manifolds.feature[m, kept] = manifolds.feature[m, p]
             manifolds.lasts[m, kept] = 1 if lasts else 0
+            manifolds.meets[m, kept] = 1 if meets else 0
             kept += 1
     manifolds.points[m] = kept
 
