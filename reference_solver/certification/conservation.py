@@ -85,6 +85,6 @@ def free_collisions(space: Space, count: int = 40, steps: int = 10_000, dt: floa
         size = max(size, now[3])
     changed = int((np.abs(np.diff(record.twist, axis=0)).max(axis=2) > 1e-6).sum())
     case = f"{steps} steps, {changed} changes of velocity"
-    name = made_by(space, "located")
+    name = made_by(space, "reference")
     yield Gate.at_most("momentum, relative", case, linear / start[2], 1e-12, name)
     yield Gate.at_most("angular momentum, relative", case, angular / size, 1e-12, name)

@@ -80,7 +80,7 @@ def stopping(space: Space, speed: float = 3.0, friction: float = 0.5) -> Iterato
         simulation = space.simulation([space.floor(), box], Settings.reference(dt), GRAVITY, 0.0, friction)
         simulation.advance(math.ceil(v / (friction * GRAVITY) / dt) + 2)
         worst = max(worst, abs(simulation.pose[1, 0] / (v * v / (2.0 * friction * GRAVITY)) - 1.0))
-    yield Gate.at_most("stopping distance, relative", "any dt and phase", worst, 1e-10, made_by(space, "located"))
+    yield Gate.at_most("stopping distance, relative", "any dt and phase", worst, 1e-10, made_by(space, "reference"))
 
 
 def time_to_roll(space: Space, speed: float = 3.0, friction: float = 0.2) -> Iterator[Gate]:
@@ -97,4 +97,4 @@ def time_to_roll(space: Space, speed: float = 3.0, friction: float = 0.2) -> Ite
         simulation.advance(steps)
         measured = 2.0 * (simulation.pose[1, 0] - rolls * steps * dt) / (speed - rolls)
         worst = max(worst, abs(measured / truth - 1.0))
-    yield Gate.at_most("time to roll, relative", "any dt", worst, 1e-10, made_by(space, "located"))
+    yield Gate.at_most("time to roll, relative", "any dt", worst, 1e-10, made_by(space, "reference"))

@@ -22,7 +22,7 @@ RESTITUTIONS = (0.0, 0.2, 0.5, 0.8, 0.95, 1.0)
 def gates() -> Iterator[Gate]:
     """Yield every row of impacts."""
     for space in SPACES:
-        for profile in ("classical", "located"):
+        for profile in ("classical", "reference"):
             yield from single_rebound(space, profile)
         yield from flat_rebound(space)
         yield from apexes(space)
@@ -45,7 +45,7 @@ def single_rebound(space: Space, profile: str) -> Iterator[Gate]:
     name = made_by(space, profile)
     for case, measure in (("no gravity, any phase", rebound_free), ("gravity, from touch", rebound_from_touch)):
         yield Gate.at_most("rebound, of max(v-, g dt)", case, measure(space, profile), 1e-14, name)
-    if profile == "located":
+    if profile == "reference":
         error = rebound_falling(space)
         yield Gate.at_most("rebound, of max(v-, g dt)", "gravity, any phase, v >= 1 m/s", error, 1e-14, name)
 
@@ -73,7 +73,7 @@ def rebound_from_touch(space: Space, profile: str) -> float:
         ball = space.ball(0.0, 0.5, space.twist(0.0, -v))
         simulation = space.simulation([space.floor(), ball], settings_of(profile, dt), GRAVITY, e)
         simulation.advance(1)
-        slowed = GRAVITY * dt if profile == "located" else 0.0
+        slowed = GRAVITY * dt if profile == "reference" else 0.0
         worst = max(worst, abs(simulation.twist[1, space.up] + slowed - e * v) / max(v, GRAVITY * dt))
     return worst
 
@@ -132,7 +132,7 @@ def apexes(space: Space, restitution: float = 0.8, height: float = 1.0, dt: floa
         worst = max(worst, float(np.abs(found - restitution ** (2 * n) * height).max(initial=0.0)) / height)
         worst = worst if len(found) else math.inf
     case = f"e = {restitution:g}, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("20 apexes, of h0", case, worst, 1e-12, made_by(space, "located"))
+    yield Gate.at_most("20 apexes, of h0", case, worst, 1e-12, made_by(space, "reference"))
 
 
 def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> Iterator[Gate]:
@@ -153,7 +153,7 @@ def rest_time(space: Space, restitution: float = 0.8, height: float = 1.0) -> It
                 # what one step's weight leaves after a solve to 1e-13 is rest
                 rests = abs(simulation.twist[1, space.up]) <= 1e-13 * GRAVITY * settings.dt
                 worst = worst if rests == (sign > 0.0) else max(worst, float(share))
-    yield Gate.at_most("rest time, relative", f"e = {restitution:g}", worst, 1e-12, made_by(space, "located"))
+    yield Gate.at_most("rest time, relative", f"e = {restitution:g}", worst, 1e-12, made_by(space, "reference"))
 
 
 def elastic_bounces(space: Space, count: int = 10_000, dt: float = 1 / 240) -> Iterator[Gate]:
@@ -163,7 +163,7 @@ def elastic_bounces(space: Space, count: int = 10_000, dt: float = 1 / 240) -> I
     height, speed = simulation.pose[1, space.up] - 0.5, simulation.twist[1, space.up]
     energy = (height + speed**2 / (2.0 * GRAVITY)) / 1.0
     case = f"e = 1, {count} bounces, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("energy, relative", case, energy - 1.0, 1e-9, made_by(space, "located"))
+    yield Gate.at_most("energy, relative", case, energy - 1.0, 1e-9, made_by(space, "reference"))
 
 
 def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: float = 1 / 256) -> Iterator[Gate]:
@@ -186,7 +186,7 @@ def closing_wall(space: Space, speed: float = 1 / 128, hits: int = 200, dt: floa
         constants.append((after - speed) * room)
     spread = (max(constants) - min(constants)) / constants[0] if len(constants) == hits else math.inf
     case = f"{len(constants)} hits, dt = 1/{1 / dt:.0f}"
-    yield Gate.at_most("(v - V) L, relative spread", case, spread, 1e-12, made_by(space, "located"))
+    yield Gate.at_most("(v - V) L, relative spread", case, spread, 1e-12, made_by(space, "reference"))
 
 
 def deep_overlap(space: Space, dt: float = 1 / 240) -> Iterator[Gate]:
@@ -249,6 +249,6 @@ def thin_wall(space: Space, dt: float = 1 / 60) -> Iterator[Gate]:
         record = simulation.record(4)
         passed += int((record.pose[:, 1, 0] > 0.0).any())
         worst = max(worst, abs(record.twist[-1, 1, 0] / speed + e))
-    name = made_by(space, "located")
+    name = made_by(space, "reference")
     yield Gate.exactly("thin wall: passages", "1..1e6 lengths per second", passed, 0, name)
     yield Gate.at_most("thin wall: speed after, of v-", "1..1e6 lengths per second", worst, 0.0, name)

@@ -77,7 +77,7 @@ def gates() -> Iterator[Gate]:
     """Yield one row per relation, dimension and profile: the worst of all scenes and trials."""
     for space in SPACES:
         for relation in (*ANY_PROFILE, *REFERENCE_ONLY):
-            yield row(relation, space, "located")
+            yield row(relation, space, "reference")
         for relation in ANY_PROFILE:
             yield row(relation, space, "classical")
         yield from predictability(space)

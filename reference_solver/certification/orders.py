@@ -65,9 +65,9 @@ def orders() -> Iterator[Order]:
     """Yield every case in both dimensions, with every profile."""
     for space in SPACES:
         for case, error in CASES.items():
-            for profile in ("classical", "reference", "located"):
+            for profile in ("classical", "fixed_step", "reference"):
                 yield observed(case, error, space, profile)
-    for profile in ("classical", "reference", "located"):
+    for profile in ("classical", "fixed_step", "reference"):
         yield observed("free rotation [rad]", rotation, SPACES[1], profile)
 
 

@@ -48,9 +48,9 @@ LATE = 1e-15
 #: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
 #: sub-step and released there.
 OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step,
-#: faster ones.
-NO_IMPACT, TURNED, STRUCK_SOFTLY, STRUCK = 0, 1, 2, 3
+#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step with
+#: e = 0, such with e > 0, faster ones.
+NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
 #: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
 BOUNCES = 32
 
@@ -135,7 +135,8 @@ def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float
             continue
         if rows.integer[c, MEETS] == 0:
             continue
-        found = max(found, STRUCK_SOFTLY if -u <= load_speed(bodies, rows, c, options.dt) else STRUCK)
+        soft = REBOUNDED if options.restitution and rows.real[c, RESTITUTION] > 0.0 else LANDED
+        found = max(found, soft if -u <= load_speed(bodies, rows, c, options.dt) else STRUCK)
         rows.integer[c, IMPACT] = 1
         if options.restitution:
             rebound = -rows.real[c, RESTITUTION] * u

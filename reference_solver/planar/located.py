@@ -12,7 +12,7 @@ from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import row_work
-from reference_solver.planar.clock import count_event, most_events, open_step, uncount_soft
+from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
 from reference_solver.planar.columns import (
     FORCE_N,
     FORCE_T,
@@ -26,9 +26,9 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import (
+    LANDED,
     NO_IMPACT,
-    STRUCK,
-    STRUCK_SOFTLY,
+    REBOUNDED,
     collide_now,
     end_series,
     keep_touching,
@@ -161,12 +161,12 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         if k > 0:
             go_back(tally, sub.tally[0])
         found = collide_now(bodies, rows, problem, sub, options, tally)
-        struck = found >= STRUCK_SOFTLY
+        struck = found >= LANDED
         length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
         if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
             break
-    if found == STRUCK:
-        uncount_soft(sub.clock)
+    if found >= REBOUNDED:
+        weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
     return length
 
 

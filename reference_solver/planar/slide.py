@@ -20,6 +20,7 @@ from reference_solver.planar.columns import (
     MOTION,
     PN,
     PT,
+    RESTITUTION,
     SLIP,
     SPEED,
     TANGENT_MASS,
@@ -88,9 +89,9 @@ def press(
 def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
     """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
 
-    A rebound always does, however low: its series ends when it ends (E22).
+    A rebound with e > 0 always does, however low: its series ends when it ends (E22).
     """
-    if rows.integer[c, IMPACT]:
+    if rows.integer[c, IMPACT] and rows.real[c, RESTITUTION] > 0.0:
         return True
     pull = load_speed(bodies, rows, c, 1.0)
     return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length

@@ -22,9 +22,9 @@ NOISE = 1e-11
 #: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
 #: sub-step and released there.
 OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step,
-#: faster ones.
-NO_IMPACT, TURNED, STRUCK_SOFTLY, STRUCK = 0, 1, 2, 3
+#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step with
+#: e = 0, such with e > 0, faster ones.
+NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
 #: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
 BOUNCES = 32
 
@@ -97,8 +97,8 @@ def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifold
                 continue
             if manifolds.meets[m, p] == 0:
                 continue
-            soft = -u[2] <= load_speed(bodies, manifolds, m, p, options.dt)
-            found = max(found, STRUCK_SOFTLY if soft else STRUCK)
+            soft = REBOUNDED if options.restitution and restitution > 0.0 else LANDED
+            found = max(found, soft if -u[2] <= load_speed(bodies, manifolds, m, p, options.dt) else STRUCK)
             manifolds.impact[m, p] = 1
             if options.restitution and manifolds.ending[m, p] == OPEN_ENDED:
                 manifolds.target[m, p] = -restitution * u[2]

@@ -10,13 +10,13 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.clock import count_event, most_events, open_step, uncount_soft
+from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
 from reference_solver.planar.state import EVENTS, HELD, LEFT, Options
 from reference_solver.spatial.certificate import open_solve, point_work
 from reference_solver.spatial.impact import (
+    LANDED,
     NO_IMPACT,
-    STRUCK,
-    STRUCK_SOFTLY,
+    REBOUNDED,
     carries,
     collide_now,
     copy_twists,
@@ -148,12 +148,12 @@ def solve_sub_step(
             if k != SWEEPS and k != WORST_SWEEPS and k != UNCONVERGED:
                 tally[k] = sub.saved[k]
         found = collide_now(bodies, detection, manifolds, problem, options, tally)
-        struck, held = found >= STRUCK_SOFTLY, sub.clock[HELD] > 0.0
+        struck, held = found >= LANDED, sub.clock[HELD] > 0.0
         length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck, held)
         if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
             break
-    if found == STRUCK:
-        uncount_soft(sub.clock)
+    if found >= REBOUNDED:
+        weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
     for k in range(len(tally)):
         sub.saved[k] = tally[k]
     certify_press(bodies, manifolds, options, tally, length)

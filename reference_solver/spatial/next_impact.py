@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.planar.flight import DRIFT
 from reference_solver.planar.state import HELD, Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
 from reference_solver.spatial.flight import place_at, reach_of
-from reference_solver.spatial.impact import NOISE, carries
+from reference_solver.spatial.impact import carries
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import momentum_of, spin_of
 from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import CANDIDATES, FIXED, FREE, HALF_SPACE, Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.time_of_impact import return_of_corners, strikes_hard, time_of_impact
-from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import add_scaled, row, sub
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
@@ -75,8 +75,8 @@ def mark_closing(bodies: Bodies, manifolds: Manifolds, options: Options, length:
         for p in range(manifolds.points[m]):
             if not carries(manifolds, m, p, length / options.dt):
                 continue
-            drifts = abs(velocity_at(v, w, manifolds, m, p)[2]) > NOISE * manifolds.speed[m, p]
-            if drifts or manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
+            drift = max(abs(velocity_at(v, w, manifolds, m, p)[2]), manifolds.gap[m, p] / length)
+            if drift > DRIFT * manifolds.speed[m, p]:
                 bodies.closing[manifolds.body_a[m]] = bodies.closing[manifolds.body_b[m]] = 1
 
 
