@@ -32,7 +32,13 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import (
+    add_pressure,
+    apply_normal,
+    apply_tangent,
+    normal_velocity,
+    tangent_velocity,
+)
 from reference_solver.planar.residual import IMPULSE_SHARE, row_residual
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows
 from reference_solver.tally import (
@@ -193,13 +199,7 @@ def check_momentum(bodies: Bodies, rows: Rows, options: Options, tally: Array) -
         apply_normal(bodies, bodies.start, rows, c, pn)
         if options.friction:
             apply_tangent(bodies, bodies.start, rows, c, pt)
-        # Impulses that came and went during the solve leave round-off of the contact's usual ones.
-        size = abs(pn) + abs(pt) + rows.real[c, NORMAL_MASS] * rows.real[c, SPEED]
-        for side in range(2):
-            i = rows.integer[c, A + side]
-            lever = max(abs(rows.real[c, ARM_A + 2 * side]), abs(rows.real[c, ARM_A + 2 * side + 1]))
-            bodies.pressed[i, 0] += bodies.real[i, INVERSE_MASS] * size
-            bodies.pressed[i, 1] += bodies.real[i, INVERSE_INERTIA] * size * lever
+        add_pressure(bodies, rows, c)
     for i in range(len(bodies.kind)):
         for part in range(2):
             defect, speed = 0.0, bodies.pressed[i, part]

@@ -9,7 +9,7 @@ from reference_solver.direct.problem import FACTORISATIONS as OF_STEP
 from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_blocks
-from reference_solver.planar.direct import rebuild_velocities, solve_directly
+from reference_solver.planar.direct import mend_velocities, solve_directly
 from reference_solver.planar.residual import natural_map
 from reference_solver.planar.sequential_impulses import sweep_rows
 from reference_solver.planar.state import BLOCK, Bodies, Options, Rows
@@ -67,7 +67,7 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
     Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
     in circles. When the residual has made no progress for a while, the factor and its bound go half way to 1.
     Sweeps that turn out slow hand over to the direct solver (E44), and go on from its answer if it does not finish.
-    Velocities that went through its hands are built anew before they count.
+    Velocities that went through its hands are mended before they count.
     """
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     limit = LARGEST_RELAXATION
@@ -80,7 +80,7 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
     sweeps, best_at, asked, next_direct = 0, 0, 0, DIRECT_AFTER
     while sweeps < options.max_sweeps and (stale or residual > options.residual):
         if residual <= options.residual:
-            rebuild_velocities(bodies, rows, options)
+            mend_velocities(bodies, rows, options)
             residual, stale = natural_map(bodies, rows, options), False
             continue
         sweep(bodies, rows, options, relaxation)

@@ -16,8 +16,12 @@ from reference_solver.planar.columns import (
     INVERSE_INERTIA,
     INVERSE_MASS,
     LOAD,
+    NORMAL_MASS,
     NX,
     NY,
+    PN,
+    PT,
+    SPEED,
     A,
     B,
 )
@@ -99,3 +103,17 @@ def copy_vectors(source: Array, target: Array) -> None:
     for i in range(len(source)):
         for k in range(3):
             target[i, k] = source[i, k]
+
+
+@inner_kernel
+def add_pressure(bodies: Bodies, rows: Rows, c: int) -> None:
+    """Add what the impulses of row c, or its usual ones, can at most do to the velocities of its bodies.
+
+    Its usual ones: of impulses that came and went during a solve the round-off stays.
+    """
+    size = abs(rows.real[c, PN]) + abs(rows.real[c, PT]) + rows.real[c, NORMAL_MASS] * rows.real[c, SPEED]
+    for side in range(2):
+        i = rows.integer[c, A if side == 0 else B]
+        lever = max(abs(rows.real[c, ARM_A + 2 * side]), abs(rows.real[c, ARM_A + 2 * side + 1]))
+        bodies.pressed[i, 0] += bodies.real[i, INVERSE_MASS] * size
+        bodies.pressed[i, 1] += bodies.real[i, INVERSE_INERTIA] * size * lever

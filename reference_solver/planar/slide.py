@@ -40,6 +40,8 @@ FAR = 1e3
 STICK_SOLVES = 30
 #: Share of the end told by a row that stuck which is tried next, to be on the slipping side of it.
 SHORTER = 0.9
+#: Friction below this share of its limit sticks.
+STUCK = 1.0 - 1e-9
 #: Relative accuracy of that instant: some ten units in the last place.
 SAME_TIME = 1e-14
 
@@ -102,12 +104,16 @@ def slip_end(bodies: Bodies, rows: Rows, length: float) -> float:
     """First time at which a slide of the solved sub-step comes to its end, inf if none does (E23).
 
     A row that still slips the same way goes on linearly. One that stuck or turned would, with its whole friction,
-    have gone on past zero; how far, is told by its own effective mass.
+    have gone on past zero; how far, is told by its own effective mass. What stuck in the sub-step before slips because
+    its levers have turned, and ends no slide.
     """
     first = math.inf
     for c in range(rows.counts[CONTACTS]):
         slip, pressed = rows.real[c, SLIP], rows.real[c, PN]
         if pressed <= 0.0 or rows.real[c, FRICTION] == 0.0 or abs(slip) <= NOISE * rows.real[c, SPEED]:
+            continue
+        limit = rows.real[c, FRICTION] * rows.real[c, FORCE_N]
+        if rows.integer[c, LASTS] and abs(rows.real[c, FORCE_T]) < STUCK * limit:
             continue
         whole = -math.copysign(rows.real[c, FRICTION] * pressed, slip)
         after = tangent_velocity(bodies.twist, rows, c) + (whole - rows.real[c, PT]) / rows.real[c, TANGENT_MASS]

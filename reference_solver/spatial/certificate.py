@@ -15,7 +15,7 @@ from reference_solver.model import Array
 from reference_solver.planar.certificate import enter_creation, enter_share
 from reference_solver.planar.residual import IMPULSE_SHARE
 from reference_solver.planar.state import Options
-from reference_solver.spatial.kinematics import apply_wrench, point_velocity, relative_twist, velocity_at
+from reference_solver.spatial.kinematics import add_pressure, apply_wrench, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.residual import point_residual
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
 from reference_solver.spatial.vector import (
@@ -178,20 +178,9 @@ def check_momentum(bodies: Bodies, manifolds: Manifolds, options: Options, tally
             impulse = row(manifolds.impulse[m], p, 0)
             force = add(force, impulse)
             moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))
-            # Impulses that came and went during the solve leave round-off of the point's usual ones.
-            size = length(impulse) + manifolds.speed[m, p] / manifolds.matrix[m, p, 5]
-            add_pressure(bodies, manifolds.body_a[m], size, length(row(manifolds.arm_a[m], p, 0)))
-            add_pressure(bodies, manifolds.body_b[m], size, length(row(manifolds.arm_b[m], p, 0)))
+            add_pressure(bodies, manifolds, m, p)
         apply_wrench(bodies, bodies.start, manifolds, m, options.rotation, force, moment)
     for i in range(len(bodies)):
         for part in range(2):
             after, sought = row(bodies.twist, i, 3 * part), row(bodies.start, i, 3 * part)
             enter_share(tally, MOMENTUM, length(sub(after, sought)), length(after) + bodies.pressed[i, part])
-
-
-@inner_kernel
-def add_pressure(bodies: Bodies, i: int, size: float, arm: float) -> None:
-    """Add what an impulse of this size at this arm can at most do to the velocities of body i."""
-    moments = row(bodies.inverse_moments, i, 0)
-    bodies.pressed[i, 0] += bodies.inverse_mass[i] * size
-    bodies.pressed[i, 1] += max(moments[0], moments[1], moments[2]) * size * arm

@@ -5,10 +5,11 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import CONTACTS, Problem
 from reference_solver.direct.rounds import solve_problem
+from reference_solver.planar.direct import MENDED
 from reference_solver.planar.state import Options
-from reference_solver.spatial.kinematics import apply_wrench
+from reference_solver.spatial.kinematics import add_pressure, apply_wrench
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
-from reference_solver.spatial.vector import ZERO, add, cross, row, scale, times
+from reference_solver.spatial.vector import ZERO, add, cross, row, scale, sub, times
 
 
 @inner_kernel
@@ -21,33 +22,54 @@ def solve_directly(
     residual = solve_problem(problem, options.residual, budget, fresh)
     c = 0
     for m in range(len(manifolds)):
+        force, moment = ZERO, ZERO
         for p in range(manifolds.points[m]):
             if manifolds.open[m, p]:
                 continue
+            best = row(problem.contact.best, c, 0)
+            change = sub((best[1], best[2], best[0]), row(manifolds.impulse[m], p, 0))
             for d in range(3):
-                manifolds.impulse[m, p, d] = problem.contact.best[c, (d + 1) % 3]
+                manifolds.impulse[m, p, d] = best[(d + 1) % 3]
+            force = add(force, change)
+            moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
             c += 1
-    rebuild_velocities(bodies, manifolds, options)
+        apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
+    mend_velocities(bodies, manifolds, options)
     return residual
 
 
 @inner_kernel
-def rebuild_velocities(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
-    """Velocities once more from v*, kept in ``start``, and the impulses.
+def mend_velocities(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
+    """Build velocities anew from v*, kept in ``start``, and the impulses, should they differ by more than round-off.
 
-    The direct solver may move very large loads along redundant contacts on its way; of what came and went the
-    round-off stays.
+    The direct solver may move very large loads along redundant contacts on its way, and of what came and went the
+    round-off stays. Else the velocities that the changes led to are the more accurate ones. Uses up ``pseudo``.
     """
     for i in range(len(bodies)):
+        bodies.pressed[i, 0] = bodies.pressed[i, 1] = 0.0
         for d in range(6):
-            bodies.twist[i, d] = bodies.start[i, d]
+            bodies.pseudo[i, d] = bodies.start[i, d]
     for m in range(len(manifolds)):
         force, moment = ZERO, ZERO
         for p in range(manifolds.points[m]):
             impulse = row(manifolds.impulse[m], p, 0)
             force = add(force, impulse)
             moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))
-        apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
+            add_pressure(bodies, manifolds, m, p)
+        apply_wrench(bodies, bodies.pseudo, manifolds, m, options.rotation, force, moment)
+    for i in range(len(bodies)):
+        for d in range(6):
+            if abs(bodies.twist[i, d] - bodies.pseudo[i, d]) > MENDED * bodies.pressed[i, d // 3]:
+                rebuild(bodies)
+                return
+
+
+@inner_kernel
+def rebuild(bodies: Bodies) -> None:
+    """Take the velocities in ``pseudo``."""
+    for i in range(len(bodies)):
+        for d in range(6):
+            bodies.twist[i, d] = bodies.pseudo[i, d]
 
 
 @inner_kernel

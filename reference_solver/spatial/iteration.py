@@ -21,7 +21,7 @@ from reference_solver.planar.iteration import (
 )
 from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.block import sweep_blocks
-from reference_solver.spatial.direct import rebuild_velocities, solve_directly
+from reference_solver.spatial.direct import mend_velocities, solve_directly
 from reference_solver.spatial.residual import natural_map
 from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import Bodies, Manifolds
@@ -44,7 +44,7 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
     Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
     in circles. When the residual has made no progress for a while, the factor and its bound go half way to 1.
     Sweeps that turn out slow hand over to the direct solver (E44), and go on from its answer if it does not finish.
-    Velocities that went through its hands are built anew before they count.
+    Velocities that went through its hands are mended before they count.
     """
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     limit = LARGEST_RELAXATION
@@ -57,7 +57,7 @@ def sweep_to_residual(bodies: Bodies, manifolds: Manifolds, problem: Problem, op
     sweeps, best_at, asked, next_direct = 0, 0, 0, DIRECT_AFTER
     while sweeps < options.max_sweeps and (stale or residual > options.residual):
         if residual <= options.residual:
-            rebuild_velocities(bodies, manifolds, options)
+            mend_velocities(bodies, manifolds, options)
             residual, stale = natural_map(bodies, manifolds, options), False
             continue
         sweep(bodies, manifolds, options, relaxation)

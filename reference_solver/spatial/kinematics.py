@@ -91,3 +91,18 @@ def load_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) 
     at_a = acceleration_at(bodies, a, row(manifolds.arm_a[m], p, 0))
     at_b = acceleration_at(bodies, b, row(manifolds.arm_b[m], p, 0))
     return dt * (at_a + at_b)
+
+
+@inner_kernel
+def add_pressure(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> None:
+    """Add what the impulse of a point, or its usual one, can at most do to the velocities of its bodies.
+
+    Its usual ones: of impulses that came and went during a solve the round-off stays.
+    """
+    size = length(row(manifolds.impulse[m], p, 0)) + manifolds.speed[m, p] / manifolds.matrix[m, p, 5]
+    for side in range(2):
+        i = manifolds.body_b[m] if side else manifolds.body_a[m]
+        arm = length(row(manifolds.arm_b[m] if side else manifolds.arm_a[m], p, 0))
+        moments = row(bodies.inverse_moments, i, 0)
+        bodies.pressed[i, 0] += bodies.inverse_mass[i] * size
+        bodies.pressed[i, 1] += max(moments[0], moments[1], moments[2]) * size * arm

@@ -11,10 +11,10 @@ from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.impact import NOISE, clear_point, copy_twists, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
-from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
 from reference_solver.spatial.prepare import warm_start
-from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
 
@@ -24,6 +24,8 @@ STICK_SOLVES = 30
 SHORTER = 0.9
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.
 AT_END = 1e-13
+#: Friction below this share of its limit sticks.
+STUCK = 1.0 - 1e-9
 #: Relative accuracy of that instant: some ten units in the last place.
 SAME_TIME = 1e-14
 
@@ -53,7 +55,7 @@ def press(
             clear_point(manifolds, m, p)
             manifolds.slip[m, p, 0], manifolds.slip[m, p, 1] = u[0], u[1]
             leaves = u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0)
-            if leaves and not held:
+            if leaves and not held and flies(bodies, manifolds, m, p, u[2], length):
                 manifolds.open[m, p] = 1
                 continue
             for k in range(3):
@@ -64,6 +66,22 @@ def press(
     copy_twists(bodies.twist, bodies.start)
     warm_start(bodies, manifolds, options)
     solve_velocities(bodies, manifolds, problem, options, tally)
+
+
+@inner_kernel
+def flies(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, length: float) -> bool:
+    """Whether a point that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
+
+    A rebound with e > 0 always does, however low: its series ends when it ends (E22). Between two bodies that other
+    points hold, returns are not looked for, and what loads bring back in time does not leave.
+    """
+    if manifolds.impact[m, p] and manifolds.restitution[m] > 0.0:
+        return True
+    pull = load_speed(bodies, manifolds, m, p, 1.0)
+    if 2.0 * u > pull * length:
+        return True
+    plane = bodies.kind[manifolds.body_a[m]] == HALF_SPACE or bodies.kind[manifolds.body_b[m]] == HALF_SPACE
+    return bool(plane and u * u > 2.0 * pull * gap_noise(bodies, manifolds, m, p))
 
 
 @inner_kernel
@@ -98,6 +116,14 @@ def slip_left(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
 
 
 @inner_kernel
+def stuck(manifolds: Manifolds, m: int, p: int) -> bool:
+    """Whether point p stuck in the sub-step before: it slips because its levers have turned, and ends no slide."""
+    f1, f2, pressed = manifolds.force[m, p, 0], manifolds.force[m, p, 1], manifolds.force[m, p, 2]
+    limit = STUCK * manifolds.friction[m] * pressed
+    return bool(manifolds.lasts[m, p] and f1 * f1 + f2 * f2 < limit * limit)
+
+
+@inner_kernel
 def slip_end(bodies: Bodies, manifolds: Manifolds, options: Options, length: float) -> float:
     """First time at which a slide of the solved sub-step comes to its end, inf if none does (E34)."""
     first = math.inf
@@ -107,14 +133,16 @@ def slip_end(bodies: Bodies, manifolds: Manifolds, options: Options, length: flo
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             slip = math.sqrt(manifolds.slip[m, p, 0] ** 2 + manifolds.slip[m, p, 1] ** 2)
-            if manifolds.impulse[m, p, 2] <= 0.0 or slip <= NOISE * manifolds.speed[m, p]:
+            if manifolds.impulse[m, p, 2] <= 0.0 or slip <= NOISE * manifolds.speed[m, p] or stuck(manifolds, m, p):
                 continue
             rest = slip_left(manifolds, m, p, velocity_at(v, w, manifolds, m, p))
             lost = slip - rest
             if abs(rest) <= AT_END * manifolds.speed[m, p]:
                 first = min(first, length)
             elif lost > 0.0:
-                first = min(first, length * (slip / lost))
+                end = length * (slip / lost)
+                if slip * end > gap_noise(bodies, manifolds, m, p):  # else it ends at once: what stuck has turned
+                    first = min(first, end)
     return first
 
 

@@ -75,6 +75,7 @@ MANIFOLD = np.dtype(
         ("body_b", "i8"),
         ("points", "i8"),  # number of points, 1..4
         ("friction", "f8"),  # mu
+        ("restitution", "f8"),  # e
         ("frame", "f8", (3, 3)),  # rows t1, t2, n; n points from A to B
         ("lever_a", "f8", 3),  # centre of the manifold minus centre of A [m]
         ("lever_b", "f8", 3),

@@ -108,6 +108,7 @@ def describe(bodies: Bodies, detection: Detection, manifolds: Manifolds, m: int,
     set_frame(bodies, manifolds, m)
     friction = detection.friction[manifolds.body_a[m], manifolds.body_b[m]]
     manifolds.friction[m] = friction if options.friction else 0.0
+    manifolds.restitution[m] = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
     for p in range(manifolds.points[m]):
         set_response(bodies, manifolds, m, p, options)
         force = times(manifolds.frame, m, row(manifolds.force[m], p, 0))

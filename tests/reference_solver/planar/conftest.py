@@ -53,3 +53,8 @@ def reference():
 @pytest.fixture
 def classical():
     return Settings.classical(DT)
+
+
+@pytest.fixture
+def fixed_step():
+    return Settings.fixed_step(DT)

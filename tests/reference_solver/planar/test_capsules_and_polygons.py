@@ -38,7 +38,7 @@ def body(shape, x, y, angle, **fields):
 
 
 def touch(*bodies):
-    simulation = Simulation(Model(2, bodies, (0.0, 0.0), 0.0, 0.0), Settings.reference(DT))
+    simulation = Simulation(Model(2, bodies, (0.0, 0.0), 0.0, 0.0), Settings.fixed_step(DT))
     simulation.advance(1)
     return simulation.contacts()
 
@@ -150,7 +150,7 @@ def test_features_stay_while_a_triangle_rocks_and_the_world_turns():
     assert len(names) <= 3  # two ends seen from the box's face; one end where the other has left the reach
 
 
-@pytest.mark.parametrize("profile", [Settings.classical, Settings.reference])
+@pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
 def test_a_polygon_with_a_boxs_vertices_moves_like_the_box(profile):
     """Boxes and polygons have different detection; six bodies tumble into a heap before chaos tells them apart."""
 
@@ -178,7 +178,7 @@ def test_resting_on_a_floor_carries_the_weight_and_does_not_creep(shape):
         angle = -math.atan2(along[1], along[0])
     height = radius - turned(angle, vertices)[:, 1].min()
     simulation = Simulation(
-        Model(2, [FLOOR, body(shape, 0.0, height, angle)], (0.0, -9.81), 0.0, 0.5), Settings.reference(DT)
+        Model(2, [FLOOR, body(shape, 0.0, height, angle)], (0.0, -9.81), 0.0, 0.5), Settings.fixed_step(DT)
     )
     simulation.advance(240)
     assert simulation.contacts().impulse.sum(axis=0) == pytest.approx([0.0, 9.81 * DT], abs=1e-14)
@@ -189,7 +189,7 @@ def test_a_capsule_falling_over_its_round_end_keeps_its_energy():
     """Leaning on a smooth floor it falls: its centre goes straight down, and what it loses in height it gains."""
     start = 0.2 + 0.4 * math.sin(math.pi / 2.0 - 0.1)
     capsule = Body(Capsule(0.4, 0.2), 1.0, 0.1, (0.0, start, math.pi / 2.0 - 0.1))
-    simulation = Simulation(Model(2, [FLOOR, capsule], (0.0, -9.81), 0.0, 0.0), Settings.reference(1e-4))
+    simulation = Simulation(Model(2, [FLOOR, capsule], (0.0, -9.81), 0.0, 0.0), Settings.fixed_step(1e-4))
     simulation.advance(3000)
     (_, y, angle), (vx, vy, w) = simulation.pose[1], simulation.twist[1]
     assert 0.1 < angle < 1.4  # on its way down

@@ -28,9 +28,9 @@ def pile(build, seed, settings, bodies=14):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_piles_of_tilted_bodies_are_solved_in_every_step(build, reference, seed):
+def test_piles_of_tilted_bodies_are_solved_in_every_step(build, fixed_step, seed):
     """Sweeps alone leave a quarter of the steps of such piles unsolved after 4000 of them."""
-    simulation = pile(build, seed, reference)
+    simulation = pile(build, seed, fixed_step)
     simulation.advance(500)
     certificate = simulation.certificate
     assert certificate["converged"] and certificate["residual"] <= 1e-13
@@ -38,21 +38,21 @@ def test_piles_of_tilted_bodies_are_solved_in_every_step(build, reference, seed)
     assert not [reason for reason in certificate["reasons"] if "overlap" not in reason]  # some overlap at the start
 
 
-def test_a_pile_falls_the_same_way_twice(build, reference):
+def test_a_pile_falls_the_same_way_twice(build, fixed_step):
     """Neither start values nor the memory of an earlier run enter: equal bits."""
     poses = []
     for _ in range(2):
-        simulation = pile(build, 4, reference)
+        simulation = pile(build, 4, fixed_step)
         simulation.advance(400)
         poses.append(simulation.pose)
     assert np.array_equal(*poses)
 
 
-def test_easy_steps_never_ask(build, reference):
+def test_easy_steps_never_ask(build, fixed_step):
     """A box and a disc at rest, and a column of three, are solved by fewer sweeps than it is asked after."""
-    simulation = build.simulation([build.floor(), build.box(0.0, 0.5), build.disc(2.0, 0.5)], reference, (0.0, -G))
+    simulation = build.simulation([build.floor(), build.box(0.0, 0.5), build.disc(2.0, 0.5)], fixed_step, (0.0, -G))
     simulation.advance(100)
-    column = build.column(3, reference)
+    column = build.column(3, fixed_step)
     column.advance(100)
     assert simulation.certificate["factorisations"] == column.certificate["factorisations"] == 0
 
@@ -63,10 +63,10 @@ def pushed_stack(build, settings):
     return build.simulation([build.floor(), *boxes], settings, (0.0, -G), 0.0, 0.4)
 
 
-def test_direct_answer_is_that_of_the_sweeps(build, reference):
+def test_direct_answer_is_that_of_the_sweeps(build, fixed_step):
     answers = []
     for direct in (True, False):
-        simulation = pushed_stack(build, replace(reference, direct=direct, max_sweeps=100_000))
+        simulation = pushed_stack(build, replace(fixed_step, direct=direct, max_sweeps=100_000))
         simulation.advance(1)
         assert simulation.certificate["converged"]
         assert (simulation.certificate["direct"] > 0) is direct
@@ -76,11 +76,11 @@ def test_direct_answer_is_that_of_the_sweeps(build, reference):
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
-def test_interfaces_of_alternating_masses_in_every_step(build, reference, ratio):
+def test_interfaces_of_alternating_masses_in_every_step(build, fixed_step, ratio):
     """Impulse i is the weight above; the unit in the last place of g h is what a light box may miss."""
     masses = np.array([1.0, ratio] * 4)
     boxes = [build.box(0.0, 0.5 + i, mass=m) for i, m in enumerate(masses)]
-    simulation = build.simulation([build.floor(), *boxes], reference, (0.0, -G), 0.0, 0.5)
+    simulation = build.simulation([build.floor(), *boxes], fixed_step, (0.0, -G), 0.0, 0.5)
     weight = G * build.dt * np.cumsum(masses[::-1])[::-1]
     for _ in range(50):
         simulation.advance(1)
@@ -90,32 +90,32 @@ def test_interfaces_of_alternating_masses_in_every_step(build, reference, ratio)
     assert simulation.certificate["direct"] > 0
 
 
-def test_frictionless_worlds_without_rotation_are_solved_as_well(build, reference):
+def test_frictionless_worlds_without_rotation_are_solved_as_well(build, fixed_step):
     """A column of 40 discs, mu = 0: normal rows only, and bodies that do not turn."""
     n = 40
     discs = [build.disc(0.0, 0.5 + i) for i in range(n)]
-    simulation = build.simulation([build.floor(), *discs], reference, (0.0, -G))
+    simulation = build.simulation([build.floor(), *discs], fixed_step, (0.0, -G))
     simulation.advance(1)
     assert "rotation" in simulation.left_out and simulation.certificate["direct"] == 1
     weight = G * build.dt * np.arange(n, 0, -1)
     assert simulation.contacts().impulse[:, 1] / weight == pytest.approx(1.0, abs=1e-13)
 
 
-def test_room_grows_with_the_contacts(build, reference):
+def test_room_grows_with_the_contacts(build, fixed_step):
     """Many points on few bodies: more contacts than there was room for at first."""
     boxes = [build.box(0.4 * i, 0.5, (1.0, 0.0, 0.0), half=(0.19, 0.5)) for i in range(40)]
     lid = build.box(7.8, 1.1, half=(8.1, 0.1), mass=50.0)
-    simulation = build.simulation([build.floor(), *boxes, lid], reference, (0.0, -G), 0.0, 0.5)
+    simulation = build.simulation([build.floor(), *boxes, lid], fixed_step, (0.0, -G), 0.0, 0.5)
     simulation.advance(3)
     assert simulation.certificate["converged"]
 
 
-def test_slab_on_many_columns_shares_its_weight(build, reference):
+def test_slab_on_many_columns_shares_its_weight(build, fixed_step):
     """A body that touches 20 others: a dense row of the matrix, and sums of forces that must balance."""
     n, mass = 20, 30.0
     posts = [build.box(0.5 * i, 0.5, half=(0.1, 0.5)) for i in range(n)]
     slab = Body(Box((5.2, 0.1)), mass, mass * (5.2**2 + 0.01) / 3.0, (0.25 * (n - 1), 1.1, 0.0))
-    simulation = build.simulation([build.floor(), *posts, slab], reference, (0.0, -G), 0.0, 0.3)
+    simulation = build.simulation([build.floor(), *posts, slab], fixed_step, (0.0, -G), 0.0, 0.3)
     simulation.advance(2)
     assert simulation.certificate["converged"]
     contacts = simulation.contacts()

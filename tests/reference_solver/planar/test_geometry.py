@@ -12,11 +12,11 @@ from reference_solver import Body, Disc, HalfSpace
 
 
 @pytest.fixture
-def touch(build, reference):
+def touch(build, fixed_step):
     """Contacts of a set of resting bodies."""
 
     def contacts(*bodies):
-        simulation = build.simulation(list(bodies), reference)
+        simulation = build.simulation(list(bodies), fixed_step)
         simulation.advance(1)
         return simulation.contacts()
 

@@ -23,10 +23,10 @@ def leaning(build):
     ]
 
 
-def test_warm_starting_does_not_change_the_converged_answer(build, reference):
+def test_warm_starting_does_not_change_the_converged_answer(build, fixed_step):
     results = []
     for warm in (True, False):
-        simulation = build.simulation(leaning(build), replace(reference, warm_starting=warm), (0.0, -G), 0.0, 0.3)
+        simulation = build.simulation(leaning(build), replace(fixed_step, warm_starting=warm), (0.0, -G), 0.0, 0.3)
         simulation.advance(60)
         assert simulation.certificate["converged"]
         results.append(simulation)
@@ -37,10 +37,10 @@ def test_warm_starting_does_not_change_the_converged_answer(build, reference):
     assert efforts[0] < efforts[1]
 
 
-def test_scalar_rows_and_blocks_converge_to_the_same_answer(build, reference):
+def test_scalar_rows_and_blocks_converge_to_the_same_answer(build, fixed_step):
     twists = []
     for solver in ("scalar", "block"):
-        settings = replace(reference, solver=solver, relaxation=1.0)
+        settings = replace(fixed_step, solver=solver, relaxation=1.0)
         simulation = build.simulation(leaning(build), settings, (0.0, -G), 0.0, 0.3)
         simulation.advance(30)
         assert simulation.certificate["converged"]
@@ -67,7 +67,7 @@ def test_the_residual_is_a_certificate_of_the_error(build):
     """Stopping earlier leaves a larger error, and none larger than the condition of the column allows."""
     n, errors = 10, []
     for residual in (1e-4, 1e-7, 1e-10, 1e-13):
-        simulation = build.column(n, replace(Settings.reference(build.dt), residual=residual))
+        simulation = build.column(n, replace(Settings.fixed_step(build.dt), residual=residual))
         simulation.advance(1)
         assert simulation.certificate["residual"] <= residual
         contacts = simulation.contacts()
@@ -79,7 +79,7 @@ def test_the_residual_is_a_certificate_of_the_error(build):
 
 
 def test_an_unreached_residual_is_reported(build):
-    simulation = build.column(10, replace(Settings.reference(build.dt), max_sweeps=5))
+    simulation = build.column(10, replace(Settings.fixed_step(build.dt), max_sweeps=5))
     simulation.advance(3)
     certificate = simulation.certificate
     assert certificate["converged"] is False
@@ -95,10 +95,10 @@ def test_a_fixed_number_of_sweeps_is_kept_exactly(build):
     assert simulation.certificate["converged"] is True
 
 
-def test_relaxation_changes_the_path_and_not_the_answer(build, reference):
+def test_relaxation_changes_the_path_and_not_the_answer(build, fixed_step):
     answers = []
     for relaxation in (1.0, 1.5, 1.8, None):
-        simulation = build.column(6, replace(reference, relaxation=relaxation))
+        simulation = build.column(6, replace(fixed_step, relaxation=relaxation))
         simulation.advance(1)
         answers.append(simulation.contacts().impulse[:, 1])
     for answer in answers[1:]:
@@ -113,13 +113,13 @@ def velocities_of_one_block(build, settings, box, friction, restitution):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_two_point_block_solves_the_contact_problem(build, reference, seed):
+def test_a_two_point_block_solves_the_contact_problem(build, fixed_step, seed):
     """Random flat impacts of a box: signs, cone, complementarity and maximal dissipation, checked from outside."""
     rng = np.random.default_rng(seed)
     half = (rng.uniform(0.2, 1.0), rng.uniform(0.2, 1.0))
     mu, e = rng.uniform(0.0, 1.0), rng.choice([0.0, 0.5])
     box = build.box(0.0, half[1] - 1e-4, tuple(rng.normal(size=3) * [2.0, 1.0, 3.0]), half=half)
-    simulation, before = velocities_of_one_block(build, reference, box, mu, e)
+    simulation, before = velocities_of_one_block(build, fixed_step, box, mu, e)
     contacts, after = simulation.contacts(), simulation.twist[1]
     assert simulation.certificate["converged"]
     arms = contacts.point - simulation.model.bodies[1].pose[:2]
@@ -137,14 +137,14 @@ def test_a_two_point_block_solves_the_contact_problem(build, reference, seed):
         assert abs(speed[0]) <= scale or tangent == pytest.approx(-math.copysign(mu * normal, speed[0]), abs=scale)
 
 
-def test_block_modes_agree_with_enumeration_of_all_sixteen(build, reference):
+def test_block_modes_agree_with_enumeration_of_all_sixteen(build, fixed_step):
     """An independent least-squares enumeration of open, stick, slip+, slip- at both points finds the same motion."""
     found_modes = set()
     for seed in range(30):
         rng = np.random.default_rng(100 + seed)
         half, mu = (rng.uniform(0.2, 1.0), rng.uniform(0.2, 1.0)), rng.uniform(0.1, 0.9)
         box = build.box(0.0, half[1], tuple(rng.normal(size=3) * [1.5, 1.0, 3.0]), half=half)
-        simulation, before = velocities_of_one_block(build, reference, box, mu, 0.0)
+        simulation, before = velocities_of_one_block(build, fixed_step, box, mu, 0.0)
         free = before[1] + build.dt * np.array([0.0, -G, 0.0])
         rows = []
         for x in (-half[0], half[0]):

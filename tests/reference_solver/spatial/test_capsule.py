@@ -28,7 +28,7 @@ def body(shape, place, turn=(1.0, 0.0, 0.0, 0.0), **fields):
 
 
 def touch(*bodies):
-    simulation = Simulation(Model(3, bodies, (0.0, 0.0, 0.0), 0.0, 0.5), Settings.reference(DT))
+    simulation = Simulation(Model(3, bodies, (0.0, 0.0, 0.0), 0.0, 0.5), Settings.fixed_step(DT))
     simulation.advance(1)
     return simulation.contacts()
 
@@ -145,7 +145,7 @@ def test_a_resting_capsule_carries_its_weight(turn):
     height = 0.2 if turn[0] == 1.0 else 0.6
     simulation = Simulation(
         Model(3, [FLOOR, body(Capsule(0.4, 0.2), (0.0, 0.0, height), turn)], (0.0, 0.0, -9.81), 0.0, 0.5),
-        Settings.reference(DT),
+        Settings.fixed_step(DT),
     )
     simulation.advance(60)
     assert simulation.contacts().impulse.sum(axis=0) == pytest.approx([0.0, 0.0, 9.81 * DT], abs=1e-14)
@@ -156,7 +156,7 @@ def test_a_capsule_released_sliding_rolls_at_the_speed_of_its_inertia():
     """Across its axis a capsule is a disc: v = v0 / (1 + k), k = I / (m r^2) about the axis."""
     moments = (0.02, 0.1, 0.1)
     capsule = Body(Capsule(0.4, 0.2), 1.0, moments, (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
-    simulation = Simulation(Model(3, [FLOOR, capsule], (0.0, 0.0, -9.81), 0.0, 0.3), Settings.reference(DT))
+    simulation = Simulation(Model(3, [FLOOR, capsule], (0.0, 0.0, -9.81), 0.0, 0.3), Settings.fixed_step(DT))
     simulation.advance(120)
     k = 0.02 / 0.2**2
     assert simulation.twist[1, 1] == pytest.approx(1.0 / (1.0 + k), abs=1e-12)

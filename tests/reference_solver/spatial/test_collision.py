@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
 
 DT = 1.0 / 240.0
-SETTINGS = Settings.reference(DT)
+SETTINGS = Settings.fixed_step(DT)
 
 
 def matrix(q):

@@ -24,7 +24,7 @@ def test_a_sphere_leaves_the_floor_with_e_times_its_approach_speed(build, settin
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
 def test_gravity_of_the_step_does_not_change_the_rebound(build, dt, scheme):
     """A fixed step spends its gravity inside the impact; a located one lets it act afterwards."""
-    settings = dataclasses.replace(Settings.reference(dt), scheme=scheme)
+    settings = dataclasses.replace(Settings.fixed_step(dt), scheme=scheme)
     ball = build.sphere((0.0, 0.0, 0.5), (0.0, 0.0, -2.0))
     simulation = build.simulation([build.floor(), ball], settings, (0.0, 0.0, -9.81), 0.8)
     simulation.advance(1)
@@ -69,7 +69,7 @@ def test_an_oblique_spinning_sphere_obeys_coulomb_at_impact(build, settings, vel
     assert simulation.twist[1] == pytest.approx(expected, abs=10 * ROUND_OFF * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("profile", [Settings.classical, Settings.reference])
+@pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
 def test_a_strike_off_centre_turns_a_body_by_its_whole_inertia_tensor(build, mechanics, profile):
     """A small sphere hits the top face of a turned box with three different moments (S-A5).
 

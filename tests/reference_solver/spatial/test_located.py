@@ -12,12 +12,6 @@ G = 9.81
 DOWN = (0.0, 0.0, -G)
 
 
-@pytest.fixture
-def located():
-    """The reference profile with located steps, at any step."""
-    return lambda dt: dataclasses.replace(Settings.reference(dt), scheme="located")
-
-
 def bounces(height, e, t):
     """Height over its rest and velocity of a ball dropped at rest, after t: parabolas between impacts (O16)."""
     impact, speed = math.sqrt(2 * height / G), e * math.sqrt(2 * G * height)
@@ -33,10 +27,10 @@ def bounces(height, e, t):
 @pytest.mark.parametrize("shape", ["sphere", "box"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 0.1])
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.8])
-def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(build, located, shape, dt, e):
+def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(build, shape, dt, e):
     """From 1 m: every sample against the closed form; at rest after (1 + e)/(1 - e) falls, to the bit."""
     body = getattr(build, shape)((0.2, -0.1, 1.5))
-    simulation = build.simulation([build.floor(), body], located(dt), DOWN, e, 0.3)
+    simulation = build.simulation([build.floor(), body], Settings.reference(dt), DOWN, e, 0.3)
     record = simulation.record(round(4.5 / dt))
     exact = np.array([bounces(1.0, e, t) for t in record.t])
     # Times of impact and places are sums of some hundred steps of order one: 1e-15 each, times the speed of 4 m/s.
@@ -51,7 +45,7 @@ def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(build, locate
 @pytest.mark.parametrize("speed", [1e-3, 0.1, 6.0, 1e3])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 1000])
 @pytest.mark.parametrize("phase", [0.0, 0.137, 0.5, 0.999])
-def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, located, e, speed, dt, phase):
+def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, e, speed, dt, phase):
     """It starts where it reaches the floor after a share of the step; what counts is the impulse of the impact."""
     early = phase * dt
     start = speed - G * early
@@ -60,7 +54,7 @@ def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, located, e, spee
         place, early, speed = 0.5 + speed * early + 0.5 * G * early**2, early, speed + G * early
         start = speed - G * early
     ball = build.sphere((0.0, 0.0, place), (0.0, 0.0, -start), mass=0.5)
-    simulation = build.simulation([build.floor(), ball], located(dt), DOWN, e)
+    simulation = build.simulation([build.floor(), ball], Settings.reference(dt), DOWN, e)
     simulation.advance(1)
     rebound, left = e * speed, dt - early
     if 2 * rebound > G * left:  # one bounce in this step
@@ -74,10 +68,10 @@ def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, located, e, spee
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("half", [(0.5, 0.5, 0.5), (1.0, 0.3, 0.2)])
 @pytest.mark.parametrize("height", [0.0, 1e-3, 0.02])
-def test_a_flat_box_rebounds_on_four_points_without_turning(build, located, half, friction, height):
+def test_a_flat_box_rebounds_on_four_points_without_turning(build, half, friction, height):
     box = build.box((0.0, 0.0, half[2] + height), (0.0, 0.0, -3.0), half=half, turn=(0.9, 0.0, 0.0, 0.3))
     dt = 1 / 60
-    simulation = build.simulation([build.floor(), box], located(dt), DOWN, 0.5, friction)
+    simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.5, friction)
     simulation.advance(1)
     impact = math.sqrt(9.0 + 2 * G * height)
     early = 2 * height / (3.0 + impact)
@@ -87,12 +81,12 @@ def test_a_flat_box_rebounds_on_four_points_without_turning(build, located, half
 
 @pytest.mark.parametrize("dt", [1 / 7, 1 / 60, 1 / 240])
 @pytest.mark.parametrize("k", [2 / 5, 2 / 3])
-def test_a_sliding_sphere_rolls_from_the_instant_its_slip_ends(build, located, dt, k):
+def test_a_sliding_sphere_rolls_from_the_instant_its_slip_ends(build, dt, k):
     """Speed v0/(1 + k) and place after the slide of 2 k v0/(...): time to roll k v0 / ((1 + k) mu g), oblique."""
     along = np.array([math.cos(0.7), math.sin(0.7), 0.0])
     v0, mu, steps = 3.0, 0.3, math.ceil(2.0 / dt)
     ball = build.sphere((0.0, 0.0, 0.5), v0 * along, k=k)
-    simulation = build.simulation([build.floor(), ball], located(dt), DOWN, 0.0, mu)
+    simulation = build.simulation([build.floor(), ball], Settings.reference(dt), DOWN, 0.0, mu)
     simulation.advance(steps)
     end, speed = k * v0 / ((1 + k) * mu * G), v0 / (1 + k)
     way = v0 * end - 0.5 * mu * G * end**2 + speed * (steps * dt - end)
@@ -103,31 +97,35 @@ def test_a_sliding_sphere_rolls_from_the_instant_its_slip_ends(build, located, d
 
 @pytest.mark.parametrize("dt", [1 / 7, 1 / 60, 1 / 240])
 @pytest.mark.parametrize("turn", [0.0, 0.4])
-def test_a_sliding_box_stops_where_its_energy_is_spent(build, located, dt, turn):
+def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, turn):
     along = np.array([math.cos(0.3), math.sin(0.3), 0.0])
     box = build.box((0.0, 0.0, 0.25), 3.0 * along, half=(1.0, 0.8, 0.25), turn=(math.cos(turn), 0, 0, math.sin(turn)))
-    simulation = build.simulation([build.floor(), box], located(dt), DOWN, 0.0, 0.3)
+    simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.0, 0.3)
     simulation.advance(math.ceil(1.5 / dt))
     way = 9.0 / (2 * 0.3 * G)
     assert simulation.pose[1, :3] == pytest.approx(way * along + [0, 0, 0.25], abs=1e-10 * way)
     assert np.abs(simulation.twist[1]).max() <= 1e-12
 
 
-def test_a_box_near_the_limit_does_not_creep(build, located):
+def test_a_box_near_the_limit_does_not_creep(build):
     slope = math.atan(0.999 * 0.5)
     pull = G * math.sin(slope)
     gravity = (pull * math.cos(0.7), pull * math.sin(0.7), -G * math.cos(slope))
-    simulation = build.simulation([build.floor(), build.box((0.0, 0.0, 0.5))], located(1 / 240), gravity, 0.0, 0.5)
+    simulation = build.simulation(
+        [build.floor(), build.box((0.0, 0.0, 0.5))], Settings.reference(1 / 240), gravity, 0.0, 0.5
+    )
     simulation.advance(1000)
     assert np.abs(simulation.twist[1]).max() <= 1e-14
     assert np.abs(simulation.pose[1, :3] - [0, 0, 0.5]).max() <= 1e-12
 
 
-def test_a_box_above_the_limit_accelerates_by_the_difference(build, located):
+def test_a_box_above_the_limit_accelerates_by_the_difference(build):
     slope = math.atan(1.1 * 0.5)
     pull = G * math.sin(slope)
     gravity = (pull * math.cos(0.7), pull * math.sin(0.7), -G * math.cos(slope))
-    simulation = build.simulation([build.floor(), build.box((0.0, 0.0, 0.5))], located(1 / 240), gravity, 0.0, 0.5)
+    simulation = build.simulation(
+        [build.floor(), build.box((0.0, 0.0, 0.5))], Settings.reference(1 / 240), gravity, 0.0, 0.5
+    )
     simulation.advance(240)
     expected = (pull - 0.5 * G * math.cos(slope)) * np.array([math.cos(0.7), math.sin(0.7), 0.0])
     assert simulation.twist[1, :3] == pytest.approx(expected, abs=1e-12)
@@ -136,10 +134,10 @@ def test_a_box_above_the_limit_accelerates_by_the_difference(build, located):
 
 @pytest.mark.parametrize("lengths_per_second", [1e2, 1e4, 1e6])
 @pytest.mark.parametrize("shape", ["sphere", "box"])
-def test_nothing_passes_a_thin_wall_and_the_rebound_is_exact(build, located, lengths_per_second, shape):
+def test_nothing_passes_a_thin_wall_and_the_rebound_is_exact(build, lengths_per_second, shape):
     wall = Body(Box((0.001, 50.0, 50.0)), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     body = getattr(build, shape)((-1.0, 0.2, 0.1), (lengths_per_second, 0.0, 0.0))
-    simulation = build.simulation([wall, body], located(1 / 60), restitution=0.5)
+    simulation = build.simulation([wall, body], Settings.reference(1 / 60), restitution=0.5)
     simulation.advance(2)
     assert simulation.twist[1, :3] == pytest.approx([-0.5 * lengths_per_second, 0, 0], rel=1e-12)
     way = 0.5 * (2 / 60 * lengths_per_second - (1.0 - 0.5 - 0.001))
@@ -163,10 +161,8 @@ def cloud(build, settings, restitution, friction, count, shape, seed=5):
 
 @pytest.mark.parametrize("shape", ["sphere", "box"])
 @pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_ten_thousand_steps_of_free_collisions_keep_momentum_and_angular_momentum(
-    build, mechanics, located, shape, friction
-):
-    unpushed = dataclasses.replace(located(1 / 240), position_correction="none")
+def test_ten_thousand_steps_of_free_collisions_keep_momentum_and_angular_momentum(build, mechanics, shape, friction):
+    unpushed = dataclasses.replace(Settings.reference(1 / 240), position_correction="none")
     simulation = cloud(build, unpushed, 0.8, friction, 8, shape)
     momentum, angular = mechanics.momentum(simulation), mechanics.angular_momentum(simulation)
     simulation.advance(10_000)
@@ -178,19 +174,19 @@ def test_ten_thousand_steps_of_free_collisions_keep_momentum_and_angular_momentu
 
 
 @pytest.mark.parametrize("shape", ["sphere", "box"])
-def test_elastic_collisions_without_friction_keep_energy(build, mechanics, located, shape):
+def test_elastic_collisions_without_friction_keep_energy(build, mechanics, shape):
     """Impacts keep it to round-off; the free rotation of boxes swings by (w dt)^2 of it."""
-    simulation = cloud(build, located(1 / 240), 1.0, 0.0, 8, shape)
+    simulation = cloud(build, Settings.reference(1 / 240), 1.0, 0.0, 8, shape)
     before = mechanics.kinetic_energy(simulation)
     simulation.advance(2000)
     assert mechanics.kinetic_energy(simulation) == pytest.approx(before, rel=1e-12 if shape == "sphere" else 1e-4)
 
 
-def test_samples_see_every_impact_of_a_step_once(build, mechanics, located):
+def test_samples_see_every_impact_of_a_step_once(build, mechanics):
     """A ball between floor and ceiling: several impacts in one step; the impulses add up to the change of momentum."""
     ceiling = Body(Box((5.0, 5.0, 0.1)), motion="fixed", pose=(0.0, 0.0, 1.2, 1.0, 0.0, 0.0, 0.0))
     ball = build.sphere((0.0, 0.0, 0.55), (0.0, 0.0, -60.0))
-    simulation = build.simulation([build.floor(), ceiling, ball], located(1 / 60), DOWN, 0.9)
+    simulation = build.simulation([build.floor(), ceiling, ball], Settings.reference(1 / 60), DOWN, 0.9)
     before = simulation.twist[2, 2]
     simulation.advance(1)
     contacts = simulation.contacts()
@@ -199,10 +195,10 @@ def test_samples_see_every_impact_of_a_step_once(build, mechanics, located):
     assert simulation.twist[2, 2] - before == pytest.approx(gained - G / 60, abs=1e-13 * 120)
 
 
-def test_a_box_dropped_on_its_edge_comes_to_rest_flat(build, located):
+def test_a_box_dropped_on_its_edge_comes_to_rest_flat(build):
     simulation = build.simulation(
         [build.floor(), build.box((0, 0, 1.2), spin=(0, 5.0, 0), turn=(math.cos(0.3), 0, math.sin(0.3), 0))],
-        located(1 / 240),
+        Settings.reference(1 / 240),
         DOWN,
         0.3,
         0.4,
@@ -213,11 +209,11 @@ def test_a_box_dropped_on_its_edge_comes_to_rest_flat(build, located):
     assert simulation.certificate["holds"]
 
 
-def test_a_ball_rolling_over_a_sphere_keeps_angular_momentum(build, mechanics, located):
+def test_a_ball_rolling_over_a_sphere_keeps_angular_momentum(build, mechanics):
     """Curved contact under spin: positions that follow the last velocity keep x cross m v of both."""
     a = build.sphere((0.0, 0.0, 0.0), spin=(0.0, 3.0, 0.0))
     b = build.sphere((0.0, 0.0, 1.0), (0.5, 0.0, -0.2), (0.0, -1.0, 0.0), mass=2.0)
-    settings = dataclasses.replace(located(1 / 240), position_correction="none")
+    settings = dataclasses.replace(Settings.reference(1 / 240), position_correction="none")
     simulation = build.simulation([a, b], settings, friction=0.5)
     momentum, angular = mechanics.momentum(simulation), mechanics.angular_momentum(simulation)
     simulation.advance(240)
