@@ -30,7 +30,7 @@ from reference_solver.planar.impact import NOISE, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.rows import measure_speed, warm_start
-from reference_solver.planar.state import CONTACTS, FREE, HELD, Bodies, Options, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FREE, HELD, LEFT, Bodies, Options, Rows, SubStep
 from reference_solver.tally import SWEEPS
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
@@ -72,10 +72,10 @@ def press(
         if leaves and flies(bodies, rows, c, u, length):
             rows.real[c, TARGET] = -FAR * (speed + u)
             rows.real[c, PN] = rows.real[c, PT] = 0.0
-        elif rows.real[c, GAP] > gap_noise(bodies, rows, c):
-            rows.real[c, TARGET] = -rows.real[c, GAP] / length
         else:
-            rows.real[c, TARGET] = 0.0
+            gap = rows.real[c, GAP] if rows.real[c, GAP] > gap_noise(bodies, rows, c) else 0.0
+            last = rows.integer[c, LASTS] == 1
+            rows.real[c, TARGET] = closing_speed(gap, u if last else 0.0, length, sub.clock[LEFT] if last else length)
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FREE:
             for k in range(3):
@@ -85,6 +85,17 @@ def press(
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+
+
+@inner_kernel
+def closing_speed(gap: float, parts: float, length: float, left: float) -> float:
+    """Target of a contact that closes its gap within ``left`` [m/s], of which this sub-step has ``length`` (E20).
+
+    A lasting contact parts with ``parts`` because its normal has turned. Loads take that back in all of what is left:
+    in a part of it they can take a part, and one that had to be closed at once would lose its load.
+    """
+    share = length / left
+    return (1.0 - share) * max(parts, 0.0) - share * (gap / left)
 
 
 @inner_kernel

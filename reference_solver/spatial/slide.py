@@ -7,6 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
+from reference_solver.planar.slide import closing_speed
 from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.impact import NOISE, clear_point, copy_twists, set_reference_speed
@@ -38,10 +39,11 @@ def press(
     options: Options,
     tally: Array,
     length: float,
+    left: float,
     struck: bool,
     held: bool,
 ) -> None:
-    """Velocities at the end of a sub-step of ``length``: from ``first`` to ``twist`` (E20).
+    """Velocities at the end of a sub-step of ``length``, out of ``left``: from ``first`` to ``twist`` (E20).
 
     ``struck``: impacts came first, so that lasting contacts may part as well; ``held``: none does, by the fixed-step
     law (E28). v* is kept for the certificate.
@@ -60,8 +62,9 @@ def press(
                 continue
             for k in range(3):
                 manifolds.impulse[m, p, k] = length * manifolds.force[m, p, k] if options.warm_starting else 0.0
-            if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
-                manifolds.target[m, p] = -manifolds.gap[m, p] / length
+            gap = manifolds.gap[m, p] if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p) else 0.0
+            last = manifolds.lasts[m, p] == 1
+            manifolds.target[m, p] = closing_speed(gap, u[2] if last else 0.0, length, left if last else length)
     accelerate(bodies, length)
     copy_twists(bodies.twist, bodies.start)
     warm_start(bodies, manifolds, options)
@@ -110,7 +113,7 @@ def slip_left(manifolds: Manifolds, m: int, p: int, u: Vector) -> float:
     t1, t2 = manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1]
     whole = manifolds.friction[m] * manifolds.impulse[m, p, 2]
     along = u[0] * d1 + u[1] * d2
-    if along < 0.0:  # it turned round: along the old direction it would have gone on as it began
+    if along <= AT_END * manifolds.speed[m, p]:  # it stuck or turned: in the old direction it would have gone on
         return along - (whole + t1 * d1 + t2 * d2) * softness
     return math.sqrt(u[0] * u[0] + u[1] * u[1]) - (whole - math.sqrt(t1 * t1 + t2 * t2)) * softness
 
@@ -163,7 +166,7 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
-    press(bodies, manifolds, problem, options, tally, left, struck, held)
+    press(bodies, manifolds, problem, options, tally, left, left, struck, held)
     length = left
     for _ in range(STICK_SOLVES if options.friction and not held else 0):
         end = slip_end(bodies, manifolds, options, length)
@@ -171,5 +174,5 @@ def press_until_stick(
             break
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
-        press(bodies, manifolds, problem, options, tally, length, struck, held)
+        press(bodies, manifolds, problem, options, tally, length, left, struck, held)
     return length
