@@ -152,6 +152,8 @@ class EngineFacts:
     customary_dt: float
     quirks: tuple[Quirk, ...] = ()
     known_bad_versions: Mapping[str, str] = field(default_factory=dict)
+    #: Profiles that step differently, by name.
+    profile_schemes: Mapping[str, Scheme] = field(default_factory=dict)
 
 
 class Engine(ABC):
@@ -167,8 +169,8 @@ class Engine(ABC):
         return self.facts.name
 
     def scheme(self, profile: str) -> Scheme:
-        """How ``profile`` moves bodies: as the facts say, unless the engine has a profile that steps differently."""
-        return self.facts.scheme
+        """How ``profile`` moves bodies."""
+        return self.facts.profile_schemes.get(profile, self.facts.scheme)
 
     @abstractmethod
     def version(self) -> str:

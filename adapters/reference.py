@@ -3,8 +3,8 @@
     step:  detect at x  ->  sample u- = J v (before forces)  ->  v* = v + h M^-1 f  ->  sweep the contact rows
            (target -e u-, accumulated clamping, Coulomb with the current total)  ->  x += h v  ->  split impulses
 
-Two profiles on the same equations: ``classical`` makes a fixed number of sweeps, as textbooks do; ``reference``
-sweeps until the contact equations hold to a residual, and certifies it.
+Two profiles: ``classical`` makes a fixed number of sweeps, as textbooks do; ``reference`` solves the same contact
+equations to a residual and certifies them, in steps that are cut where bodies meet and where slides end.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ REASONS = {
     "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
 }
 
-#: The profile `reference` steps so; the engine's own scheme is the textbook's.
+#: Steps cut at events, with constant accelerations between them.
 LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
 
 
@@ -92,6 +92,7 @@ class ReferenceEngine(Engine):
         dimensions=frozenset({2, 3}),
         scheme=Scheme("detect, sample restitution, forces, solve, position", 1),
         customary_dt=1.0 / 60.0,
+        profile_schemes=MappingProxyType({"reference": LOCATED}),
         quirks=(
             Quirk(
                 "classical advances velocity before position: free fall from rest is ahead by g t dt / 2",
@@ -106,10 +107,6 @@ class ReferenceEngine(Engine):
         ),
     )
     profiles = MappingProxyType({"classical": classical_profile, "reference": reference_profile})
-
-    def scheme(self, profile: str) -> Scheme:
-        """Reference cuts its steps at events, with constant accelerations between them."""
-        return LOCATED if profile == "reference" else self.facts.scheme
 
     def version(self) -> str:
         """Package version and eight hex digits over the solver's sources.

@@ -107,7 +107,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "package": facts.package,
         "dimensions": sorted(facts.dimensions),
         "scheme": asdict(facts.scheme),
-        "schemes": {profile: asdict(found.engine.scheme(profile)) for profile in found.engine.profiles},
+        "profile_schemes": {profile: asdict(scheme) for profile, scheme in facts.profile_schemes.items()},
         "customary_dt": facts.customary_dt,
         "quirks": [asdict(quirk) for quirk in facts.quirks],
         "known_bad_versions": dict(facts.known_bad_versions),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import kernel
 from reference_solver.model import Array
 from reference_solver.planar.state import EVENTS, HELD, LEFT, PATIENCE, SOFT
 from reference_solver.tally import EVENTS_LOCATED, STEPS_HELD
@@ -16,7 +16,7 @@ MOST_SOFT = 16
 REBOUND = 0.25
 
 
-@inner_kernel
+@kernel
 def open_step(clock: Array, bodies: int, dt: float) -> None:
     """Start the clock of a step: half the patience after one that was held, twice as much after a calm one (E28).
 
@@ -34,13 +34,13 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
     clock[EVENTS] = clock[SOFT] = clock[HELD] = 0.0
 
 
-@inner_kernel
+@kernel
 def most_events(bodies: int) -> int:
     """Events that are located in one step."""
     return MOST_EVENTS + EVENTS_PER_BODY * bodies
 
 
-@inner_kernel
+@kernel
 def count_event(clock: Array, bodies: int, tally: Array) -> None:
     """Enter an event, as a soft one until its impact is weighed; too many of them, and the step is held from here."""
     clock[EVENTS] += 1.0
@@ -51,7 +51,7 @@ def count_event(clock: Array, bodies: int, tally: Array) -> None:
         tally[STEPS_HELD] += 1.0
 
 
-@inner_kernel
+@kernel
 def weigh_event(clock: Array, weight: float) -> None:
     """What led here turned out to be a soft rebound, or a hard impact (weight 0)."""
     clock[SOFT] = max(clock[SOFT] - (1.0 - weight), 0.0)

@@ -1,0 +1,139 @@
+"""Steps with more events than are located go on by the fixed-step law, certified and counted (E28)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.planar.clock import MOST_SOFT, count_event, most_events, open_step, weigh_event
+from reference_solver.planar.state import CLOCK_SIZE, EVENTS, HELD, LEFT, PATIENCE, SOFT
+from reference_solver.tally import EVENTS_LOCATED, STEPS_HELD, new_tally
+
+DT, G = 1.0 / 240.0, 9.81
+PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def half_space(normal, offset=0.0):
+    pose = PLACE if len(normal) == 3 else (0.0, 0.0, 0.0)
+    return Body(HalfSpace(normal, offset), motion="fixed", pose=pose)
+
+
+def tilted(dimension, rng, place, mass):
+    """A box at any angle."""
+    half = tuple(rng.uniform(0.2, 0.5, dimension))
+    if dimension == 2:
+        return Body(Box(half), mass, mass / 3.0 * (half[0] ** 2 + half[1] ** 2), (*place, rng.uniform(0.0, 3.0)))
+    turn = rng.normal(size=4)
+    moments = tuple(mass / 3.0 * (sum(h * h for h in half) - h * h) for h in half)
+    return Body(Box(half), mass, moments, (*place, *(turn / np.linalg.norm(turn))))
+
+
+def pile(dimension, seed, restitution):
+    """Six tilted boxes of any mass fall between walls."""
+    rng = np.random.default_rng(seed)
+    across = np.eye(dimension)[: dimension - 1]
+    fixed = [half_space(tuple(np.eye(dimension)[-1]))]
+    fixed += [half_space(tuple(sign * n), -1.5) for n in across for sign in (1.0, -1.0)]
+    boxes = []
+    for k in range(6):
+        place = (*rng.uniform(-0.8, 0.8, dimension - 1), 0.8 + 0.9 * k)
+        boxes.append(tilted(dimension, rng, place, 10.0 ** rng.uniform(-1.0, 1.0)))
+    gravity = (*(0.0,) * (dimension - 1), -G)
+    return Simulation(Model(dimension, [*fixed, *boxes], gravity, restitution, 0.5), Settings.reference(DT))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_jammed_piles_end_in_a_certified_answer(dimension, restitution):
+    """Each impact in a jam opens other contacts: without the bound on soft events a step has no end of them."""
+    simulation = pile(dimension, 1, restitution)
+    simulation.advance(360)
+    certificate = simulation.certificate
+    assert certificate["holds"], certificate["reasons"]
+    assert certificate["events"] > 100
+    assert 0 < certificate["held_steps"] < 360
+    lowest = simulation.pose[1 + 2 * (dimension - 1) :, dimension - 1].min()
+    assert lowest > 0.15  # nothing sinks into the floor: least half width .2
+
+
+def test_a_hard_impact_is_located_in_a_held_step_as_well():
+    """A ball that flies a hundred diameters a step bounces between walls while it shares the world with a pile."""
+    rng = np.random.default_rng(1)
+    bodies = [half_space((0.0, 1.0)), half_space((1.0, 0.0), -1.5), half_space((-1.0, 0.0), -1.5)]
+    for k in range(6):
+        place = (rng.uniform(-0.8, 0.8), 0.8 + 0.9 * k)
+        bodies.append(tilted(2, rng, place, 10.0 ** rng.uniform(-1.0, 1.0)))
+    speed, end = 480.0, 1.49
+    # A force carries its weight, so that it flies level, high above the pile.
+    ball = Body(Disc(0.01), 1.0, 5e-5, (0.0, 50.0, 0.0), (speed, 0.0, 0.0), force=(0.0, G))
+    restitution = np.zeros((len(bodies) + 1,) * 2)
+    restitution[-1, 1:3] = restitution[1:3, -1] = 1.0
+    simulation = Simulation(Model(2, [*bodies, ball], (0.0, -G), restitution, 0.0), Settings.reference(DT))
+    simulation.advance(480)
+    assert simulation.certificate["held_steps"] > 0
+    assert abs(simulation.twist[-1, 0]) == pytest.approx(speed, rel=1e-12)
+    unfolded = (speed * 480 * DT + end) % (4.0 * end)
+    assert simulation.pose[-1, 0] == pytest.approx(end - abs(unfolded - 2.0 * end), abs=1e-10)
+
+
+def test_patience_halves_after_a_held_step_and_comes_back_after_calm_ones():
+    clock, tally, bodies = np.zeros(CLOCK_SIZE), new_tally(), 4
+    open_step(clock, bodies, DT)
+    assert (clock[LEFT], clock[PATIENCE]) == (DT, MOST_SOFT + bodies)
+    for _ in range(MOST_SOFT + bodies):
+        count_event(clock, bodies, tally)
+    assert clock[HELD] == 0.0
+    count_event(clock, bodies, tally)
+    assert clock[HELD] == 1.0
+    assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (1.0, MOST_SOFT + bodies + 1)
+    open_step(clock, bodies, DT)
+    assert (clock[HELD], clock[PATIENCE], clock[EVENTS]) == (0.0, 0.5 * (MOST_SOFT + bodies), 0.0)
+    for _ in range(6):  # more than half of the ten: neither calm nor held
+        count_event(clock, bodies, tally)
+    open_step(clock, bodies, DT)
+    assert clock[PATIENCE] == 0.5 * (MOST_SOFT + bodies)
+    open_step(clock, bodies, DT)
+    assert clock[PATIENCE] == MOST_SOFT + bodies
+
+
+def test_hard_impacts_try_no_patience_but_have_a_bound():
+    clock, tally, bodies = np.zeros(CLOCK_SIZE), new_tally(), 1
+    open_step(clock, bodies, DT)
+    for k in range(most_events(bodies)):
+        assert clock[HELD] == 0.0, k
+        count_event(clock, bodies, tally)
+        weigh_event(clock, 0.0)
+        assert clock[SOFT] == 0.0
+    assert clock[HELD] == 1.0
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_corner_that_pivots_has_no_events(dimension):
+    """A leaning box that turns about a sticking corner: levers turn in each step, and that ends no slide."""
+    angle, half = 0.25, (0.5, 0.25)
+    low = half[0] * math.sin(angle) + half[1] * math.cos(angle)
+    if dimension == 2:
+        box = Body(Box(half), 1.0, (half[0] ** 2 + half[1] ** 2) / 3.0, (0.0, low, angle))
+    else:
+        turn = (math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0)
+        box = Body(Box((half[0], half[0], half[1])), 1.0, (0.1, 0.2, 0.1), (0.0, 0.0, low, *turn))
+    gravity = (*(0.0,) * (dimension - 1), -G)
+    floor = half_space(tuple(np.eye(dimension)[-1]))
+    simulation = Simulation(Model(dimension, [floor, box], gravity, 0.0, 2.0), Settings.reference(DT))
+    simulation.advance(25)
+    assert simulation.certificate["holds"], simulation.certificate["reasons"]
+    assert abs(simulation.twist[1, -1 if dimension == 2 else 4]) > 0.5  # it does turn
+    assert simulation.certificate["events"] == 0
+
+
+def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
+    """Three contacts at once, e = 0: no chatter, no held step."""
+    planes = [half_space(tuple(np.eye(3)[k])) for k in range(3)]
+    ball = Body(Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.6, 0.7, 0.8, 1.0, 0.0, 0.0, 0.0))
+    simulation = Simulation(Model(3, [*planes, ball], (-3.0, -4.0, -5.0), 0.0, 0.0), Settings.reference(DT))
+    simulation.advance(240)
+    assert simulation.pose[-1, :3] == pytest.approx([0.5, 0.5, 0.5], abs=1e-13)
+    assert np.abs(simulation.twist[-1]).max() <= 1e-15
+    assert simulation.certificate["held_steps"] == 0
+    assert simulation.certificate["events"] == 3
