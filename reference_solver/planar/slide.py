@@ -44,6 +44,9 @@ SHORTER = 0.9
 STUCK = 1.0 - 1e-9
 #: Relative accuracy of that instant: some ten units in the last place.
 SAME_TIME = 1e-14
+#: A length at which a row sticks is the end of its slide if one shorter by no more than this share, at which it still
+#: slipped, told it: such a step converges quadratically, and what is left of its error is the square.
+CLOSE = 1e-6
 
 
 @inner_kernel
@@ -170,11 +173,14 @@ def press_until_stick(
     press(bodies, rows, problem, sub, options, tally, left, struck)
     if not options.friction or sub.clock[HELD] > 0.0:
         return left
-    length = left
+    length, slipped = left, 0.0
     for _ in range(STICK_SOLVES):
         end = slip_end(bodies, rows, length)
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break
+        if end < length and length - slipped <= CLOSE * length:
+            break
+        slipped = max(slipped, length) if end > length else slipped
         # What a row that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
         go_back(tally, sub.tally[1])

@@ -29,6 +29,9 @@ AT_END = 1e-13
 STUCK = 1.0 - 1e-9
 #: Relative accuracy of that instant: some ten units in the last place.
 SAME_TIME = 1e-14
+#: A length at which a point sticks is the end of its slide if one shorter by no more than this share, at which it still
+#: slipped, told it: such a step converges quadratically, and what is left of its error is the square.
+CLOSE = 1e-6
 
 
 @spliced_kernel
@@ -167,11 +170,14 @@ def press_until_stick(
         copy_twists(bodies.twist, bodies.start)
         return left
     press(bodies, manifolds, problem, options, tally, left, left, struck, held)
-    length = left
+    length, slipped = left, 0.0
     for _ in range(STICK_SOLVES if options.friction and not held else 0):
         end = slip_end(bodies, manifolds, options, length)
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break
+        if end < length and length - slipped <= CLOSE * length:
+            break
+        slipped = max(slipped, length) if end > length else slipped
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
         press(bodies, manifolds, problem, options, tally, length, left, struck, held)
