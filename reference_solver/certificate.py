@@ -51,6 +51,7 @@ def summary(tally: Array) -> dict[str, Any]:
         "converged": bool(tally[entries.UNCONVERGED] == 0.0),
         "projected": float(tally[entries.PROJECTED]),
         "solves": int(tally[entries.SOLVES]),
+        "unique": int(tally[entries.UNIQUE]),
         "direct": int(tally[entries.DIRECT]),
         "factorisations": int(tally[entries.FACTORISATIONS]),
         "events": int(tally[entries.EVENTS_LOCATED]),

@@ -46,8 +46,10 @@ EVENTS_LOCATED = 22
 STEPS_HELD = 23
 #: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
 RELEASED_SPEED = 24
+#: Contact solves whose velocities are proven to be the only answer (E66).
+UNIQUE = 25
 
-SIZE = 25
+SIZE = 26
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (
@@ -63,6 +65,7 @@ SUMS = (
     FACTORISATIONS,
     EVENTS_LOCATED,
     STEPS_HELD,
+    UNIQUE,
 )
 
 

@@ -14,6 +14,7 @@ from reference_solver.model import Array
 from reference_solver.planar.columns import (
     ARM_A,
     ARM_B,
+    COUPLING,
     EXTENT,
     FRICTION,
     GAP,
@@ -57,6 +58,7 @@ from reference_solver.tally import (
     PUMPED,
     SOLVES,
     SURFACE_WORK,
+    UNIQUE,
 )
 
 #: Created energy up to this share of a solve's work is round-off of its impulses: 1e4 units in the last place, what
@@ -99,7 +101,31 @@ def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     enter_creation(work, effort, restored, tally)
     gained, size = kinetic_change(bodies)
     enter_share(tally, ENERGY, abs(gained - work - surface), effort + size)
+    tally[UNIQUE] += 1.0 if is_unique(bodies, rows, options) else 0.0
     check_momentum(bodies, rows, options, tally)
+
+
+@inner_kernel
+def is_unique(bodies: Bodies, rows: Rows, options: Options) -> bool:
+    """Whether the velocities are proven to be the only answer (E66); uses up ``pressed``."""
+    if not options.friction:
+        return True
+    for i in range(len(bodies.kind)):
+        bodies.pressed[i, 0] = 0.0
+    for c in range(rows.counts[CONTACTS]):
+        bodies.pressed[rows.integer[c, A], 0] += 1.0
+        bodies.pressed[rows.integer[c, B], 0] += 1.0
+    for c in range(rows.counts[CONTACTS]):
+        mu = rows.real[c, FRICTION]
+        if mu == 0.0:
+            continue
+        for side in range(2):
+            i = rows.integer[c, A + side]
+            if bodies.kind[i, MOTION] == FREE and bodies.pressed[i, 0] > 1.0:
+                return False
+        if mu * abs(rows.real[c, COUPLING]) * rows.real[c, NORMAL_MASS] >= 1.0:
+            return False
+    return True
 
 
 @inner_kernel

@@ -43,7 +43,11 @@ from reference_solver.tally import (
     PULL,
     SOLVES,
     SURFACE_WORK,
+    UNIQUE,
 )
+
+#: Normal and tangential response of a contact are coupled above this share: below is the round-off of its levers.
+COUPLED = 1e-12
 
 
 @kernel
@@ -84,7 +88,30 @@ def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array
     enter_creation(work, effort, restored, tally)
     gained, size = kinetic_change(bodies)
     enter_share(tally, ENERGY, abs(gained - work - surface), effort + size)
+    tally[UNIQUE] += 1.0 if is_unique(bodies, manifolds) else 0.0
     check_momentum(bodies, manifolds, options, tally)
+
+
+@inner_kernel
+def is_unique(bodies: Bodies, manifolds: Manifolds) -> bool:
+    """Whether the velocities are proven to be the only answer (E66); uses up ``pressed``."""
+    for i in range(len(bodies)):
+        bodies.pressed[i, 0] = 0.0
+    for m in range(len(manifolds)):
+        bodies.pressed[manifolds.body_a[m], 0] += manifolds.points[m]
+        bodies.pressed[manifolds.body_b[m], 0] += manifolds.points[m]
+    for m in range(len(manifolds)):
+        if manifolds.friction[m] == 0.0:
+            continue
+        a, b = manifolds.body_a[m], manifolds.body_b[m]
+        if bodies.motion[a] == FREE and bodies.pressed[a, 0] > 1.0:
+            return False
+        if bodies.motion[b] == FREE and bodies.pressed[b, 0] > 1.0:
+            return False
+        k = manifolds.matrix[m, 0]
+        if max(abs(k[2]), abs(k[4])) > COUPLED * k[5]:
+            return False
+    return True
 
 
 @inner_kernel

@@ -1,0 +1,61 @@
+"""What the certificate counts as unique is: enumeration finds one answer (E66)."""
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.exact_contact import coulomb_solutions
+
+DT, G = 1.0 / 240.0, 9.81
+
+
+def test_a_planar_contact_below_the_bound_has_one_answer():
+    """Random W, q and friction up to the bound mu |k_nt| = k_n: never none, never two."""
+    rng = np.random.default_rng(66)
+    for _ in range(2000):
+        root = rng.normal(size=(2, 2))
+        matrix = root @ root.T + 1e-3 * np.eye(2)
+        mu = rng.uniform(0.0, 0.999) * matrix[0, 0] / abs(matrix[0, 1])
+        found = coulomb_solutions(matrix, rng.normal(size=2), [mu])
+        assert len(found) == 1
+
+
+def floor(dimension):
+    normal = (0.0,) * (dimension - 1) + (1.0,)
+    pose = (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    return Body(HalfSpace(normal), motion="fixed", pose=pose)
+
+
+def round_body(dimension, x):
+    if dimension == 2:
+        return Body(Disc(0.5), 1.0, 0.125, (x, 0.5, 0.0), (1.0, 0.0, 0.0))
+    return Body(Sphere(0.5), 1.0, (0.1,) * 3, (x, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0), (1.0, 0.2, 0.0, 0.0, 0.0, 0.0))
+
+
+def box(dimension, x):
+    if dimension == 2:
+        return Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (x, 0.5, 0.0), (1.0, 0.0, 0.0))
+    twist = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Body(Box((0.5,) * 3), 1.0, (1.0 / 6.0,) * 3, (x, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0), twist)
+
+
+def certificate(dimension, bodies, friction, profile):
+    gravity = (0.0,) * (dimension - 1) + (-G,)
+    simulation = Simulation(Model(dimension, [floor(dimension), *bodies], gravity, 0.0, friction), profile(DT))
+    simulation.advance(5)
+    return simulation.certificate
+
+
+@pytest.mark.parametrize("profile", [Settings.fixed_step, Settings.reference])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_separate_round_bodies_and_smooth_boxes_have_one_answer(dimension, profile):
+    balls = [round_body(dimension, x) for x in (0.0, 3.0)]
+    for bodies, friction in ((balls, 0.4), ([box(dimension, 0.0)], 0.0), (balls[:1], 5.0)):
+        found = certificate(dimension, bodies, friction, profile)
+        assert found["unique"] == found["solves"] > 0
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_box_on_several_rough_points_is_not_proven(dimension):
+    found = certificate(dimension, [box(dimension, 0.0)], 0.4, Settings.reference)
+    assert found["unique"] == 0 < found["solves"]
