@@ -2,11 +2,22 @@
 
 import pytest
 
-from reference_solver.certification import Gate, columns, friction, impact, rotation
+from reference_solver.certification import Gate, columns, conservation, friction, impact, rotation
 from reference_solver.certification.space import SPACES
 
 IN_BOTH = [
     (impact.single_rebound, "classical"),
+    (impact.single_rebound, "reference"),
+    (impact.apexes,),
+    (impact.rest_time,),
+    (impact.elastic_bounces,),
+    (impact.closing_wall,),
+    (impact.thin_wall,),
+    (friction.stopping,),
+    (friction.time_to_roll,),
+    (conservation.free_collisions,),
+    (columns.heavy_on_light, 1e6, 1e-8),
+    (columns.alternating, 1e6, 1e-8),
     (impact.flat_rebound,),
     (impact.deep_overlap,),
     (impact.turning_box,),
@@ -28,7 +39,6 @@ ALONE = [
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    (columns.heavy_on_light, SPACES[1], 1e6, 1e-8),
 ]
 
 
