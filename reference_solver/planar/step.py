@@ -14,6 +14,7 @@ from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
 from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import prepare, warm_start
@@ -95,10 +96,8 @@ def run_steps(
 @inner_kernel
 def sample(bodies: Bodies, rows: Rows, buffer: Buffer, s: int) -> None:
     """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    for i in range(len(bodies.kind)):
-        for k in range(3):
-            buffer.pose[s, i, k] = bodies.pose[i, k]
-            buffer.twist[s, i, k] = bodies.twist[i, k]
+    copy_vectors(bodies.pose, buffer.pose[s])
+    copy_vectors(bodies.twist, buffer.twist[s])
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:

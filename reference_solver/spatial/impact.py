@@ -5,6 +5,18 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
+from reference_solver.planar.impact import (
+    BOUNCES,
+    LANDED,
+    NO_IMPACT,
+    NOISE,
+    OPEN_ENDED,
+    REBOUNDED,
+    RELEASED,
+    SERIES_ENDS,
+    STRUCK,
+    TURNED,
+)
 from reference_solver.planar.rows import SPEED_SHARE
 from reference_solver.planar.state import LEFT, Options
 from reference_solver.spatial.certificate import certify, open_solve
@@ -16,17 +28,6 @@ from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, length, row
 from reference_solver.tally import RELEASED_SPEED
-
-#: Velocities below this share of a contact's reference speed are round-off of the solve, whose residual is 1e-13 of it.
-NOISE = 1e-11
-#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
-#: sub-step and released there.
-OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step with
-#: e = 0, such with e > 0, faster ones.
-NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
-#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
-BOUNCES = 32
 
 
 @inner_kernel

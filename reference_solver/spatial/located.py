@@ -11,18 +11,11 @@ from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
+from reference_solver.planar.impact import LANDED, NO_IMPACT, REBOUNDED
+from reference_solver.planar.located import NOTHING_LEFT, SERIES_PASSES, SHORT
 from reference_solver.planar.state import EVENTS, HELD, LEFT, Options
 from reference_solver.spatial.certificate import open_solve, point_work
-from reference_solver.spatial.impact import (
-    LANDED,
-    NO_IMPACT,
-    REBOUNDED,
-    carries,
-    collide_now,
-    copy_twists,
-    end_series,
-    release,
-)
+from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
@@ -40,6 +33,7 @@ from reference_solver.spatial.state import (
     Memory,
     SubStep,
 )
+from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
@@ -51,13 +45,6 @@ from reference_solver.tally import (
     UNCONVERGED,
     WORST_SWEEPS,
 )
-
-#: What is left of a step below this share of it is nothing.
-NOTHING_LEFT = 1e-14
-#: A sub-step shorter than this share of a step tells nothing about forces.
-SHORT = 1e-3
-#: Passes that mark ending series of rebounds; each marks at least one point more.
-SERIES_PASSES = 4
 
 
 @spliced_kernel
@@ -240,11 +227,7 @@ def run_located(
 @inner_kernel
 def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
     """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    for i in range(len(bodies)):
-        for d in range(7):
-            buffer.pose[s, i, d] = bodies.pose[i, d]
-        for d in range(6):
-            buffer.twist[s, i, d] = bodies.twist[i, d]
+    sample_state(bodies, buffer, s)
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:

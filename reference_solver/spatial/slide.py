@@ -7,10 +7,11 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.slide import closing_speed
+from reference_solver.planar.impact import NOISE
+from reference_solver.planar.slide import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
 from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.impact import NOISE, clear_point, copy_twists, set_reference_speed
+from reference_solver.spatial.impact import clear_point, copy_twists, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
@@ -19,19 +20,8 @@ from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
 
-#: Solves in search of the end of a slide; where contacts keep their modes the second is exact.
-STICK_SOLVES = 30
-#: Share of the end told by a point that stuck which is tried next, to be on the slipping side of it.
-SHORTER = 0.9
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.
 AT_END = 1e-13
-#: Friction below this share of its limit sticks.
-STUCK = 1.0 - 1e-9
-#: Relative accuracy of that instant: some ten units in the last place.
-SAME_TIME = 1e-14
-#: A length at which a point sticks is the end of its slide if one shorter by no more than this share, at which it still
-#: slipped, told it: such a step converges quadratically, and what is left of its error is the square.
-CLOSE = 1e-6
 
 
 @spliced_kernel

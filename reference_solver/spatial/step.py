@@ -84,13 +84,19 @@ def run_steps(
 
 
 @inner_kernel
-def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+def sample_state(bodies: Bodies, buffer: Buffer, s: int) -> None:
+    """Write poses and twists as sample s."""
     for i in range(len(bodies)):
         for d in range(7):
             buffer.pose[s, i, d] = bodies.pose[i, d]
         for d in range(6):
             buffer.twist[s, i, d] = bodies.twist[i, d]
+
+
+@inner_kernel
+def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None:
+    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+    sample_state(bodies, buffer, s)
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.planar.impact import LATE
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF
 from reference_solver.planar.state import HELD, LEFT, Options
 from reference_solver.spatial.broadphase import find_candidates
@@ -13,10 +14,6 @@ from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
-
-#: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
-#: the time of impact.
-LATE = 1e-15
 
 
 @inner_kernel

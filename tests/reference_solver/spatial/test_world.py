@@ -53,19 +53,20 @@ SCENES = {
 }
 
 
-#: Steps compared. The discs are left at the end of a slide on a round contact (step 240), which the planar solver
-#: locates and the spatial one does not: an open defect.
-STEPS = {"discs on each other": 239}
+#: The slide on a round contact that ends in step 240 is located by the planar solver and not by the spatial one.
+OPEN_DEFECT = pytest.param("discs on each other", 360, marks=pytest.mark.xfail(strict=True, reason="slide not located"))
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_a_lifted_planar_scene_moves_as_in_the_plane(scene):
+@pytest.mark.parametrize(
+    ("scene", "steps"), [(name, 239 if name == "discs on each other" else 360) for name in SCENES] + [OPEN_DEFECT]
+)
+def test_a_lifted_planar_scene_moves_as_in_the_plane(scene, steps):
     bodies, restitution, friction, tolerance = SCENES[scene]
     bodies = [floor(), *bodies]
     settings = Settings.reference(1 / 240)
-    plane = Simulation(Model(2, bodies, (0.0, -G), restitution, friction), settings).record(STEPS.get(scene, 360))
+    plane = Simulation(Model(2, bodies, (0.0, -G), restitution, friction), settings).record(steps)
     model = Model(3, [lifted(body) for body in bodies], (0.0, 0.0, -G), restitution, friction)
-    space = Simulation(model, settings).record(STEPS.get(scene, 360))
+    space = Simulation(model, settings).record(steps)
     in_plane = np.stack([space.twist[..., 0], space.twist[..., 2], -space.twist[..., 4]], axis=-1)
     assert np.abs(in_plane - plane.twist).max() <= tolerance
     assert np.abs(space.pose[..., [0, 2]] - plane.pose[..., :2]).max() <= tolerance
