@@ -115,8 +115,8 @@ def limit_of(
     """Order, verdict and reason from errors at descending steps.
 
     Errors at or below ``floor`` are round-off and carry no order. Falling to round-off is convergence only if the
-    errors fell on the way (a rise by more than `LEVEL` is noise). If the finest step alone is there, the fall to it must
-    be one that an order of at most `HIGHEST_ORDER` makes: else it may be a lucky phase.
+    errors fell on the way (a rise by more than `LEVEL` is noise). If the finest step alone is there, the fall to it
+    must be one that an order of at most `HIGHEST_ORDER` makes: else it may be a lucky phase.
     """
     if not errors:
         return None, Limit.NOISY, "no step has a measured error"

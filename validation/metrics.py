@@ -69,7 +69,7 @@ def mean_rate(t: Array, value: Array) -> Measured:
     return float((value[-1] - value[middle]) / (t[-1] - t[middle])), ""
 
 
-def _reach(shape: object) -> float:
+def reach(shape: object) -> float:
     """Distance of a shape's outermost point from its centre [m]: turns spin into a speed."""
     if isinstance(shape, Disc | Sphere):
         return shape.radius
@@ -87,7 +87,7 @@ def body_speeds(scene: Scene, trajectory: Trajectory) -> Array:
     free = free_bodies(scene)
     linear = np.linalg.norm(trajectory.twist[:, free, :d], axis=2)
     angular = np.linalg.norm(trajectory.twist[:, free, d:], axis=2)
-    return linear + angular * np.array([_reach(scene.bodies[i].shape) for i in free])
+    return linear + angular * np.array([reach(scene.bodies[i].shape) for i in free])
 
 
 def kinetic_energy(scene: Scene, trajectory: Trajectory) -> Array:

@@ -14,7 +14,7 @@ from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot
 from validation.deviations import covering
 from validation.findings import finding_of, listed, reason_for, row_key
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 from validation.studies import STUDIES, StudyResult
 from validation.verdicts import Physics, Prediction, Standing, Verdict, judge, judge_physics, predicted
 
@@ -135,7 +135,7 @@ def _verdict_of_outcome(observation: Observation, check: Check) -> Verdict:
         standing = Standing.KNOWN if finding else (Standing.NEW if has_list else None)
         reason = f"{observation.reason}; {finding.reason.text}" if finding else observation.reason
         return Verdict(Physics.FAIL, standing, reason)
-    if observation.outcome is Outcome.UNSUPPORTED and has_list:
+    if observation.outcome is Outcome.UNSUPPORTED and has_list and not is_file(slot.scene):
         expected = reason_for(slot.engine, row_key(slot, check.metric), unsupported=True)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)

@@ -76,8 +76,8 @@ def _growth_check(height: float, g: float, dt: float) -> Check:
 
     The semi-implicit step keeps ``H = v^2/2 + g y - s g v dt/2`` in flight, s = +1 velocity first, -1 position first; a
     mid-point step has s = 0. An impact replaces the velocity -|v| that its step began with by e |v|, in the place of
-    gravity; the body then moves by e |v| dt (s = +1), by -|v| dt (s = -1, with the old velocity) or by the mean (s = 0).
-    At any height y, so however late or early the contact was found,
+    gravity; the body then moves by e |v| dt (s = +1), by -|v| dt (s = -1, with the old velocity) or by the mean
+    (s = 0). At any height y, so however late or early the contact was found,
 
         H after - H before  =  -(1 - e^2) v^2/2 - (1 - e) g |v| dt/2  <=  0,   and 0 for e = 1.
 

@@ -12,8 +12,8 @@ DTS = (1 / 60, 1 / 240, 1 / 1000)
 def reflected(scene, dt, scheme, restitute_gravity=False):
     """Independent scalar stepper of a bouncing ball at e = 1: heights and velocities of a whole run.
 
-    ``scheme`` orders one step: velocity first, position first, or the mid-point rule. The impact takes the velocity that
-    the step began with; a wrong engine (``restitute_gravity``) takes the one after gravity.
+    ``scheme`` orders one step: velocity first, position first, or the mid-point rule. The impact takes the velocity
+    that the step began with; a wrong engine (``restitute_gravity``) takes the one after gravity.
     """
     e, g, y, v = scene.params["e"], scene.params["g"], scene.params["height"], 0.0
     rows = [(y, v)]
