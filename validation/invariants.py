@@ -118,10 +118,7 @@ def energy_bound(scene: Scene, dt: float) -> float:
 def deepest(scene: Scene, trajectory: Trajectory) -> tuple[Measured, Measured]:
     """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m]."""
     beyond, depth = 0.0, 0.0
-    for (i, j), gap in metrics.separations(scene, trajectory).items():
-        overlap = np.maximum(0.0, -gap)
-        if not overlap.any():
-            continue
+    for (i, j), overlap in metrics.overlaps(scene, trajectory).items():
         depth = max(depth, float(overlap.max()))
         granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j))
         beyond = max(beyond, float((overlap - granted).max()))

@@ -7,8 +7,8 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Scene
 from adapters.trajectory import Trajectory
+from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
-from validation.geometry import rotation
 from validation.metrics import UNAVAILABLE
 from validation.scene_format import parts_of
 

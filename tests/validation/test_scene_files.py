@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,8 @@ pose = [0.0, 1.0, 0.0]
 restitution = 0.5
 friction = 0.3
 """
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def read(tmp_path, text, name="scene.toml"):
@@ -214,3 +217,16 @@ def test_what_an_engine_refuses_is_unsupported_in_one_line_and_no_alarm(tmp_path
     rows = rows_of("run", [refused])
     assert rows and not any(row.alarming for row in rows)
     assert list(refusals([row.as_dict() for row in rows])) == [f"UNSUPPORTED: chipmunk {path}: chipmunk is planar"]
+
+
+def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
+    canonical = stated(tmp_path, text)
+    scene = canonical.scene(2)
+    ramp, box = scene.bodies
+    height = float(np.dot(ramp.shape.normal, box.pose[:2])) - box.shape.half_extents[0]
+    assert height == pytest.approx(0.0, abs=1e-15)  # it touches the ramp
+    (check,) = (check for check in canonical.checks(scene, 1 / 240) if "[[checks]]" in check.source)
+    slide = 9.81 * (math.sin(0.3) - 0.1 * math.cos(0.3))
+    assert check.truth == pytest.approx(math.cos(0.3) * slide * scene.duration, abs=5e-4)
+    assert len(canonical.notes) == 2
