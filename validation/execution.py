@@ -13,7 +13,7 @@ from adapters.receipts import receipts
 from adapters.registry import find
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
-from validation.cells import Observation, Outcome, Prepared, Slot, prepare
+from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
 
 
 def execute(slot: Slot, keep: Path | None = None) -> Observation:
@@ -47,10 +47,11 @@ def execute(slot: Slot, keep: Path | None = None) -> Observation:
 def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path | None) -> Observation:
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
-    settings = engine.settings(slot.profile, wanted, slot.dt, slot.iterations)
+    settings = settings_of(engine, slot, scene)
     shown = tuple(asdict(setting) for setting in settings)
     try:
-        slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # What a profile declares holds for its own settings; an experiment with others is about what they change.
+        slips = () if slot.switched else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if keep is not None and sampling.stride == 1:  # what is kept is looked at: with its contacts, from the start
