@@ -78,6 +78,22 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stack-sweeps", "tuned", "interface_impulse[5]", 1),
         )
     ),
+    *(
+        Experiment(
+            "incline-contact-switching",
+            "without drag and with a wider margin the box slides right; without drag alone it does not, nor with the "
+            "wider margin alone, which leaves the drag's law",
+            "default",
+            "incline",
+            "acceleration",
+            _NO_DRAG | {"contactBreakingThreshold": margin},
+            {"ratio": 2.0},
+            dimension=dimension,
+            idle=(_NO_DRAG, {"contactBreakingThreshold": margin}, {**_NO_DRAG, "solverResidualThreshold": 0.0}),
+        )
+        for margin in (0.1, 0.001)
+        for dimension in (2, 3)
+    ),
     Experiment(
         "bounce-interval-blurred",
         "without speculative contacts the intervals of the apexes are right; drag does not matter to them",
