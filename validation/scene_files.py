@@ -7,9 +7,7 @@ energy never grows, bodies do not overlap deeper than one step of motion.
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,10 +15,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from adapters.needs import needs
+from adapters.plain import one_line
 from adapters.scene import Scene, SceneError, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
 from validation import metrics
 from validation.canonical import CanonicalScene, Check, Measured
+from validation.scene_text import parsed, read_text, said
 
 
 class _Strict(BaseModel):
@@ -105,31 +105,30 @@ def load_scene(path: Path) -> Scene:
     SceneError
         One line that names the file and every field that is wrong.
     """
+    return scene_from_text(read_text(path), path)
+
+
+def scene_from_text(text: str, path: Path) -> Scene:
+    """Check the text of the scene file that lies, or lay, at ``path``; raises as `load_scene`."""
+    shown = one_line(path)
     try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
-    except OSError as error:
-        raise SceneError(f"scene: cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene: {path} is not valid {path.suffix[1:].upper()}: {error}") from None
-    try:
-        model = SceneModel.model_validate(data)
+        model = SceneModel.model_validate(parsed(text, path))
     except ValidationError as errors:
-        found = "; ".join(f"{_path(e['loc'])}: {e['msg']}" for e in errors.errors())
-        raise SceneError(f"{path}: {found}") from None
+        raise SceneError(f"{shown}: {said(errors)}") from None
     try:
         return scene_from_dict(model.model_dump())
     except SceneError as error:
-        raise SceneError(f"{path}: {error}") from None
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) or "file"
+        raise SceneError(f"{shown}: {one_line(error)}") from None
 
 
 def canonical_from_file(path: Path) -> CanonicalScene:
     """Wrap a scene file so that it runs like a scene of the catalogue."""
-    scene = load_scene(path)
+    return canonical_from_text(read_text(path), path)
+
+
+def canonical_from_text(text: str, path: Path) -> CanonicalScene:
+    """Wrap the text of the scene file that lies, or lay, at ``path``; raises as `load_scene`."""
+    scene = scene_from_text(text, path)
     return CanonicalScene(
         scene.name,
         scene.version,
