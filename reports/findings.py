@@ -9,9 +9,9 @@ from typing import Any
 from reports.wording import LABELS, mark_of, number, params_text, reproduce
 
 #: Marks that make the command exit with 1.
-ALARMING = ("crashed", "timed_out", "invalid", "new", "drifted")
+ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
 #: Marks in the order in which findings are printed.
-ORDER = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained")
+ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
 
 def finding_line(row: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from reports.findings import ALARMING
 from reports.wording import LABELS, MARKS, mark_of
 
 #: Colours support the words, they never replace them.
@@ -86,7 +87,7 @@ def table_of(matrix: Matrix, versions: Mapping[str, str]) -> Table:
 def _styled(field: Field | None) -> Text:
     if field is None:
         return Text("")
-    alarming = field.mark in ("crashed", "timed_out", "invalid", "new", "drifted")
+    alarming = field.mark in ALARMING
     return Text(field.text, style=ALARM if alarming else STYLES.get(field.mark, ""))
 
 

@@ -28,6 +28,8 @@ FILE = "results.sqlite"
 VERSION = 1
 #: Seconds that a process waits for another one that writes.
 PATIENCE = 30.0
+#: Runs from moved starts, for the scatter of what another run found; never the latest run.
+SCATTER_TITLE = "scatter of "
 _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS runs (
     id TEXT PRIMARY KEY, date TEXT NOT NULL, commit_hash TEXT NOT NULL, machine TEXT NOT NULL,
@@ -80,7 +82,9 @@ class Store:
     folder
         Made if it does not exist. The store's file itself may be named instead.
     create
-        False: results are only read, and must be there; nothing is written beside them.
+        False: results must be there.
+    write
+        Whether anything is written; by default only where results may be made. Without, not even a file beside them.
 
     Raises
     ------
@@ -90,12 +94,13 @@ class Store:
         If the folder or its file cannot be used, or is of a later version than this one.
     """
 
-    def __init__(self, folder: Path, create: bool = True) -> None:
+    def __init__(self, folder: Path, create: bool = True, write: bool | None = None) -> None:
+        write = create if write is None else write
         self.path = folder if folder.is_file() else folder / FILE
         if not create and not self.path.exists():
             raise MissingError(f"out: there are no results at {self.path}")
         with self._guarded("use"):
-            if create:
+            if write:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self._db = _patiently(lambda: _opened(self.path))
             else:
@@ -105,7 +110,7 @@ class Store:
             self._db.close()
             raise StoreError(f"out: {self.path} is of version {version}, made by a later release; this one reads up "
                              f"to {VERSION}")  # fmt: skip
-        if create and version < VERSION:
+        if write and version < VERSION:
             with self._guarded("use"):
                 _patiently(self._make_tables)
 
@@ -193,19 +198,18 @@ class Store:
         return [self.run(run_id) for (run_id,) in ids]
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run; the latest is a bench only if there is nothing else.
+        """Return one run; the latest is a bench or a scatter only if there is nothing else.
 
         Raises
         ------
         MissingError
             If there is none of that name.
         """
-        where, args = (
-            ("id = ?", (run_id,)) if run_id != "latest" else ("1 ORDER BY title LIKE 'bench %', rowid DESC LIMIT 1", ())
-        )
+        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ?, rowid DESC LIMIT 1"
+        where, args = ("id = ?", run_id) if run_id != "latest" else (last, f"{SCATTER_TITLE}%")
         columns = "id, date, commit_hash, machine, title, plan, finished"
         with self._guarded("read"):
-            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
+            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", (args,)).fetchone()
             known = [str(r[0]) for r in self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20")]
             if row is None:
                 said = one_line(", ".join(known) or "none")

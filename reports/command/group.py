@@ -15,11 +15,12 @@ from adapters.isolation import IsolationError
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports.command import statuses
+from validation.findings import FindingsError
 from validation.store import MissingError, StoreError
 from validation.workers import LimitError
 
 #: Everything a wrong call can raise; the command turns each into one line and exit code 2.
-WRONG_CALL = (SceneError, EngineError, MissingError)
+WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
 #: What the machine refuses: a process, its memory.
 TOO_LITTLE = (LimitError, IsolationError)
 OUT = click.option("--out", default="crosscheck-out", show_default=True, type=Path, help="Folder for results.")

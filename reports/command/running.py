@@ -11,7 +11,6 @@ from typing import Any
 import click
 from rich.console import Console
 
-from adapters import registry
 from adapters.engine import EngineError
 from adapters.plain import one_line
 from adapters.scene import SceneError
@@ -19,10 +18,9 @@ from reports import exports
 from reports.command import statuses
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
-from reports.findings import finding_line, lines
+from reports.findings import lines
 from reports.matrix import legend, matrix_of, table_of, versions_of
 from reports.progress import run_plan
-from validation.acceptance import accept as write_findings
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import pinned
@@ -46,8 +44,8 @@ from validation.workers import TIMEOUT, run_cells
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run SCENES (names, globs or files; all by default) and judge them.
 
-    Exits with 1 if a row is new, drifted, INVALID, CRASHED or TIMED OUT, with 2 if the call is wrong, with 4 if not
-    all of it ran.
+    Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
+    if not all of it ran.
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
@@ -62,7 +60,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done))
+    rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     _show(rows, out, as_json, console, options)
     absent = missing(options["engine"])
@@ -139,23 +137,3 @@ def _slot(text: str) -> Slot:
     slot = replace(slot, scene=pinned(slot.scene))
     prepare(slot)
     return slot
-
-
-@main.command()
-@click.argument("run", default="latest")
-@click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
-@OUT
-def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
-    """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
-
-    Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
-    listed to be shown, not to be hidden.
-    """
-    for name in engine:
-        registry.find(name)
-    counts, unexplained = write_findings(exports.load_rows(out, run), engine)
-    for name, count in counts.items():
-        click.echo(f"{name}: {count} rows listed")
-    for row in unexplained:
-        click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
-    sys.exit(1 if unexplained else 0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 #: Everything that was asked for ran, and nothing of it is alarming.
 FINE = 0
-#: A verdict: rows that are new, drifted, INVALID, CRASHED or TIMED OUT; a regression; a check that does not hold.
+#: A verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a check that does not hold.
 ALARM = 1
 #: The call is wrong: an unknown name, a value out of range, a scene file that is not valid. Nothing has run.
 WRONG_CALL = 2
@@ -21,7 +21,7 @@ INTERRUPTED = 130
 #: Status -> what it says, as the README has it.
 MEANING = {
     FINE: "everything asked for ran, nothing is alarming",
-    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED or TIMED OUT; a regression; a check that does not hold",
+    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check",
     WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
     RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
     INCOMPLETE: "not everything asked for ran: named engine missing, cells left after time-outs, too little memory",
