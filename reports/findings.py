@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from reports.wording import LABELS, mark_of, number, params_text, reproduce
+from validation.posed import is_file
 
 #: Marks that make the command exit with 1.
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
@@ -58,6 +59,15 @@ def lines(rows: Sequence[Mapping[str, Any]], most: int | None) -> Iterator[str]:
             for row in worst[:most]:
                 rest = 0 if most is None else len(family) - most
                 yield finding_line(row) + (f" (and {rest} more like it)" if rest > 0 else "")
+
+
+def refusals(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """One line per engine and scene file that it cannot run, with its reason: no fault of either."""
+    found: dict[tuple[Any, ...], None] = {}
+    for row in rows:
+        if row["outcome"] == "unsupported" and is_file(row["scene"]):
+            found[row["engine"], row["scene"], row["reason"]] = None
+    return (f"UNSUPPORTED: {engine} {scene}: {reason}" for engine, scene, reason in found)
 
 
 def _severity(row: Mapping[str, Any]) -> float:

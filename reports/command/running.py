@@ -18,12 +18,12 @@ from reports import exports
 from reports.command import statuses
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
-from reports.findings import lines
+from reports.findings import lines, refusals
 from reports.matrix import legend, matrix_of, table_of, versions_of
 from reports.progress import run_plan
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
-from validation.posed import pinned
+from validation.posed import pinned, resolve
 from validation.rows import Row, rows_of
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
@@ -56,6 +56,9 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(f"{len(chosen)} cells")
         return
+    for name in request.scenes:
+        for note in resolve(name).notes:
+            console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
@@ -78,7 +81,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    for line in lines(plain, None if options["all_findings"] else 1):
+    for line in (*refusals(plain), *lines(plain, None if options["all_findings"] else 1)):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(table_of(matrix_of(plain), versions_of(plain)))
     console.print(legend(), style="dim", markup=False)

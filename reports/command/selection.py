@@ -11,7 +11,7 @@ from adapters import registry
 from adapters.scene import SceneError
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.plan import Request
-from validation.posed import is_file
+from validation.posed import is_file, pinned
 from validation.scenes import matching
 
 
@@ -57,7 +57,7 @@ def parameter(text: str) -> tuple[str, float]:
 def _scene_names(arguments: Sequence[str]) -> list[str]:
     names: list[str] = []
     for argument in arguments or ["*"]:
-        names += [argument] if is_file(argument) else [scene.name for scene in matching(argument)]
+        names += [pinned(argument)] if is_file(argument) else [scene.name for scene in matching(argument)]
     return list(dict.fromkeys(names))
 
 
