@@ -56,8 +56,14 @@ def switched(slot: Slot, changes: Mapping[str, Any]) -> Slot:
 
 
 def observe(slots: Iterable[Slot], jobs: int = 1) -> dict[Slot, Observation]:
-    """Run cells in worker processes; each slot once."""
-    return {observation.slot: observation for observation in run_cells(list(dict.fromkeys(slots)), jobs)}
+    """Run cells in worker processes; each slot once. What is left unfinished, as its engine hangs, counts as such."""
+    found: dict[Slot, Observation] = {}
+
+    def left(slot: Slot, reason: str) -> None:
+        found[slot] = Observation(slot, "", 0, "", Outcome.TIMED_OUT, reason)
+
+    found |= {observation.slot: observation for observation in run_cells(list(dict.fromkeys(slots)), jobs, leave=left)}
+    return found
 
 
 def readings(observation: Observation) -> list[Reading]:

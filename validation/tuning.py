@@ -3,7 +3,7 @@
     start       the profile as it is, on the cells of one group of scenes
     search      every candidate value of every setting, one at a time; the best that helps is kept; again with it
     accept      a change counts if it makes fewer checks fail, or the same number come clearly nearer, and if
-                nothing that passed fails: on the cells searched with *and* on others, held out
+                nothing that passed fails; on other cells, held out, nothing may get worse
     fairness    a value as shipped that does as well as the tuned one is reported too: nothing is tuned for its own sake
 
 The same cells, candidates' budget and rule for every engine. What a search finds is adopted by hand, with its reason,
@@ -167,7 +167,8 @@ def search(
             progress(trial.changes, trial.score)
         helpful = [trial for trial in tried if not trial.broken and trial.score.better_than(best)]
         helpful.sort(key=lambda trial: (trial.score.failing, trial.score.decades))
-        chosen = next((t for t in helpful if not broken(start_held, held.readings(t.changes))), None)
+        held.prepare([trial.changes for trial in helpful])
+        chosen = next((t for t in helpful if _holds(start_held, held.readings(t.changes))), None)
         if chosen is None:
             break
         changes, best = dict(chosen.changes), chosen.score
@@ -198,6 +199,11 @@ def _own(slot: Slot, name: str) -> Any:
     found = load(slot.engine)
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     return {setting.name: setting.value for setting in settings_of(found, slot, scene)}.get(name)
+
+
+def _holds(before: Sequence[Reading], after: Sequence[Reading]) -> bool:
+    """Whether cells that were not searched with are none the worse."""
+    return not broken(before, after) and not score(before).better_than(score(after))
 
 
 def _needless(engine: str, bench: _Bench, changes: Mapping[str, Any]) -> dict[str, Any]:
