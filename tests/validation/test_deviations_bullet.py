@@ -16,7 +16,6 @@ from validation.deviations import covering
 from validation.deviations.bullet import DEVIATIONS, sliding_with_drag
 from validation.execution import execute
 from validation.scenes import CATALOGUE
-from validation.switching import switched
 
 ENGINE = BulletEngine()
 VERSION = "3.2.7"
@@ -121,21 +120,21 @@ def test_drag_of_the_default_profile_predicts_the_slide(ratio, mu, dt):
 
 def test_a_friction_that_is_half_a_percent_off_is_not_explained_by_drag():
     """The law's band used to hold 0.7 % of the friction."""
-    for ratio in (1.1, 2.0):
+    for ratio in (1.1, 1.6):
         scene = CATALOGUE["incline"].scene(3, {"ratio": ratio})
         weaker = replace(scene, pairs=(replace(scene.pairs[0], friction=0.995 * scene.pairs[0].friction),))
         (centre, band), (other, _) = sliding_with_drag(scene, 1 / 240), sliding_with_drag(weaker, 1 / 240)
         assert abs(other - centre) > 10.0 * band
 
 
-def test_a_fast_box_that_loses_contact_points_is_outside_the_law_of_drag():
-    """It is listed with a reason of its own; a wider margin brings it back to the law."""
-    name = "contactBreakingThreshold"
-    for margin, inside in ((0.02, False), (0.1, True)):
-        slot = switched(Slot("incline", (("ratio", 2.0),), 3, "bullet", "default", 1 / 240), {name: margin})
-        value, _ = execute(slot).metrics["acceleration"]
-        centre, band = sliding_with_drag(CATALOGUE["incline"].scene(3, {"ratio": 2.0}), 1 / 240)
-        assert (abs(value - centre) <= band) is inside
+def test_the_law_of_drag_is_silent_where_a_step_is_longer_than_contact_points_may_drift():
+    """1.7 cm a step for a box of 1 m: beyond it the friction is off by up to 0.1 %, which no band of drag may hold."""
+    for ratio, dt, speaks in ((1.6, 1 / 240, True), (2.0, 1 / 240, False), (2.0, 1 / 480, True)):
+        law = sliding_with_drag(CATALOGUE["incline"].scene(3, {"ratio": ratio}), dt)
+        assert (law is not None) is speaks
+        if law is not None:
+            value, _ = execute(Slot("incline", (("ratio", ratio),), 3, "bullet", "default", dt)).metrics["acceleration"]
+            assert abs(value - law[0]) <= law[1]
 
 
 def test_sticking_box_has_no_law():
