@@ -95,8 +95,8 @@ def _breaking_threshold() -> Setting:
 
 def _wide_breaking_threshold() -> Setting:
     because = (
-        "contact points that drift farther in a step than this share of the body are dropped: the shipped 0.02 loses some "
-        "of a box that slides 1.7 cm a step, and friction with them. Nothing is solved at a distance: "
+        "contact points that drift farther in a step than this share of the body are dropped: the shipped 0.02 loses "
+        "some of a box that slides 1.7 cm a step, and friction with them. Nothing is solved at a distance: "
         "contactProcessingThreshold is 0"
     )
     return Setting("contactBreakingThreshold", 0.1, because, "crosscheck tune bullet --group slide; also --profile one")
