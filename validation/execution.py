@@ -11,8 +11,8 @@ from adapters.engine import Engine, EngineError
 from adapters.needs import needs
 from adapters.receipts import receipts
 from adapters.registry import find
-from adapters.stepping import posed_for, run
-from adapters.trajectory import Trajectory
+from adapters.stepping import posed_for, run, step_count
+from adapters.trajectory import Sampling, Trajectory
 from validation.cells import Observation, Outcome, Prepared, Slot, prepare
 
 
@@ -66,8 +66,13 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
     if trajectory.finish == "diverged":
         return replace(measured, outcome=Outcome.DIVERGED, reason=trajectory.reason)
     measured = replace(measured, metrics=prepared.canonical.measure(scene, trajectory))
-    if trajectory.certificate.get("certified") is False:
-        reasons = "; ".join(trajectory.certificate.get("reasons", ()))
+    try:
+        measured = _certified(engine, prepared, measured, trajectory, sampling)
+    except Exception as error:
+        reason = f"certificate: {type(error).__name__}: {error}".splitlines()[0]
+        return replace(measured, outcome=Outcome.INVALID, reason=reason)
+    if measured.certificate.get("certified") is False:
+        reasons = "; ".join(measured.certificate.get("reasons", ()))
         return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
     broken = [slip for slip in slips if not slip.holds]
     if broken:
@@ -75,6 +80,44 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
         reason = f"receipt {worst.quantity}: measured {worst.measured:.6g}, declared {worst.declared:.6g}"
         return replace(measured, outcome=Outcome.INVALID, reason=f"{reason} +- {worst.band:.2g}")
     return measured
+
+
+def _certified(
+    engine: Engine, prepared: Prepared, measured: Observation, trajectory: Trajectory, sampling: Sampling
+) -> Observation:
+    """Enter the full certificate of an engine that has one, and how far its finite step puts each metric off.
+
+    The error of a metric is twice its difference to that of a run at half the step, at the same times: at least the
+    error for the step, whatever the order. Runs moved by units in the last place are not judged and not certified.
+    """
+    slot, scene = measured.slot, prepared.scene
+    if slot.ulp or "certified" not in trajectory.certificate:
+        return measured
+    values = {setting["name"]: setting["value"] for setting in measured.settings}
+    steps = step_count(scene.duration, slot.dt)
+    full = engine.certify(scene, slot.dt, values, steps, trajectory.pose[-1])
+    if full is None:
+        return measured
+    whole = replace(scene, duration=steps * slot.dt)
+    if sampling.contacts_from is None:  # the same samples: what a metric owes to their spacing is no error of the run
+        finer = run(engine, whole, 0.5 * slot.dt, values, replace(sampling, stride=2 * sampling.stride))
+        finer = replace(finer, dt=slot.dt)
+    else:  # impulses are those of a step, and metrics know of which
+        finer = run(engine, whole, 0.5 * slot.dt, values, sampling)
+    found = prepared.canonical.measure(scene, finer)
+    errors = {name: _error(value, found[name][0]) for name, (value, _) in measured.metrics.items()}
+    light = trajectory.certificate
+    reasons = [*light.get("reasons", ()), *(reason for reason in full["reasons"] if reason not in light["reasons"])]
+    certified = bool(light["certified"] and full["holds"])
+    entries = {"certified": certified, "reasons": reasons, "full": full, "metric_errors": errors}
+    return replace(measured, certificate={**light, **entries})
+
+
+def _error(value: float | None, finer: float | None) -> float | None:
+    """Error of a metric for the step; none where neither run has it, infinite (null) where only one has."""
+    if value is None or finer is None:
+        return 0.0 if value is finer else None
+    return 2.0 * abs(value - finer)
 
 
 def _plain(slip: Any) -> dict[str, Any]:

@@ -20,6 +20,8 @@ from validation.verdicts import Physics, Prediction, Standing, Verdict, judge, j
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
+#: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
+TRUTH_SHARE = 0.1
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out")
 
 
@@ -57,6 +59,7 @@ class Row:
     slot: dict[str, Any] = field(default_factory=dict)
     cells: list[str] = field(default_factory=list)
     floor: float | None = None
+    certificate: str = ""
 
     @property
     def alarming(self) -> bool:
@@ -105,6 +108,9 @@ def _cell_rows(run: str, observation: Observation) -> list[Row]:
 def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
     slot = observation.slot
     value, why = observation.metrics.get(check.metric, (None, ""))
+    doubt = _doubt(observation, check)
+    if doubt:
+        observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
     if observation.outcome in (Outcome.OK, Outcome.INVALID):
         has_list = listed(slot.engine) is not None
         finding = finding_of(slot, check.metric)
@@ -115,6 +121,29 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
         verdict = _verdict_of_outcome(observation, check)
     reason = "; ".join(text for text in (why, verdict.reason) if text)
     return _assemble(run, observation, slot, dict(scene.params), check, value, verdict, reason)
+
+
+def _doubt(observation: Observation, check: Check) -> str:
+    """Why a certified run cannot be truth for this check: its error for the step is not small beside the tolerance."""
+    errors = observation.certificate.get("metric_errors")
+    if observation.outcome is not Outcome.OK or errors is None or check.bound is None:
+        return ""
+    error, most = errors.get(check.metric, 0.0), TRUTH_SHARE * check.bound
+    if error is not None and error <= most:
+        return ""
+    known = "infinite" if error is None else f"{error:.3g}"
+    return f"certificate: error for the step {known}, at most {most:.3g}, a tenth of the tolerance"
+
+
+def _certificate(observation: Observation, check: Check) -> str:
+    """Which certificate ran, and to what the value is certified."""
+    found = observation.certificate
+    if "certified" not in found:
+        return ""
+    if "full" not in found:
+        return "light"
+    error = found["metric_errors"].get(check.metric)
+    return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
@@ -181,6 +210,7 @@ def _assemble(
         initial_change=list(observation.initial_change),
         slot=slot.as_dict(),
         cells=[observation.cell],
+        certificate=_certificate(observation, check),
     )
 
 
