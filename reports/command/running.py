@@ -15,12 +15,11 @@ from adapters.scene import SceneError
 from reports import exports
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import request_from, selection
-from reports.findings import finding_line, lines
-from reports.matrix import legend, matrix_of, table_of, versions_of
 from reports.progress import run_plan
-from validation.acceptance import accept as write_findings
+from reports.summary import show
 from validation.cells import Slot, slot_from_dict
 from validation.plan import slots
+from validation.posed import resolve
 from validation.rows import Row, rows_of
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
@@ -33,7 +32,6 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--all-findings", is_flag=True, help="Print every finding, not the worst of each family.")
 @click.option("--junit", type=Path, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=Path, help="Also write a Markdown summary to this file.")
 @AS_JSON
@@ -41,7 +39,7 @@ from validation.workers import TIMEOUT, run_cells
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run SCENES (names, globs or files; all by default) and judge them.
 
-    Exits with 1 if a row is new, drifted, INVALID, CRASHED or TIMED OUT, with 2 if the call is wrong.
+    Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong.
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
@@ -52,11 +50,14 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(f"{len(chosen)} cells")
         return
+    for name in request.scenes:
+        for note in resolve(name).notes:
+            console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done))
+    rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     _show(rows, out, as_json, console, options)
     sys.exit(1 if any(row.alarming for row in rows) else 0)
@@ -71,11 +72,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    for line in lines(plain, None if options["all_findings"] else 1):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(table_of(matrix_of(plain), versions_of(plain)))
-    console.print(legend(), style="dim", markup=False)
-    console.print(f"{len(rows)} rows; written: {', '.join(str(path) for path in written.values())}", markup=False)
+    show(plain, console, files=written.values())
 
 
 @main.command("run-cell")
@@ -102,23 +99,3 @@ def _slot(text: str) -> Slot:
     slot = slot_from_dict(data)
     registry.find(slot.engine)
     return slot
-
-
-@main.command()
-@click.argument("run", default="latest")
-@click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
-@OUT
-def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
-    """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
-
-    Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
-    listed to be shown, not to be hidden.
-    """
-    for name in engine:
-        registry.find(name)
-    counts, unexplained = write_findings(exports.load_rows(out, run), engine)
-    for name, count in counts.items():
-        click.echo(f"{name}: {count} rows listed")
-    for row in unexplained:
-        click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
-    sys.exit(1 if unexplained else 0)
