@@ -191,6 +191,15 @@ class Engine(ABC):
         Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
         """
 
+    def certify(
+        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+    ) -> dict[str, Any] | None:
+        """Certify the run of ``steps`` steps that ended in ``final_pose`` independently; None where nothing can.
+
+        The dictionary has ``holds``, ``reasons`` and whatever numbers stand behind them.
+        """
+        return None
+
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
 
