@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from adapters.trajectory import load_trajectory
+from reports.stages import stage, warm_up
 from validation.cells import Slot, prepare
 from validation.store import Run, Store
 from validation.tracks import record, representatives
@@ -45,10 +46,12 @@ def run_plan(
         TimeRemainingColumn(),
     )
     jobs = jobs or min(len(todo) or 1, os.cpu_count() or 1)
+    warm_up(todo, jobs, console)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
     with (
+        stage(console, f"{len(todo)} cells"),
         TemporaryDirectory(prefix="crosscheck-") as scratch,
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):

@@ -67,7 +67,7 @@ class Store:
     """
 
     def __init__(self, folder: Path, create: bool = True) -> None:
-        path = folder / FILE if folder.is_dir() or not folder.suffix else folder
+        path = folder if folder.is_file() else folder / FILE
         if not create and not path.exists():
             raise StoreError(f"out: there are no results at {path}")
         try:

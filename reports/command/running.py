@@ -13,6 +13,7 @@ from rich.console import Console
 from adapters import registry
 from adapters.scene import SceneError
 from reports import exports
+from reports.command.files import folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import request_from, selection
 from reports.findings import finding_line
@@ -44,13 +45,17 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
+    for name in ("junit", "markdown"):
+        if options[name]:
+            writable(options[name], name)
     request = request_from(options)
     chosen = slots(request)
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
+    folder(out)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
@@ -102,8 +107,9 @@ def _slot(text: str) -> Slot:
 @main.command()
 @click.argument("run", default="latest")
 @click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
+@AS_JSON
 @OUT
-def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
+def accept(run: str, engine: tuple[str, ...], as_json: bool, out: Path) -> None:
     """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
 
     Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
@@ -112,7 +118,9 @@ def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
     for name in engine:
         registry.find(name)
     counts, unexplained = write_findings(exports.load_rows(out, run), engine)
-    for name, count in counts.items():
+    if as_json:
+        click.echo(json.dumps({"listed": counts, "without_reason": [row.as_dict() for row in unexplained]}))
+    for name, count in counts.items() if not as_json else ():
         click.echo(f"{name}: {count} rows listed")
     for row in unexplained:
         click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
