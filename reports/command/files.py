@@ -4,8 +4,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
+
+import click
 
 from adapters.scene import SceneError
+
+
+class _File(click.ParamType):
+    """Name of a file that will be written; what ends in a slash names a folder."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value).endswith(("/", os.sep)):
+            field = param.name if param else "file"
+            raise SceneError(f"{field}: {value} is a folder, not a file")
+        return Path(value)
+
+
+FILE = _File()
 
 
 def writable(path: Path, field: str) -> Path:
@@ -16,7 +34,7 @@ def writable(path: Path, field: str) -> Path:
     SceneError
         Naming ``field``, if it is a folder, if its folder is not there, or if it may not be written.
     """
-    if path.is_dir() or str(path).endswith(("/", os.sep)):
+    if path.is_dir():
         raise SceneError(f"{field}: {path} is a folder, not a file")
     folder = nearest(path.parent)
     if field != "output" and folder != path.parent:

@@ -12,7 +12,7 @@ import click
 from rich.console import Console
 
 from adapters.engine import EngineError
-from reports.command.files import writable
+from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.stages import stage
 from validation.store import Store
@@ -20,7 +20,7 @@ from validation.store import Store
 
 @main.command()
 @click.argument("run", default="latest")
-@click.option("-o", "--output", type=Path, help="File to write; OUT/report.html by default.")
+@click.option("-o", "--output", type=FILE, help="File to write; OUT/report.html by default.")
 @click.option("--open", "show", is_flag=True, help="Also open it in the browser.")
 @AS_JSON
 @OUT
@@ -43,7 +43,7 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
 
 @main.command()
 @click.argument("run", default="latest")
-@click.option("-o", "--output", type=Path, help="File to write; OUT/crosscheck-<run>.zip by default.")
+@click.option("-o", "--output", type=FILE, help="File to write; OUT/crosscheck-<run>.zip by default.")
 @AS_JSON
 @OUT
 def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:

@@ -13,7 +13,7 @@ from rich.console import Console
 from adapters import registry
 from adapters.scene import SceneError
 from reports import exports
-from reports.command.files import folder, writable
+from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import request_from, selection
 from reports.findings import finding_line
@@ -34,8 +34,8 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--junit", type=Path, help="Also write JUnit XML to this file.")
-@click.option("--markdown", type=Path, help="Also write a Markdown summary to this file.")
+@click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
+@click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
