@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from validation.posed import is_file
 
 Plain = Mapping[str, Any]
 #: Marks that make the command exit with 1.
-ALARMING = ("crashed", "timed_out", "invalid", "new", "drifted")
+ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
 #: Marks in the order in which findings are shown.
-ORDER = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained")
+ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
 
 def finding_line(row: Plain) -> str:
@@ -97,6 +98,15 @@ def families(rows: Iterable[Plain]) -> list[Family]:
         for key, own in members.items():
             found.append(Family(mark, *key, tuple(sorted(own, key=severity, reverse=True))))
     return found
+
+
+def refusals(rows: Iterable[Plain]) -> Iterator[str]:
+    """One line per engine and scene file that it cannot run, with its reason: no fault of either."""
+    found: dict[tuple[Any, ...], None] = {}
+    for row in rows:
+        if row["outcome"] == "unsupported" and is_file(row["scene"]):
+            found[row["engine"], row["scene"], row["reason"]] = None
+    return (f"UNSUPPORTED: {engine} {scene}: {reason}" for engine, scene, reason in found)
 
 
 def severity(row: Plain) -> float:

@@ -15,6 +15,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from reports.findings import ALARMING
 from reports.wording import LABELS, MARKS, SHORT, mark_of
 
 #: Colours support the words, they never replace them.
@@ -188,7 +189,7 @@ def _version(version: str) -> str:
 def _styled(field: Field | None, words: Mapping[str, str]) -> Text:
     if field is None:
         return Text("")
-    alarming = field.mark in ("crashed", "timed_out", "invalid", "new", "drifted")
+    alarming = field.mark in ALARMING
     return Text(field.said(words), style=ALARM if alarming else STYLES.get(field.mark, ""))
 
 

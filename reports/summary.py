@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from reports.answers import Costs, answers, choices
-from reports.findings import alarms, families
+from reports.findings import alarms, families, refusals
 from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, versions_of
 
 Plain = Mapping[str, Any]
@@ -30,6 +30,8 @@ def show(rows: Sequence[Plain], console: Console, costs: Costs | None = None, fi
     console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
     for line in sweeps_of(matrix):
         console.print(_folded(line, console, ""), style="dim")
+    for line in refusals(rows):
+        console.print(_folded(line, console, ""))
     _alarms(rows, console)
     _choices(rows, console, costs)
     _answers(rows, console)

@@ -13,10 +13,11 @@ from validation.metrics import NEVER
 from validation.posed import resolve
 
 #: Order in which a group of rows is summed up: the first that occurs is its mark.
-MARKS = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
+MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
     "crashed": "CRASHED",
     "timed_out": "TIMED OUT",
+    "missing": "MISSING",
     "invalid": "INVALID",
     "diverged": "DIVERGED",
     "new": "FAIL new",
@@ -35,12 +36,12 @@ SHORT = LABELS | {"new": "NEW", "known": "known", "explained": "expl.", "not_ins
 
 def mark_of(row: Mapping[str, Any]) -> str:
     """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
-    if row["outcome"] in ("crashed", "timed_out", "invalid", "not_installed"):
+    if row["outcome"] in ("crashed", "timed_out", "missing", "invalid", "not_installed"):
         return str(row["outcome"])
     if row["outcome"] == "unsupported":
         return "new" if row["standing"] == "new" else "unsupported"
-    if row["standing"] == "drifted":
-        return "drifted"
+    if row["standing"] in ("drifted", "new"):  # also where there is no value, or a PASS left its band
+        return str(row["standing"])
     if row["physics"] == "pass":
         return "pass"
     if row["physics"] == "fail":

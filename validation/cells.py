@@ -30,6 +30,8 @@ class Outcome(Enum):
     DIVERGED = "diverged"
     CRASHED = "crashed"
     TIMED_OUT = "timed_out"
+    #: Planned, but there is no observation: shown with the run, never stored.
+    MISSING = "missing"
 
 
 def format_dt(dt: float) -> str:

@@ -17,6 +17,8 @@ from validation.identity import code_hash, commit, machine
 from validation.tracks import Recording, recording_from_bytes
 
 FILE = "results.sqlite"
+#: Runs from moved starts, for the scatter of what another run found; never the latest run.
+SCATTER_TITLE = "scatter of "
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS runs (
     id TEXT PRIMARY KEY, date TEXT NOT NULL, commit_hash TEXT NOT NULL, machine TEXT NOT NULL,
@@ -145,20 +147,17 @@ class Store:
         return [self.run(run_id) for (run_id,) in ids]
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run; the latest is a bench only if there is nothing else.
+        """Return one run; the latest is a bench or a scatter only if there is nothing else.
 
         Raises
         ------
         StoreError
             If there is none of that name.
         """
-        where, args = (
-            ("id = ?", (run_id,))
-            if run_id != "latest"
-            else ("1 ORDER BY title LIKE 'bench %', date DESC, id DESC LIMIT 1", ())
-        )
+        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ?, date DESC, id DESC LIMIT 1"
+        where, args = ("id = ?", run_id) if run_id != "latest" else (last, f"{SCATTER_TITLE}%")
         columns = "id, date, commit_hash, machine, title, plan, finished"
-        row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
+        row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", (args,)).fetchone()
         if row is None:
             known = ", ".join(r[0] for r in self._db.execute("SELECT id FROM runs")) or "none"
             raise StoreError(f"run: there is no run {run_id!r} in {self.path}; it has {known}")

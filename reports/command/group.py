@@ -9,10 +9,11 @@ import click
 
 from adapters.engine import EngineError
 from adapters.scene import SceneError
+from validation.findings import FindingsError
 from validation.store import StoreError
 
 #: Everything a wrong call can raise; the command turns each into one line and exit code 2.
-WRONG_CALL = (SceneError, EngineError, StoreError)
+WRONG_CALL = (SceneError, EngineError, StoreError, FindingsError)
 OUT = click.option("--out", default="crosscheck-out", show_default=True, type=Path, help="Folder for results.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 

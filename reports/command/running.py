@@ -16,12 +16,11 @@ from reports import exports
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import request_from, selection
-from reports.findings import finding_line
 from reports.progress import run_plan
 from reports.summary import show
-from validation.acceptance import accept as write_findings
 from validation.cells import Slot, slot_from_dict
 from validation.plan import slots
+from validation.posed import resolve
 from validation.rows import Row, rows_of
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
@@ -41,7 +40,7 @@ from validation.workers import TIMEOUT, run_cells
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run SCENES (names, globs or files; all by default) and judge them.
 
-    Exits with 1 if a row is new, drifted, INVALID, CRASHED or TIMED OUT, with 2 if the call is wrong.
+    Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong.
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
@@ -56,11 +55,14 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
     folder(out)
+    for name in request.scenes:
+        for note in resolve(name).notes:
+            console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done))
+    rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     _show(rows, out, as_json, console, options)
     sys.exit(1 if any(row.alarming for row in rows) else 0)
@@ -102,26 +104,3 @@ def _slot(text: str) -> Slot:
     slot = slot_from_dict(data)
     registry.find(slot.engine)
     return slot
-
-
-@main.command()
-@click.argument("run", default="latest")
-@click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
-@AS_JSON
-@OUT
-def accept(run: str, engine: tuple[str, ...], as_json: bool, out: Path) -> None:
-    """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
-
-    Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
-    listed to be shown, not to be hidden.
-    """
-    for name in engine:
-        registry.find(name)
-    counts, unexplained = write_findings(exports.load_rows(out, run), engine)
-    if as_json:
-        click.echo(json.dumps({"listed": counts, "without_reason": [row.as_dict() for row in unexplained]}))
-    for name, count in counts.items() if not as_json else ():
-        click.echo(f"{name}: {count} rows listed")
-    for row in unexplained:
-        click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
-    sys.exit(1 if unexplained else 0)
