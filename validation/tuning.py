@@ -3,7 +3,8 @@
     start       the profile as it is, on the cells of one group of scenes
     search      every candidate value of every setting, one at a time; the best that helps is kept; again with it
     accept      a change counts if it makes fewer checks fail, or the same number come clearly nearer, and if
-                nothing that passed fails; on other cells, held out, nothing may get worse
+                nothing that passed fails; on other cells, held out, nothing may get worse, and where a profile's
+                own iterations are cut down nothing that passed may fail
     fairness    a value as shipped that does as well as the tuned one is reported too: nothing is tuned for its own sake
 
 The same cells, candidates' budget and rule for every engine. What a search finds is adopted by hand, with its reason,
@@ -14,14 +15,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters.needs import needs
 from adapters.registry import load
 from validation.cells import Observation, Slot, settings_of
 from validation.experiments import candidates_of
-from validation.plan import QUICK_DT
+from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
 from validation.switching import Reading, observe, readings, switched
 
@@ -41,6 +42,9 @@ HELD_OUT: dict[str, Cells] = {
     "stand": (("stack", {}), ("stack", {"n": 20.0})),
     "slide": tuple(("incline", {"ratio": ratio}) for ratio in (0.9, 0.99, 1.01, 1.5)),
 }
+#: Iterations at which the cells of a group must not fail where they passed, for profiles that have such a count: a
+#: setting that needs a solution to the end is no better one.
+STARVED: dict[str, tuple[int, ...]] = {"stand": (1, 10)}
 #: Least gain of the summed decades of error over tolerance that counts: a tenth of a decade is a quarter of an error.
 GAIN = 0.1
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
@@ -155,7 +159,8 @@ def search(
     """
     bench = _Bench(slots_of(engine, profile, SEARCHED[group], dimensions), jobs)
     held = _Bench(slots_of(engine, profile, HELD_OUT[group], dimensions), jobs)
-    start, start_held = bench.readings({}), held.readings({})
+    starved = _Bench(_starved(bench.slots, group), jobs)
+    start, start_held, start_starved = bench.readings({}), held.readings({}), starved.readings({})
     changes: dict[str, Any] = {}
     best, trials = score(start), []
     for _ in range(ROUNDS):
@@ -168,7 +173,16 @@ def search(
         helpful = [trial for trial in tried if not trial.broken and trial.score.better_than(best)]
         helpful.sort(key=lambda trial: (trial.score.failing, trial.score.decades))
         held.prepare([trial.changes for trial in helpful])
-        chosen = next((t for t in helpful if _holds(start_held, held.readings(t.changes))), None)
+        starved.prepare([trial.changes for trial in helpful])
+        chosen = next(
+            (
+                trial
+                for trial in helpful
+                if _holds(start_held, held.readings(trial.changes))
+                and ("iterations" in trial.changes or not broken(start_starved, starved.readings(trial.changes)))
+            ),
+            None,
+        )
         if chosen is None:
             break
         changes, best = dict(chosen.changes), chosen.score
@@ -199,6 +213,12 @@ def _own(slot: Slot, name: str) -> Any:
     found = load(slot.engine)
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     return {setting.name: setting.value for setting in settings_of(found, slot, scene)}.get(name)
+
+
+def _starved(slots: Sequence[Slot], group: str) -> list[Slot]:
+    """The group's cells with fewer iterations, for profiles that stop at a count."""
+    counted = [slot for slot in slots if has_iterations(load(slot.engine), slot)]
+    return [replace(slot, iterations=count) for slot in counted for count in STARVED.get(group, ())]
 
 
 def _holds(before: Sequence[Reading], after: Sequence[Reading]) -> bool:

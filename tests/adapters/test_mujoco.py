@@ -115,7 +115,7 @@ def test_tuned_follows_the_needs_and_every_setting_has_a_reason() -> None:
     assert (smooth["kappa_elastic"], smooth["smooth_condim"], smooth["solreffriction"]) == (0.0, 1, None)
     assert rough["solreffriction"] == "stick" and rough["cone"] == "elliptic"
     assert plastic["kappa_plastic"] == 0.0 and plastic["margin"] == 0.0
-    assert resting["kappa_plastic"] == 0.5 and resting["solreffriction"] is None
+    assert resting["kappa_plastic"] == 0.1 and resting["solreffriction"] is None
     assert sliding["solreffriction"] == (0.05, 1.0)
     for scene in (make(ball("ball", 1.0)), make(FLOOR, cube("box", 0.5), mu=0.5, g=(1.0, 0.0, -G))):
         for profile in PROFILES:
