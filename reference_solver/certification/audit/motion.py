@@ -11,8 +11,8 @@ from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 
-#: Classical Runge-Kutta steps in which a turn is integrated: with turns up to .3 rad a piece it is off by 1e-10 of it.
-TURN_STEPS = 8
+#: Classical Runge-Kutta steps in which a turn is integrated: one of .3 rad is off by 1e-11.
+TURN_STEPS = 16
 
 
 def measured(run: Run, pose: Array, end: Array) -> Iterator[tuple[str, float]]:
