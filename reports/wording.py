@@ -70,6 +70,18 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{max(1, digits - 2)}e}".replace("e-0", "e-").replace("e+0", "e+")
 
 
+def cell(value: Any) -> Any:
+    """Value for a table that a spreadsheet may open: text that would be taken for a formula is quoted."""
+    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@") and value != "-" else value
+
+
+def markdown(text: str) -> str:
+    """Text that is shown as it is in Markdown: no HTML, no cell of a table ends in it."""
+    for raw, escaped in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|")):
+        text = text.replace(raw, escaped)
+    return text
+
+
 def params_text(params: Mapping[str, float]) -> str:
     """``e=0.8 height=1.03``."""
     return " ".join(f"{name}={value:g}" for name, value in params.items())

@@ -16,17 +16,19 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from adapters import registry
 from adapters.scene import SceneError
 from reports import speed
+from reports.command import statuses
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import JOBS, SECONDS, parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.primary import PRIMARY
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.units import Unit, prepared
-from validation.cells import Slot, parse_dt
+from validation.cells import Outcome, Slot, parse_dt
 from validation.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
@@ -51,7 +53,7 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
     minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
     than 90 % of the ratios agree.
     """
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
     options["full"] = not options["quick"]
@@ -63,6 +65,11 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(f"{len(cells)} cells")
         return
+    absent = missing(options["engine"], request.engines)
+    for line in absent:
+        click.echo(f"crosscheck: {line}", err=True)
+    if all(registry.find(name).engine is None for name in request.engines):
+        sys.exit(statuses.INCOMPLETE)
     store = Store(out)
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
@@ -70,13 +77,17 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
     run = run_plan(
         store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False
     )
+    if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
+        store.close()
+        click.echo("crosscheck: bench: no cell has a result, so there is nothing to time", err=True)
+        sys.exit(statuses.INCOMPLETE)
     limits = QUICK if request.suite == "quick" else FULL
     _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
     store.finish(run)
     _show(store, run, out, as_json, console)
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
-    sys.exit(0 if agrees else 1)
+    sys.exit(statuses.verdict(not agrees, not absent))
 
 
 def _earlier(store: Store, name: str | None) -> Run | None:
