@@ -12,6 +12,8 @@ from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
 UNAVAILABLE = "the engine does not report contact impulses"
+#: Begins the reason of a time that is only the end of the run: what has not come to rest has no time of rest.
+NEVER = "never settled"
 
 
 def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None, str]:
@@ -60,7 +62,7 @@ def last_motion(t: Array, speed: Array, threshold: float) -> Measured:
     if len(moving) == 0:
         return 0.0, ""
     if moving[-1] == len(t) - 1:
-        return float(t[-1]), "still moving at the end of the run"
+        return float(t[-1]), f"{NEVER}: still moving at the end of the run"
     return float(t[moving[-1] + 1]), ""
 
 

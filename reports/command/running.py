@@ -18,9 +18,8 @@ from reports import exports
 from reports.command import statuses
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
-from reports.findings import lines, refusals
-from reports.matrix import legend, matrix_of, table_of, versions_of
 from reports.progress import run_plan
+from reports.summary import show
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import pinned, resolve
@@ -36,7 +35,6 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--all-findings", is_flag=True, help="Print every finding, not the worst of each family.")
 @click.option("--junit", type=Path, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=Path, help="Also write a Markdown summary to this file.")
 @AS_JSON
@@ -81,11 +79,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    for line in (*refusals(plain), *lines(plain, None if options["all_findings"] else 1)):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(table_of(matrix_of(plain), versions_of(plain)))
-    console.print(legend(), style="dim", markup=False)
-    console.print(f"{len(rows)} rows; written: {', '.join(str(path) for path in written.values())}", markup=False)
+    show(plain, console, files=written.values())
 
 
 @main.command("run-cell")
