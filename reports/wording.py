@@ -12,6 +12,8 @@ from validation.cells import format_dt, parse_dt
 from validation.metrics import NEVER
 from validation.posed import resolve
 
+#: What a spreadsheet takes for the begin of a formula.
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Order in which a group of rows is summed up: the first that occurs is its mark.
 MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
@@ -95,7 +97,15 @@ def number(value: float | None, digits: int = 4) -> str:
 
 def cell(value: Any) -> Any:
     """Value for a table that a spreadsheet may open: text that would be taken for a formula is quoted."""
-    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@") and value != "-" else value
+    return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA and not _is_number(value) else value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return text == "-"
+    return True
 
 
 def markdown(text: str) -> str:
