@@ -12,6 +12,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
+from adapters.foreign import checked_settings
 from adapters.isolation import LOG_LINES
 from adapters.needs import needs
 from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
@@ -250,8 +251,8 @@ def prepare(slot: Slot) -> Prepared:
     found = find(slot.engine)
     settings: list[Any] = []
     if found.engine is not None:
-        settings = found.engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
-    text = json.dumps([(s.name, s.value) for s in settings], sort_keys=True, default=str)
+        settings = checked_settings(found.engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
+    text = json.dumps([(s.name, plain(s.value)) for s in settings], sort_keys=True, default=str)
     settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
     version = ".".join(platform.python_version_tuple()[:2])
     cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)

@@ -60,9 +60,10 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         if found.engine is None:
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
-            refusal = checked_refusal(found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile))
+            refusal = found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile)
         except EngineError as error:
-            refusal = one_line(error)
+            refusal = str(error)
+        refusal = checked_refusal(refusal)
         if refusal:
             return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal), None
         observation, trajectory = _observe(found.engine, prepared, blank, keep is not None or shown)

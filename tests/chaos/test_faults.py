@@ -5,16 +5,20 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from adapters import registry
 from adapters.plain import REASON
 from reports import exports
+from reports.progress import run_plan
 from validation.cells import Outcome, Slot, observation_from_dict
 from validation.execution import execute
 from validation.rows import rows_of
+from validation.store import Store
 from validation.workers import run_cells
 from validation.workers.pool import MOST_TIMEOUTS
 
@@ -64,8 +68,9 @@ ODD = {
     "block_signals", "patch_math", "patch_numpy", "patch_loop", "patch_class", "patch_json", "patch_module",
     "stop_collecting", "lower_recursion", "clear_path", "leave_thread", "leave_child", "leave_session",
     "readback_cyclic", "readback_odd", "readback_large", "long_change", "settings_object",
+    "pose_jumps",
 }  # fmt: skip
-DIVERGES = {"pose_nan", "pose_jumps"}
+DIVERGES = {"pose_nan"}
 REFUSES = {"refusal_long"}
 
 
@@ -127,15 +132,17 @@ def processes():
             continue
 
 
-def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty):
+def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty, tmp_path):
     hanging = [faulty_slot("hang", v=float(v)) for v in range(1, 6)]
     elsewhere = Slot("bounce", (), 2, "faulty", "none", DT)
-    left = []
-    found = list(run_cells([*hanging, elsewhere], timeout=8.0, leave=lambda slot, reason: left.append((slot, reason))))
+    store, said = Store(tmp_path), StringIO()
+    run = run_plan(store, "hangs", [*hanging, elsewhere], Console(file=said, width=200), jobs=1, timeout=8.0)
+    found = store.observations(run)
     assert [o.slot for o in found if o.outcome is Outcome.TIMED_OUT] == hanging[:MOST_TIMEOUTS]
-    assert [slot for slot, _ in left] == hanging[MOST_TIMEOUTS:]
-    assert all("timed out 3 times" in reason for _, reason in left)
     assert len(found) == MOST_TIMEOUTS + 1
+    assert not run.finished
+    assert "left: 2 cells, faulty has timed out 3 times on impact" in said.getvalue()
+    assert "the same command resumes it" in said.getvalue()
 
 
 def test_plugins_that_end_their_importer_are_lines_in_a_table(faulty, tmp_path):
