@@ -241,3 +241,27 @@ def test_a_step_rebounds_from_the_first_contact(turn):
         assert simulation.twist[1] == pytest.approx(expected, rel=1e-9, abs=1e-9 * turn / DT)
         judged += len(through) > 0
     assert judged >= 4
+
+
+def test_accelerations_that_are_none_at_the_start_are_bounded():
+    """Neither moving nor accelerated at the start: a gap of .1 (1 - 2 (t/dt)^3) closes at dt / 2^(1/3)."""
+    path = np.zeros((3, 5))
+    path[1, 2] = -0.2 / DT**3
+    t = meet(WALL, Disc(0.5), ((0.0,) * 3, (0.0, 0.6, 0.0)), (STILL, path))
+    assert t == pytest.approx(DT * 0.5 ** (1.0 / 3.0), rel=1e-14)
+    path[1, 3] = 0.3 / DT**4  # it turns back before it gets there: 1 - 2 s^3 + 3 s^4 > 0
+    assert meet(WALL, Disc(0.5), ((0.0,) * 3, (0.0, 0.6, 0.0)), (STILL, path)) == math.inf
+
+
+def test_a_turn_that_begins_at_rest_is_bounded():
+    """A box that stands upright over a wall comes down by turning alone: its corner, at a known angle.
+
+    So small an angle that the change of spin, and not the spin, is what has to be bounded.
+    """
+    half, angle = (0.2, 0.5), 0.005
+    # the corner is below the centre by .2 sin a + .5 cos a = |half| cos(a - atan(.2/.5))
+    height = math.hypot(*half) * math.cos(angle - math.atan(0.4))
+    path = np.zeros((3, 5))
+    path[2, 1] = 0.02 / DT**2
+    t = meet(WALL, Box(half), ((0.0,) * 3, (0.0, height, 0.0)), (STILL, path))
+    assert 0.02 * (t / DT) ** 2 == pytest.approx(angle, rel=1e-11)
