@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -198,6 +199,10 @@ class Engine(ABC):
 
         The dictionary has ``holds``, ``reasons`` and whatever numbers stand behind them.
         """
+        return None
+
+    def kernels(self) -> Path | None:
+        """Folder that keeps machine code which this engine compiles at its first steps; None if it compiles nothing."""
         return None
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:

@@ -180,6 +180,12 @@ class ReferenceEngine(Engine):
         """Nothing: single contacts and constant forces are exact in both profiles."""
         return {}
 
+    def kernels(self) -> Path | None:
+        """Folder of the solver's kernels; None where nothing is compiled, or where no folder can keep it."""
+        from reference_solver import compilation
+
+        return None if compilation.config.DISABLE_JIT else compilation.cache_folder()
+
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: the solver's settings."""
         changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
