@@ -11,10 +11,12 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.box_box import AXIS_ADVANTAGE
 from reference_solver.planar.columns import COS, EXTENT, FIRST_VERTEX, ROUNDING, SIN, VERTICES
 from reference_solver.planar.state import Bodies
 
+#: Another axis must be better by this fraction of the smaller half width, so that ties of aligned boxes are
+#: always decided the same way and round-off cannot swap the reference face (and with it the warm start).
+AXIS_ADVANTAGE = 1e-6
 #: In place of a reference body: the axis is the line through two corners.
 CORNERS = -1
 
@@ -99,7 +101,12 @@ def separating_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float) -> tup
     Returns the separation [m], the body whose edge is the axis and its number, 0; or `CORNERS` and a corner of a and
     of b.
     """
-    advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+    return best_axis(bodies, a, b, dx, dy, AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
+
+
+@inner_kernel
+def best_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, advantage: float) -> tuple[float, int, int, int]:
+    """`separating_axis` where a later axis has to be better by ``advantage`` [m]."""
     best, k = best_edge(bodies, a, b, dx, dy, advantage)
     reference = a
     other, edge = best_edge(bodies, b, a, -dx, -dy, advantage)

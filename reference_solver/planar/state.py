@@ -6,12 +6,23 @@ points of one pair of bodies are neighbours and form a manifold ``m``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, smallest_extent
+from reference_solver.model import (
+    Array,
+    Body,
+    Box,
+    Capsule,
+    Disc,
+    HalfSpace,
+    Model,
+    Polygon,
+    pair_table,
+    smallest_extent,
+)
 from reference_solver.needs import Needs
 from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.planar.columns import (
@@ -76,8 +87,8 @@ class Bodies(NamedTuple):
 class Pairs(NamedTuple):
     """Laws of the pairs and room for candidates of the broadphase."""
 
-    restitution: Array  # (n, n)
-    friction: Array  # (n, n)
+    restitution: Array  # (n, n), strided: one number where all pairs have the same
+    friction: Array  # (n, n), likewise
     bounds: Array  # (n, 4): lower and upper corner of the bounding box
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
@@ -108,6 +119,7 @@ class SubStep(NamedTuple):
     tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
     journal: Journal
 
 
@@ -211,9 +223,11 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    n = len(model.bodies)
+    # Sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves.
+    order = np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64)
     room = np.zeros(capacity, np.int64)
-    return Pairs(model.restitution.copy(), model.friction.copy(), np.zeros((n, 4)), np.arange(n), room)
+    bounds = np.zeros((len(order), 4))
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), bounds, order, room)
 
 
 def allocate_rows(capacity: int) -> Rows:
@@ -230,13 +244,13 @@ def allocate_rows(capacity: int) -> Rows:
     )
 
 
-def allocate_sub_step(n: int) -> SubStep:
-    """Return room for the sub-steps of ``n`` bodies."""
+def allocate_sub_step(n: int, meeting: Any) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies, that of their pairs included."""
     before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
     turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
     tally = np.zeros((2, TALLY_SIZE))
     clock, probe, journal = np.zeros(CLOCK_SIZE), allocate_rows(4), allocate_journal(2, n, 0)
-    return SubStep(clock, before, start, gain, pose, turn, tally, closing, probe, journal)
+    return SubStep(clock, before, start, gain, pose, turn, tally, closing, probe, meeting, journal)
 
 
 def allocate_ledger(capacity: int) -> Ledger:

@@ -34,6 +34,7 @@ PARTS = (
     "columns",
     "conservation",
     "rotation",
+    "detection",
     "metamorphic",
     "hard_cases",
     "self_test",

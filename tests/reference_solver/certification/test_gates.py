@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_solver.certification import Gate, columns, conservation, friction, impact, rotation
+from reference_solver.certification import Gate, columns, conservation, detection, friction, impact, rotation
 from reference_solver.certification.space import SPACES
 
 IN_BOTH = [
@@ -33,12 +33,15 @@ IN_BOTH = [
     (columns.heavy_on_light, 1e4, 1e-10),
     (columns.alternating, 1e4, 1e-10),
     (columns.pyramid,),
+    (detection.seams, "box"),
+    (detection.first_impacts,),
 ]
 ALONE = [
     (rotation.order, "classical"),
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
+    (detection.seams, SPACES[0], "polygon"),
 ]
 
 
