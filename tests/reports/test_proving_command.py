@@ -17,7 +17,7 @@ def run(*arguments):
 def test_an_unknown_reason_is_refused_in_one_line():
     result = run("--prove", "phlogiston")
     assert result.exit_code == 2
-    assert "there is no reason called 'phlogiston'" in result.output and "stack-slop" in result.output
+    assert "there is no reason called 'phlogiston'" in result.output and "stack-touching-start" in result.output
 
 
 def test_all_means_every_experiment_of_the_chosen_engines():
@@ -27,8 +27,8 @@ def test_all_means_every_experiment_of_the_chosen_engines():
 
 def test_a_reason_is_proven_on_its_engine():
     pytest.importorskip("pymunk", reason="pymunk is an optional engine")
-    result = run("--prove", "stack-slop", "--engine", "chipmunk", "--json")
+    result = run("--prove", "stack-touching-start", "--engine", "chipmunk", "--json")
     assert result.exit_code == 0, result.output
     proofs = json.loads(result.stdout)
-    assert len(proofs) == len(chosen("stack-slop", ["chipmunk"])["chipmunk"])
+    assert len(proofs) == len(chosen("stack-touching-start", ["chipmunk"])["chipmunk"])
     assert all(proof["holds"] and proof["why_not"] == "" for proof in proofs)

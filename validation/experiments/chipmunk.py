@@ -19,7 +19,7 @@ _INSIDE = {"start_overlap": 5e-5}
 
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
-        "stack-slop",
+        "stack-touching-start",
         "1000 sweeps keep the touching pair from lifting off; a slop of 1e-5 m instead of 0.1 m changes nothing",
         "default",
         "stack",
@@ -30,7 +30,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     ),
     *(
         Experiment(
-            "stack-slop",
+            "stack-touching-start",
             "taller columns need both: a start inside the slop, so that no contact flickers, and enough sweeps; a "
             "smaller slop changes nothing",
             "default",

@@ -33,7 +33,7 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
     for dimension in (2, 3)
 ) + tuple(
     Experiment(
-        "incline-viscous-threshold",
+        "incline-pyramid-threshold",
         "with an elliptic cone the box slides as soon as it should; solving further or a noslip pass changes nothing: "
         "it is the pyramid, whose edges share their softness between friction and the normal",
         "default",
