@@ -30,15 +30,24 @@ def settings_of(
 
 
 def shown_cell(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    profile: str,
+    params: Mapping[str, float] | None = None,
 ) -> Observation | None:
-    """The cell that stands for a profile on a scene: the representative one, else the first that has settings."""
+    """The cell that stands for a profile on a scene: the representative one, else the first that has settings.
+
+    ``params`` (what differs from the scene's defaults) asks for another one than the representative.
+    """
     own = [
         o for o in observations
         if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
         and o.settings and o.slot.iterations is None
     ]  # fmt: skip
-    shown = [o for o in own if o.slot.params == SHOWN.get(scene, ())]
+    wanted = SHOWN.get(scene, ()) if params is None else tuple(sorted(params.items()))
+    shown = [o for o in own if o.slot.params == wanted]
     return next(iter(shown or own), None)
 
 
@@ -57,10 +66,19 @@ def changes(
 
 
 def pasteable(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    before: str,
+    after: str,
+    params: Mapping[str, float] | None = None,
 ) -> str:
-    """The changes as lines of the engine's own language, ready to paste; empty if its adapter knows none."""
-    cell = shown_cell(observations, scene, dimension, engine, after)
+    """The changes as lines of the engine's own language, ready to paste; empty if its adapter knows none.
+
+    Values that depend on the material or the step are those of the cell of ``params``, see `shown_cell`.
+    """
+    cell = shown_cell(observations, scene, dimension, engine, after, params)
     loaded = registry.find(engine).engine
     if cell is None or loaded is None:
         return ""
