@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from validation.cells import format_dt, parse_dt
-from validation.metrics import NEVER
+from validation.metrics import NEVER as NEVER
 from validation.posed import resolve
 
 #: Order in which a group of rows is summed up: the first that occurs is its mark.
