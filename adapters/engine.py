@@ -192,6 +192,15 @@ class Engine(ABC):
         Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
         """
 
+    def certify(
+        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+    ) -> dict[str, Any] | None:
+        """Certify the run of ``steps`` steps that ended in ``final_pose`` independently; None where nothing can.
+
+        The dictionary has ``holds``, ``reasons`` and whatever numbers stand behind them.
+        """
+        return None
+
     def kernels(self) -> Path | None:
         """Folder that keeps machine code which this engine compiles at its first steps; None if it compiles nothing."""
         return None

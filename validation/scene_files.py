@@ -7,19 +7,19 @@ any scene (`validation.invariants`) is judged.
 
 from __future__ import annotations
 
-import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Sampling, Trajectory
 from validation import invariants
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.quantities import force_window, quantity, unit
 from validation.scene_format import CheckModel, SceneModel, Stated, shown_quantities, stated
+from validation.scene_text import parsed, read_text, said
 
 
 def json_schema() -> dict[str, Any]:
@@ -40,31 +40,30 @@ def load_stated(path: Path) -> Stated:
     SceneError
         One line that names the file and every field that is wrong.
     """
+    return stated_from_text(read_text(path), path)
+
+
+def stated_from_text(text: str, path: Path) -> Stated:
+    """Check the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    shown = one_line(path)
     try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
-    except OSError as error:
-        raise SceneError(f"scene: cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene: {path} is not valid {path.suffix[1:].upper()}: {error}") from None
-    try:
-        model = SceneModel.model_validate(data)
+        model = SceneModel.model_validate(parsed(text, path))
     except ValidationError as errors:
-        found = "; ".join(f"{_path(e['loc'])}: {e['msg']}" for e in errors.errors())
-        raise SceneError(f"{path}: {found}") from None
+        raise SceneError(f"{shown}: {said(errors)}") from None
     try:
         return stated(model)
     except SceneError as error:
-        raise SceneError(f"{path}: {error}") from None
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) or "file"
+        raise SceneError(f"{shown}: {one_line(error)}") from None
 
 
 def canonical_from_file(path: Path) -> CanonicalScene:
     """Wrap a scene file so that it runs like a scene of the catalogue."""
-    read = load_stated(path)
+    return canonical_from_text(read_text(path), path)
+
+
+def canonical_from_text(text: str, path: Path) -> CanonicalScene:
+    """Wrap the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    read = stated_from_text(text, path)
     scene = read.scene
     return CanonicalScene(
         scene.name,
