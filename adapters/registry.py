@@ -87,8 +87,17 @@ def loaded(entry: EntryPoint) -> Found:
         return Found(name, None, "", said_by(error), facts)
 
 
+def adapter(name: str) -> Engine | None:
+    """Our own adapter called ``name``, whose engine is not imported; None for one of somebody else's, or unknown."""
+    entry = _entries().get(name)
+    return entry.load()() if entry is not None and is_ours(entry) else None
+
+
 def facts(name: str) -> EngineFacts | None:
     """Constant facts of an engine, even of one that is not installed; None if its adapter cannot be loaded."""
+    own = adapter(name)
+    if own is not None:
+        return own.facts  # without asking for its version, which imports the engine
     return find(name).facts if name in _entries() else None
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters import registry
-from validation.cells import Observation, prepare
+from validation.cells import Observation
+from validation.posed import resolve
 from validation.tracks import SHOWN
 
 
@@ -79,12 +80,14 @@ def pasteable(
     Values that depend on the material or the step are those of the cell of ``params``, see `shown_cell`.
     """
     cell = shown_cell(observations, scene, dimension, engine, after, params)
-    loaded = registry.find(engine).engine
+    loaded = registry.adapter(engine)
     if cell is None or loaded is None:
         return ""
     names = [change.name for change in changes(observations, scene, dimension, engine, before, after)]
     settings = {s["name"]: s["value"] for s in cell.settings}
-    return loaded.snippet(settings, names, prepare(cell.slot).scene, cell.slot.dt)
+    scene_of = resolve(cell.slot.scene)
+    made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
+    return loaded.snippet(settings, names, made, cell.slot.dt)
 
 
 def setting_text(value: Any) -> str:
