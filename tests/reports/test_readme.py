@@ -22,7 +22,7 @@ COMMANDS = sorted({line.strip() for line in re.findall(r"^ +(?:\.venv/bin/)?(cro
 def test_a_command_of_the_readme_exists_with_its_options(line):
     _, name, *words = shlex.split(line.replace("[", " ").replace("]", " ").replace("|", " "))
     command = main.commands[name]
-    known = {option for parameter in command.params for option in parameter.opts}
+    known = {option for parameter in command.params for option in [*parameter.opts, *parameter.secondary_opts]}
     assert [word for word in words if word.startswith("--") and word not in known] == []
     assert CliRunner().invoke(main, [name, "--help"]).exit_code == 0
 
