@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test lint setup publish clean
+.PHONY: run test soak lint setup publish tune clean
 
 setup: $(STAMP)
 
@@ -34,6 +34,11 @@ run: $(STAMP)
 test: $(STAMP)
 	CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
 
+# All faults, 12 000 scene files, 2 000 cells, 60 kills, from a seed of its own (CROSSCHECK_SEED=N repeats one).
+soak: $(STAMP)
+	CROSSCHECK_SOAK=1 CROSSCHECK_SEED=$${CROSSCHECK_SEED:-$$(date +%s)} \
+		$(BIN)/python -m pytest tests/chaos -n 0 --timeout 14400 -p no:randomly
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -46,6 +51,11 @@ publish: $(STAMP)
 	mkdir -p reports/published
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
+
+# Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
+tune: $(STAMP)
+	@test -n "$(ENGINE)" || { echo "which engine? make tune ENGINE=bullet"; exit 2; }
+	$(BIN)/crosscheck tune $(ENGINE) --jobs 2
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

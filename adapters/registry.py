@@ -94,11 +94,15 @@ def adapter(name: str) -> Engine | None:
 
 
 def facts(name: str) -> EngineFacts | None:
-    """Constant facts of an engine, even of one that is not installed; None if its adapter cannot be loaded."""
-    own = adapter(name)
-    if own is not None:
-        return own.facts  # without asking for its version, which imports the engine
-    return find(name).facts if name in _entries() else None
+    """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
+    entry = _entries().get(name)
+    if entry is None or not is_ours(entry):
+        return find(name).facts if entry else None
+    try:
+        told: EngineFacts = entry.load().facts
+    except ImportError:
+        return None
+    return told
 
 
 def load(name: str) -> Engine:

@@ -12,7 +12,11 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
+from adapters.engine import Engine, Setting
+from adapters.foreign import checked_settings
+from adapters.isolation import LOG_LINES
 from adapters.needs import needs
+from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
 from validation.canonical import CanonicalScene, Measured
@@ -85,6 +89,8 @@ class Slot:
         None: the profile's own count.
     ulp
         Units in the last place by which the start height is moved (measures the noise floor).
+    switched
+        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.switching`).
     """
 
     scene: str
@@ -95,10 +101,11 @@ class Slot:
     dt: float
     iterations: int | None = None
     ulp: int = 0
+    switched: tuple[tuple[str, Any], ...] = ()
 
     def key(self) -> str:
         """Sixteen hex digits that identify the slot."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(_said(asdict(self)), sort_keys=True).encode()).hexdigest()[:16]
 
     def params_text(self) -> str:
         """``e=0.8 height=1.03``."""
@@ -110,7 +117,13 @@ class Slot:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that `slot_from_dict` reads back."""
-        return {**asdict(self), "params": dict(self.params)}
+        data = _said({**asdict(self), "params": dict(self.params)})
+        return data | {"switched": dict(self.switched)} if self.switched else data
+
+
+def _said(data: dict[str, Any]) -> dict[str, Any]:
+    """A slot without experiment has no field of it: what was stored and hashed before there were any stays equal."""
+    return data if data["switched"] else {name: value for name, value in data.items() if name != "switched"}
 
 
 def slot_from_dict(data: Mapping[str, Any]) -> Slot:
@@ -129,8 +142,8 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
         if name not in data:
             raise SceneError(f"slot.{name}: is missing")
     for name in ("scene", "engine", "profile"):
-        if not isinstance(data[name], str):
-            raise SceneError(f"slot.{name}: {data[name]!r} is not a text")
+        if not isinstance(data[name], str) or not is_visible(data[name]):
+            raise SceneError(f"slot.{name}: {one_line(data[name], NAME)!r} is not a name")
     dt = parse_dt(str(data["dt"]))
     iterations = data.get("iterations")
     if iterations is not None and (not _is_whole(iterations) or not 1 <= iterations <= MOST_ITERATIONS):
@@ -144,7 +157,16 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
         raise SceneError(f"slot.dimension: {dimension!r} must be 2 or 3")
     if not _is_whole(ulp) or abs(ulp) > MOST_ULPS:
         raise SceneError(f"slot.ulp: {ulp!r} must be a whole number in [-{MOST_ULPS}, {MOST_ULPS}]")
-    return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp)
+    switched = data.get("switched", {})
+    if not isinstance(switched, Mapping):
+        raise SceneError(f"slot.switched: {switched!r} is not a table of settings")
+    pairs = tuple(sorted((str(name), _as_set(value)) for name, value in switched.items()))
+    return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp, pairs)
+
+
+def _as_set(value: Any) -> Any:
+    """A setting's value as it was before JSON made lists of tuples."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)
@@ -160,7 +182,8 @@ class Cell:
 
     def key(self) -> str:
         """Sixteen hex digits that identify the cell."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+        data = asdict(self) | {"slot": _said(asdict(self.slot))}
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -194,7 +217,9 @@ class Observation:
 
 
 def observation_from_dict(data: Mapping[str, Any]) -> Observation:
-    """Inverse of `Observation.as_dict`.
+    """Inverse of `Observation.as_dict`; the one boundary that observations come through, from workers and stores.
+
+    Text is cleaned and capped here, whoever wrote it.
 
     Raises
     ------
@@ -203,10 +228,22 @@ def observation_from_dict(data: Mapping[str, Any]) -> Observation:
     """
     values = dict(data)
     values |= {"slot": slot_from_dict(data["slot"]), "outcome": Outcome(data["outcome"])}
-    values["metrics"] = {name: (value, reason) for name, (value, reason) in data["metrics"].items()}
+    values["metrics"] = {one_line(name): _measured(*found) for name, found in data["metrics"].items()}
     for name in ("settings", "receipts", "initial_change"):
-        values[name] = tuple(data[name])
+        values[name] = tuple(plain(item) for item in data[name])
+    for name in ("readback", "certificate"):
+        values[name] = dict(plain(data[name]))
+    for name, most in (("cell", NAME), ("engine_version", NAME), ("reason", REASON), ("state_hash", NAME)):
+        values[name] = one_line(data[name], most)
+    values["log"] = lines(str(data["log"]), LOG_LINES)
     return Observation(**values)
+
+
+def _measured(value: Any, reason: Any) -> Measured:
+    """A measured value as everything behind this boundary may rely on: a finite number, or None and a reason."""
+    if value is None or math.isfinite(value):
+        return (None if value is None else float(value)), one_line(reason)
+    return None, one_line(f"{reason}; the value is {float(value)}, not a finite number".removeprefix("; "))
 
 
 @dataclass(frozen=True)
@@ -234,12 +271,26 @@ def prepare(slot: Slot) -> Prepared:
     found = find(slot.engine)
     settings: list[Any] = []
     if found.engine is not None:
-        settings = found.engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
-    text = json.dumps([(s.name, s.value) for s in settings], sort_keys=True, default=str)
+        settings = settings_of(found.engine, slot, scene)
+    text = json.dumps([(s.name, plain(s.value)) for s in settings], sort_keys=True, default=str)
     settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
     version = ".".join(platform.python_version_tuple()[:2])
     cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)
     return Prepared(canonical, scene, cell)
+
+
+def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
+    """Settings that a slot runs with: its profile's for the scene, with those that are switched replaced or added.
+
+    Raises
+    ------
+    EngineError
+        For an unknown profile, or an iteration count that the profile does not have.
+    """
+    own = checked_settings(engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
+    switched = {name: Setting(name, value, "switched for an experiment") for name, value in slot.switched}
+    kept = [switched.pop(setting.name, setting) for setting in own]
+    return [*kept, *switched.values()]
 
 
 def check_size(scene: Scene, dt: float) -> None:

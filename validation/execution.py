@@ -6,13 +6,13 @@ Everything an engine says is checked and made plain here (`adapters.plain`, `ada
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, EngineError
-from adapters.foreign import checked_refusal, checked_settings, said_by
+from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
 from adapters.plain import one_line, plain
 from adapters.receipts import Receipt, receipts
@@ -21,7 +21,7 @@ from adapters.scene import SceneError
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
-from validation.cells import Observation, Outcome, Prepared, Slot, prepare
+from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
 from validation.certification import fully_certified
 from validation.posed import resolve
 from validation.tracks import Recording, record
@@ -61,9 +61,10 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         if found.engine is None:
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
-            refusal = checked_refusal(found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile))
+            refusal = found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile)
         except EngineError as error:
-            refusal = one_line(error)
+            refusal = str(error)
+        refusal = checked_refusal(refusal)
         if refusal:
             return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal), None
         observation, trajectory = _observe(found.engine, prepared, blank, keep is not None or shown)
@@ -82,10 +83,11 @@ def _observe(
 ) -> tuple[Observation, Trajectory | None]:
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
-    settings = checked_settings(engine.settings(slot.profile, wanted, slot.dt, slot.iterations))
+    settings = settings_of(engine, slot, scene)
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
-        slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # What a profile declares holds for its own settings; an experiment with others is about what they change.
+        slips = () if slot.switched else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
@@ -129,14 +131,20 @@ def _plain(slip: Receipt) -> dict[str, Any]:
     return dict(plain(found))
 
 
+def _table(name: str, given: Any) -> dict[str, Any]:
+    if not isinstance(given, Mapping):
+        raise EngineError(f"{name}: a {type(given).__name__} was given, a table is needed")
+    return dict(plain(given))
+
+
 def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observation:
     return replace(
         observation,
         state_hash=trajectory.state_hash(),
         steps=len(trajectory.t) - 1,
         wall_time_s=trajectory.wall_time,
-        readback=dict(plain(trajectory.readback)),
-        certificate=dict(plain(trajectory.certificate)),
+        readback=_table("readback", trajectory.readback),
+        certificate=_table("certificate", trajectory.certificate),
         initial_change=tuple(one_line(change) for change in trajectory.initial_change),
         out_of_plane=trajectory.out_of_plane if math.isfinite(trajectory.out_of_plane) else 0.0,
     )
