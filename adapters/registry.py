@@ -87,6 +87,12 @@ def loaded(entry: EntryPoint) -> Found:
         return Found(name, None, "", said_by(error), facts)
 
 
+def adapter(name: str) -> Engine | None:
+    """Our own adapter called ``name``, whose engine is not imported; None for one of somebody else's, or unknown."""
+    entry = _entries().get(name)
+    return entry.load()() if entry is not None and is_ours(entry) else None
+
+
 def facts(name: str) -> EngineFacts | None:
     """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
     entry = _entries().get(name)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters import registry
-from validation.cells import Observation, prepare
+from validation.cells import Observation
+from validation.posed import resolve
 from validation.tracks import SHOWN
 
 
@@ -30,15 +31,24 @@ def settings_of(
 
 
 def shown_cell(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    profile: str,
+    params: Mapping[str, float] | None = None,
 ) -> Observation | None:
-    """The cell that stands for a profile on a scene: the representative one, else the first that has settings."""
+    """The cell that stands for a profile on a scene: the representative one, else the first that has settings.
+
+    ``params`` (what differs from the scene's defaults) asks for another one than the representative.
+    """
     own = [
         o for o in observations
         if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
         and o.settings and o.slot.iterations is None
     ]  # fmt: skip
-    shown = [o for o in own if o.slot.params == SHOWN.get(scene, ())]
+    wanted = SHOWN.get(scene, ()) if params is None else tuple(sorted(params.items()))
+    shown = [o for o in own if o.slot.params == wanted]
     return next(iter(shown or own), None)
 
 
@@ -57,16 +67,27 @@ def changes(
 
 
 def pasteable(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    before: str,
+    after: str,
+    params: Mapping[str, float] | None = None,
 ) -> str:
-    """The changes as lines of the engine's own language, ready to paste; empty if its adapter knows none."""
-    cell = shown_cell(observations, scene, dimension, engine, after)
-    loaded = registry.find(engine).engine
+    """The changes as lines of the engine's own language, ready to paste; empty if its adapter knows none.
+
+    Values that depend on the material or the step are those of the cell of ``params``, see `shown_cell`.
+    """
+    cell = shown_cell(observations, scene, dimension, engine, after, params)
+    loaded = registry.adapter(engine)
     if cell is None or loaded is None:
         return ""
     names = [change.name for change in changes(observations, scene, dimension, engine, before, after)]
     settings = {s["name"]: s["value"] for s in cell.settings}
-    return loaded.snippet(settings, names, prepare(cell.slot).scene, cell.slot.dt)
+    scene_of = resolve(cell.slot.scene)
+    made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
+    return loaded.snippet(settings, names, made, cell.slot.dt)
 
 
 def setting_text(value: Any) -> str:

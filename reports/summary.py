@@ -92,7 +92,7 @@ def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> No
         ("crosscheck explain ID", "one row: why, and what cures it"),
         ("crosscheck report --open", "one page about all of it"),
     ):
-        console.print(Text(f"  {command:<38}{what}"))
+        console.print(Text(f"  {command:<38} {what}"))
     written = [str(path) for path in files]
     if written:
         console.print(_folded(f"{len(rows)} rows written: {', '.join(written)}", console), soft_wrap=True)

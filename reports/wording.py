@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from validation.cells import format_dt, parse_dt
-from validation.metrics import NEVER
+from validation.metrics import NEVER as NEVER
 from validation.posed import resolve
 
 #: What a spreadsheet takes for the begin of a formula.

@@ -34,7 +34,7 @@ def force_window(scene: Scene) -> float:
 
 def quantity(scene: Scene, trajectory: Trajectory, name: str, at: float | None = None) -> Measured:
     """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None; forces are means over `force_window`."""
-    partner, body, what = parts_of(name)
+    partner, body, what = parts_of(name, [member.name for member in scene.bodies])
     if what.startswith("f"):
         return _force(scene, trajectory, scene.index(body), partner, "fxfyfz".index(what) // 2)
     values = _history(trajectory, scene.index(body), what)

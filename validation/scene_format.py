@@ -8,7 +8,7 @@ the length of a half-space's normal.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -154,11 +154,18 @@ def stated(model: SceneModel) -> Stated:
     return Stated(scene, tuple(notes), model.checks)
 
 
-def parts_of(quantity: str) -> tuple[str | None, str, str]:
-    """Return partner (or None), body and quantity of ``floor/box.fy`` or ``ball.y``."""
+def parts_of(quantity: str, names: Collection[str] = ()) -> tuple[str | None, str, str]:
+    """Return partner (or None), body and quantity of ``floor/box.fy`` or ``ball.y``.
+
+    ``names`` are those of the scene's bodies: a name may hold a slash itself.
+    """
     bodies, _, what = quantity.rpartition(".")
-    partner, slash, body = bodies.rpartition("/")
-    return (partner if slash else None), body, what
+    if bodies in names or "/" not in bodies:
+        return None, bodies, what
+    places = [k for k, letter in enumerate(bodies) if letter == "/"]
+    fits = [k for k in places if bodies[:k] in names and bodies[k + 1 :] in names]
+    cut = fits[0] if fits else places[-1]
+    return bodies[:cut], bodies[cut + 1 :], what
 
 
 def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
@@ -224,8 +231,8 @@ def _shape(raw: dict[str, Any], owner: str) -> Shape:
 
 
 def _refuse_wrong_check(label: str, check: CheckModel, scene: Scene) -> None:
-    partner, body, what = parts_of(check.quantity)
     names = [b.name for b in scene.bodies]
+    partner, body, what = parts_of(check.quantity, names)
     for name in (name for name in (body, partner) if name is not None):
         if name not in names:
             raise SceneError(f"{label}.quantity: {check.quantity!r} names no body of the scene: {', '.join(names)}")

@@ -231,7 +231,7 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
     if not good or good[0] == row["profile"]:
         return "", "", []
     where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], good[0])
-    return good[0], pasteable(*where), changes(*where)
+    return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
 
 
 def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[Change], console: Console) -> None:

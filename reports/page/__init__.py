@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import Any
 
@@ -46,6 +47,7 @@ def render(source: Source) -> str:
             script=script,
             symbols=symbols(source.columns),
             facts=facts(source),
+            cite=cite(source),
             sentences=conclusions.sentences(source),
             matrix=verdicts.matrix(source),
             findings=conclusions.findings(source),
@@ -115,6 +117,36 @@ def facts(source: Source) -> dict[str, Any]:
         "checks": len(source.rows),
         "machine": source.run.machine,
     }
+
+
+def cite(source: Source) -> dict[str, str]:
+    """How to cite this page, and the commands that make it again."""
+    run, installed = source.run, package_version()
+    commit = f", commit {run.commit}" if run.commit else ""
+    text = (
+        f"contact-crosscheck {installed}{commit}, run {run.id} of {run.date[:10]} ({len(source.observations)} cells, "
+        f"{len(source.rows)} judged values). CITATION.cff has the authors and, with crosscheck bundle, this run."
+    )
+    clean = run.commit.rstrip("+")
+    lines = [
+        f"git checkout {clean}" + ("   # plus changes that were not committed" if run.commit.endswith("+") else "")
+    ]
+    lines += ['pip install -e ".[all]" -c constraints.txt']
+    suite, _, scenes = run.title.partition(": ")
+    options = "--full" if suite == "full" else "--quick"
+    lines.append(f"crosscheck run {scenes} {options} --out again")
+    if source.bench is not None:
+        lines.append(f"crosscheck bench {options} --out again")
+    lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]
+    return {"text": text, "commands": "\n".join(lines if clean else lines[1:])}
+
+
+def package_version() -> str:
+    """Version of this distribution; of a checkout that was never installed it is not known."""
+    try:
+        return version("contact-crosscheck")
+    except PackageNotFoundError:
+        return "(not installed)"
 
 
 def _marks_used(source: Source) -> list[str]:

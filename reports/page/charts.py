@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import altair as alt
+import numpy as np
 import pandas as pd
 import vl_convert
 from markupsafe import Markup
@@ -20,8 +21,12 @@ from markupsafe import Markup
 from reports.palette import colours_of, dash_of, shape_of
 
 WIDTH, HEIGHT = 330, 250
-#: Values at or below this are drawn on it and labelled "0": round-off has no place on a logarithmic axis.
-FLOOR = 1e-17
+#: Errors below this share of their unit are exact for whoever chooses an engine: 1e-9 and 1e-16 are one answer.
+EXACT = 1e-6
+#: Where they are drawn: in a gutter below the axis, labelled "exact".
+GUTTER = 3e-7
+#: Shift between marks that coincide, as a share of the axis.
+DODGE = 0.016
 _CONFIG: dict[str, Any] = {
     "background": "transparent",
     "font": "system-ui, sans-serif",
@@ -72,11 +77,59 @@ def log_scale(values: Sequence[float], pad: float = 1.3) -> tuple[alt.Scale, lis
     return alt.Scale(type="log", domain=[low, high], nice=False), log_axis(low, high)
 
 
-#: Plain numbers between 0.01 and 100, 2e-6 elsewhere, 0 for what lies on the floor.
+def gutter(errors: Any) -> Any:
+    """Errors as a series, those below `EXACT` moved to the `GUTTER`."""
+    values = pd.Series(errors, dtype=float)
+    return values.mask(values < EXACT, GUTTER)
+
+
+def error_axis(values: Sequence[float], title: str, pad: float = 2.0) -> tuple[alt.Scale, alt.Axis, float]:
+    """Scale and axis of errors that went through `gutter`, and the lowest error that the axis tells."""
+    shown = [v for v in values if v >= EXACT] or [1e-3]
+    exact = any(v < EXACT for v in values)
+    scale, ticks = log_scale(shown, pad)
+    low, high = scale["domain"]
+    if exact:
+        low, ticks = EXACT, log_axis(EXACT, high)
+        scale = alt.Scale(type="log", domain=[GUTTER / 1.8, high], nice=False)
+        ticks = [GUTTER, *ticks]
+    return scale, alt.Axis(title=title, values=ticks, labelExpr=ERROR, labelOverlap=True), low
+
+
+def gutter_band(values: Sequence[float], scale: alt.Scale, axis: alt.Axis) -> list[alt.Chart]:
+    """Pale band behind the gutter, where there is one."""
+    if not any(v < EXACT for v in values):
+        return []
+    band = pd.DataFrame([{"from": scale["domain"][0], "to": GUTTER * 1.8}])
+    mark = alt.Chart(band).mark_rect(color="currentColor", opacity=0.07, aria=False)
+    return [mark.encode(y=alt.Y("from:Q", scale=scale, axis=axis), y2="to:Q")]
+
+
+def dodged(table: pd.DataFrame, x: str, y: str, logarithmic: bool = True) -> pd.DataFrame:
+    """Marks of different series at the same place, set side by side along x.
+
+    Two marks coincide if they lie within a fiftieth of a decade (of a unit, on linear axes) of each other.
+    """
+    if len(table) == 0:
+        return table
+    table = table.astype({x: float})
+    size = (lambda v: np.log10(v.clip(lower=1e-30))) if logarithmic else (lambda v: v)
+    place = [(50.0 * size(table[name])).round() for name in (x, y)]
+    span = float(np.ptp(size(table[x]))) or 1.0
+    for _, group in table.groupby(place, sort=False):
+        order = group.groupby(["engine", "profile"], sort=False).ngroup()
+        shift = DODGE * span * (order - order.max() / 2.0)
+        table.loc[group.index, x] = group[x] * 10.0**shift if logarithmic else group[x] + shift
+    return table
+
+
+#: Plain numbers between 0.01 and 100, 2e-6 elsewhere.
 POWER = (
-    "datum.value <= 1.01e-17 ? '0' : datum.value >= 0.0099 && datum.value <= 101 ? format(datum.value, '~r') : "
+    "datum.value >= 0.0099 && datum.value <= 101 ? format(datum.value, '~r') : "
     "replace(format(datum.value, '.0e'), '+', '')"
 )
+#: The same, with a word for the gutter.
+ERROR = f"datum.value < 0.9e-6 ? 'exact' : {POWER}"
 
 
 def power_axis(title: str, ticks: list[float], **more: Any) -> alt.Axis:
@@ -101,6 +154,11 @@ def styled(table: pd.DataFrame) -> dict[str, Any]:
     }
 
 
+def named(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with ``engine/profile`` in a column: what a line is called, and what the page's filter looks for."""
+    return table.assign(who=table["engine"].astype(str) + "/" + table["profile"].astype(str))
+
+
 def dashes(table: pd.DataFrame) -> alt.StrokeDash:
     """Dash pattern by ``profile``."""
     profiles = sorted(set(table["profile"]))
@@ -119,12 +177,12 @@ def lines(
     below: Sequence[alt.Chart] = (),
 ) -> alt.LayerChart | alt.FacetChart:
     """Points with thin lines per engine and profile; the column ``label`` says what a point is."""
-    style = styled(table)
+    table, style = named(table), styled(table)
     base = alt.Chart(table)
     detail = [alt.Detail("engine:N"), alt.Detail("profile:N")]
     ordered: dict[str, Any] = {"order": alt.Order(f"{order}:Q")} if order else {}
-    thin = base.mark_line(strokeWidth=1.4, opacity=0.75, aria=False).encode(
-        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=detail, **ordered
+    thin = base.mark_line(strokeWidth=1.4, opacity=0.75).encode(
+        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=detail, description="who:N", **ordered
     )
     points = base.mark_point(size=52, filled=True, opacity=0.95).encode(x=x, y=y, description="label:N", **style)
     return alt.layer(*below, thin, points).properties(width=width, height=height)

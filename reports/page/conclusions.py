@@ -13,7 +13,7 @@ from typing import Any
 
 from reports.page.source import Source
 from reports.page.verdicts import ALARMS, SAID, family_of, ratio_of, severity, slug, times
-from reports.wording import mark_of, number, params_text, reproduce
+from reports.wording import mark_of, measured, number, params_text, quantity, reproduce
 
 Plain = Mapping[str, Any]
 
@@ -130,7 +130,7 @@ def _row_text(row: Plain) -> str:
         return f"{head}: {row['reason'] or row['outcome']}"
     ratio = ratio_of(row)
     off = f", {times(ratio)} tolerances off" if ratio is not None else ""
-    return f"{head}: {number(row['value'], 4)} instead of {number(row['truth'], 4)}{off}"
+    return f"{head}: {measured(row)} instead of {quantity(row['truth'], row['unit'])}{off}"
 
 
 def sentences(source: Source) -> list[tuple[str, str]]:
@@ -180,9 +180,11 @@ def _finding(key: tuple[Any, ...], rows: Sequence[Plain]) -> FindingFamily:
     worst = max(rows, key=severity)
     engine, profile, scene, dimension, family = key
     where = where_text(worst)
-    value = worst["outcome"] if worst["value"] is None else f"{number(worst['value'], 4)}"
-    text = f"{where + ': ' if where else ''}{worst['metric']} = {value}, truth {number(worst['truth'], 4)}, "
-    text += f"tolerance {number(worst['tolerance'], 2)} {worst['unit'] if worst['unit'] != '1' else ''}".strip()
+    value = worst["outcome"] if worst["value"] is None else measured(worst)
+    text = f"{where + ': ' if where else ''}{worst['metric']} = {value}, "
+    text += (
+        f"truth {quantity(worst['truth'], worst['unit'])}, tolerance {quantity(worst['tolerance'], worst['unit'], 2)}"
+    )
     href = "#" + slug(scene, dimension, "check", family)
     return FindingFamily(
         engine, profile, scene, dimension, family, len(rows), href, text, worst["because"], worst["reason"],

@@ -10,8 +10,20 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from reports.page.charts import dashes, log_scale, power_axis, styled, svg, with_unit
-from reports.page.figures import Figure
+from reports import speed as tables_of_speed
+from reports.page.charts import (
+    dashes,
+    error_axis,
+    gutter,
+    gutter_band,
+    log_scale,
+    named,
+    power_axis,
+    styled,
+    svg,
+    with_unit,
+)
+from reports.page.figures import Figure, intervals
 from reports.page.source import Bench, Source
 from reports.page.verdicts import slug
 from reports.speed import duration
@@ -49,6 +61,8 @@ class Speed:
     """Everything of the section."""
 
     run: str
+    quality: str
+    busy: str
     cheapest: list[tuple[str, str, list[LevelCell]]]
     cheapest_levels: list[str]
     at_error: list[LevelTable]
@@ -67,9 +81,12 @@ def speed(source: Source) -> Speed | None:
     if bench is None:
         return None
     tables = bench.tables
-    at_error = _level_tables(tables["time_at_equal_error"], "cost", 1e-6)
+    busy = tables_of_speed.busy(tables["timings"])
+    at_error = _level_tables(tables["time_at_equal_error"], "cost", 1e-6, ranked=not busy)
     return Speed(
         bench.run.id,
+        tables_of_speed.quality_line(tables["timings"]),
+        busy,
         *_cheapest(tables["time_at_equal_error"]),
         at_error,
         _level_tables(tables["error_at_equal_time"], "error", 0.0),
@@ -96,18 +113,20 @@ def _cheapest(table: pd.DataFrame) -> tuple[list[tuple[str, str, list[LevelCell]
     for (scene, dimension), group in table.groupby(["scene", "dimension"], sort=False):
         cells = []
         for level in levels:
-            found = group[(group["level"] == level) & (group["rank"] == 1)]
-            cells.append(
-                _cheapest_cell(found.iloc[0].to_dict()) if len(found) else LevelCell("none reaches it", "", False, "")
-            )
+            found = group[(group["level"] == level) & group["tied"]].sort_values("cost")
+            cells.append(_cheapest_cell(found.to_dict("records")))
         out.append((f"{scene} {dimension}-D", PRIMARY[str(scene)].name, cells))
     return out, [level_text(level) for level in levels]
 
 
-def _cheapest_cell(row: Plain) -> LevelCell:
-    return LevelCell(
-        f"{row['engine']}/{row['profile']}", f"{duration(row['cost'])}, {_setting(row)}", True, reproduce(row["slot"])
-    )
+def _cheapest_cell(tied: Sequence[Plain]) -> LevelCell:
+    """The cheapest, and who is not told apart from it."""
+    if not tied:
+        return LevelCell("none reaches it", "", False, "")
+    row, *others = tied
+    also = "".join(f" = {other['engine']}/{other['profile']}" for other in others)
+    text = f"{row['engine']}/{row['profile']}{also}"
+    return LevelCell(text, f"{duration(row['cost'])}, {_setting(row)}", True, reproduce(row["slot"]))
 
 
 def _setting(row: Plain) -> str:
@@ -115,7 +134,7 @@ def _setting(row: Plain) -> str:
     return f"dt {format_dt(row['dt'])}{own}"
 
 
-def _level_tables(table: pd.DataFrame, column: str, smallest: float) -> list[LevelTable]:
+def _level_tables(table: pd.DataFrame, column: str, smallest: float, ranked: bool = True) -> list[LevelTable]:
     out: list[LevelTable] = []
     if len(table) == 0:
         return out
@@ -124,21 +143,22 @@ def _level_tables(table: pd.DataFrame, column: str, smallest: float) -> list[Lev
         rows = []
         for (engine, profile), own in group.groupby(["engine", "profile"], sort=False):
             by_level = {row["level"]: row for row in own.to_dict("records")}
-            rows.append((str(engine), str(profile), [_level_cell(by_level[level], column) for level in levels]))
+            rows.append((str(engine), str(profile), [_level_cell(by_level[level], column, ranked) for level in levels]))
         names = [level_text(level) if column == "cost" else duration(level) for level in levels]
         anchor = slug("level", column, scene, dimension)
         out.append(LevelTable(anchor, str(scene), int(str(dimension)), PRIMARY[str(scene)].name, names, rows))
     return out
 
 
-def _level_cell(row: Plain, column: str) -> LevelCell:
+def _level_cell(row: Plain, column: str, ranked: bool) -> LevelCell:
     value = float(row[column])
     if not math.isfinite(value):
         return LevelCell("–", "", False, str(row["reason"]))
     factor = float(row["times_cheapest" if column == "cost" else "times_best"])
     text = duration(value) if column == "cost" else number(value, 2)
-    times = "" if factor <= 1.0 or not math.isfinite(factor) else f", ×{factor:.3g}"
-    return LevelCell(text, _setting(row) + times, row["rank"] == 1, reproduce(row["slot"]))
+    apart = ranked and factor > 1.0 and math.isfinite(factor) and not row["tied"]
+    times = f", ×{factor:.3g}" if apart else ", tie" if ranked and row["tied"] and row["rank"] != 1 else ""
+    return LevelCell(text, _setting(row) + times, ranked and bool(row["tied"]), reproduce(row["slot"]))
 
 
 def _multiples(bench: Bench) -> list[Figure]:
@@ -147,7 +167,7 @@ def _multiples(bench: Bench) -> list[Figure]:
     if len(points) == 0:
         return []
     used = points[points["cost"].notna() & points["error"].notna() & points["on_front"]].copy()
-    used["shown"] = used["error"].clip(lower=1e-17)
+    used["shown"] = gutter(used["error"])
     figures = []
     for (scene, dimension), table in used.groupby(["scene", "dimension"], sort=False):
         figures.append(_multiple(str(scene), int(str(dimension)), table))
@@ -156,18 +176,22 @@ def _multiples(bench: Bench) -> list[Figure]:
 
 def _multiple(scene: str, dimension: int, table: pd.DataFrame) -> Figure:
     primary, style = PRIMARY[scene], styled(table)
-    x_scale, x_ticks = log_scale(list(table["cost"]), 1.6)
-    y_scale, y_ticks = log_scale(list(table["shown"]), 3.0)
+    x_scale, x_ticks = log_scale([*table["cost_low"], *table["cost_high"]], 1.3)
+    y_scale, axis, _ = error_axis(list(table["shown"]), with_unit(primary.name, primary.unit), 3.0)
     x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", x_ticks))
-    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(with_unit(primary.name, primary.unit), y_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=axis)
     table = table.assign(label=[
         f"{r['engine']}/{r['profile']}, {_setting(r)}: error {number(r['error'], 2)}, {duration(r['cost'])}"
         for r in table.to_dict("records")
-    ])[["cost", "shown", "engine", "profile", "label"]]  # fmt: skip
-    thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7, aria=False)
+    ])[["cost", "cost_low", "cost_high", "shown", "engine", "profile", "label"]]  # fmt: skip
+    table = named(table)
+    thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7)
     points = alt.Chart(table).mark_point(filled=True, size=40)
+    detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}
     chart = alt.layer(
-        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"]),
+        *gutter_band(list(table["shown"]), y_scale, axis),
+        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), **detail),
+        intervals(table, x, y, style["color"]),
         points.encode(x=x, y=y, description="label:N", **style),
     ).properties(width=215, height=180)
     title = f"{scene} {dimension}-D"
@@ -189,21 +213,26 @@ def _scaling_figure(purpose: str, scene: str, dimension: int, group: pd.DataFram
     rows = [
         {
             "engine": r["engine"], "profile": r["profile"], "x": r["x"], "y": r["per_step"],
+            "low": r["per_step_low"], "high": r["per_step_high"],
             "label": f"{r['engine']}/{r['profile']}, {r['x']:g} {purpose}: {duration(r['per_step'])} per step, "
             f"error {number(None if pd.isna(r['error']) else r['error'], 2)}",
         }
         for r in group.to_dict("records")
     ]  # fmt: skip
-    data = pd.DataFrame(rows)
+    data = named(pd.DataFrame(rows))
     style = styled(data)
     x_scale, x_ticks = log_scale(list(data["x"]), 1.3)
-    y_scale, y_ticks = log_scale(list(data["y"]), 1.5)
+    y_scale, y_ticks = log_scale([*data["low"], *data["high"]], 1.3)
     x = alt.X("x:Q", scale=x_scale, axis=power_axis(purpose, x_ticks))
     y = alt.Y("y:Q", scale=y_scale, axis=power_axis("CPU time per step [s]", y_ticks))
-    thin = alt.Chart(data).mark_line(strokeWidth=1.2, opacity=0.75, aria=False)
+    thin = alt.Chart(data).mark_line(strokeWidth=1.2, opacity=0.75)
     points = alt.Chart(data).mark_point(filled=True, size=40)
+    bars = alt.Chart(data).mark_rule(strokeWidth=1.6, opacity=0.6)
+    low = alt.Y("low:Q", scale=y_scale, axis=power_axis("CPU time per step [s]", y_ticks))
+    detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}
     chart = alt.layer(
-        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(data), detail=["engine:N", "profile:N"]),
+        thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(data), **detail),
+        bars.encode(x=x, y=low, y2="high:Q", color=style["color"], description="who:N"),
         points.encode(x=x, y=y, description="label:N", **style),
     ).properties(width=330, height=220)
     title = f"{scene} {dimension}-D, cost against {purpose}"

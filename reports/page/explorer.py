@@ -11,7 +11,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from reports.page.charts import styled, svg
+from reports.page.charts import dodged, named, styled, svg
 from reports.page.figures import Figure
 from reports.page.source import Plain, Source
 from reports.palette import colours_of, shape_of
@@ -141,11 +141,12 @@ def _map(rows: Sequence[Plain], speed: float) -> Figure:
     ideal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
     line = ideal.mark_line(color="currentColor", opacity=0.18, strokeWidth=7, aria=False).encode(x=x, y=y)
     style = styled(table)
-    thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7, aria=False)
+    table = named(dodged(table, "asked", "got", logarithmic=False))
+    thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7)
     points = alt.Chart(table).mark_point(filled=True, size=48, opacity=0.9)
     chart = alt.layer(
         line,
-        thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"]),
+        thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"], description="who:N"),
         points.encode(x=x, y=y, description="label:N", **style),
     ).properties(width=220, height=210)
     title = f"Impact at {speed:g} m/s"

@@ -11,13 +11,31 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from reports.page.charts import FLOOR, HEIGHT, WIDTH, dashes, lines, log_scale, power_axis, styled, svg, with_unit
+from reports.page.charts import (
+    EXACT,
+    HEIGHT,
+    WIDTH,
+    dashes,
+    dodged,
+    error_axis,
+    gutter,
+    gutter_band,
+    lines,
+    log_scale,
+    named,
+    power_axis,
+    styled,
+    svg,
+    with_unit,
+)
 from reports.speed import duration
 from reports.wording import number
 from validation.bench.primary import PRIMARY
 from validation.cells import format_dt
 from validation.convergence import Convergence
-from validation.tolerances import ROUND_OFF
+
+#: Said of charts in which marks were moved.
+DODGED = "Marks that coincide stand side by side; below 1e-6 an error counts as exact."
 
 
 @dataclass(frozen=True)
@@ -31,7 +49,7 @@ class Figure:
 
 
 def _error_text(error: float) -> str:
-    return "0" if error <= FLOOR else number(error, 2)
+    return number(error, 2)
 
 
 def _guides(x: Sequence[float], anchor: tuple[float, float], scale_x: alt.X, scale_y: alt.Y, low: float) -> alt.Chart:
@@ -49,7 +67,7 @@ def error_against_step(entries: Iterable[Convergence], scene: str, dimension: in
     """Declared error over dt, one line per engine and profile."""
     rows = [
         {
-            "engine": c.engine, "profile": c.profile, "dt": dt, "error": max(error, FLOOR),
+            "engine": c.engine, "profile": c.profile, "dt": dt, "error": error,
             "label": f"{c.engine}/{c.profile}, dt {format_dt(dt)} s: error {_error_text(error)} ({c.because})",
         }
         for c in entries if (c.scene, c.dimension) == (scene, dimension)
@@ -63,15 +81,17 @@ def error_against_step(entries: Iterable[Convergence], scene: str, dimension: in
     names = " : ".join(f"abs(datum.value - {dt!r}) < 1e-9 ? '{format_dt(dt)}'" for dt in ticks) + " : ''"
     scale = alt.Scale(type="log", domain=[ticks[0] / 1.25, ticks[-1] * 1.25], nice=False)
     x = alt.X("dt:Q", scale=scale, axis=alt.Axis(title="step dt [s]", values=ticks, labelExpr=names))
-    error_scale, error_ticks = log_scale(list(table["error"]), 2.0)
-    y = alt.Y("error:Q", scale=error_scale, axis=power_axis(with_unit(primary.name, primary.unit), error_ticks))
+    table["error"] = gutter(table["error"])
+    error_scale, axis, low = error_axis(list(table["error"]), with_unit(primary.name, primary.unit))
+    y = alt.Y("error:Q", scale=error_scale, axis=axis)
     # The guides start at the most exact engine of the coarsest step: what converges runs alongside them.
-    coarsest = table[(table["dt"] == ticks[-1]) & (table["error"] > ROUND_OFF)]["error"]
+    coarsest = table[(table["dt"] == ticks[-1]) & (table["error"] >= EXACT)]["error"]
     start = float(coarsest.min()) if len(coarsest) else float(table["error"].max())
-    guides = _guides(ticks, (ticks[-1], start), x, y, float(error_scale["domain"][0]))
+    guides = [_guides(ticks, (ticks[-1], start), x, y, low)] if start >= EXACT else []
+    table = dodged(table, "dt", "error")
     title = f"{scene} {dimension}-D: {primary.name} against step"
-    caption = "Supremum over the phases of an impact where there is one. Dotted: slopes of order 1 and 2."
-    picture = svg(lines(table, x, y, below=[guides]), title)
+    caption = f"Supremum over the phases of an impact where there is one. Dotted: slopes of order 1 and 2. {DODGED}"
+    picture = svg(lines(table, x, y, below=[*gutter_band(list(table["error"]), error_scale, axis), *guides]), title)
     return Figure(f"fig-step-{scene}-{dimension}", title, caption, picture)
 
 
@@ -83,13 +103,15 @@ def error_against_iterations(table: pd.DataFrame, scene: str, dimension: int, dt
     x = alt.X(
         "iterations:Q",
         scale=x_scale,
-        axis=alt.Axis(title="iterations per step", values=sorted(set(table["iterations"]))),
+        axis=alt.Axis(title="iterations per step", values=sorted(set(table["iterations"])), format="d"),
     )
-    y_scale, y_ticks = log_scale(list(table["error"]), 2.0)
-    y = alt.Y("error:Q", scale=y_scale, axis=power_axis(what, y_ticks))
+    table = table.assign(error=gutter(table["error"]))
+    y_scale, axis, _ = error_axis(list(table["error"]), what)
+    y = alt.Y("error:Q", scale=y_scale, axis=axis)
     title = f"{scene} {dimension}-D: error against iterations"
-    picture = svg(lines(table, x, y), title)
-    return Figure(f"fig-iterations-{scene}-{dimension}", title, f"dt = {format_dt(dt)} s.", picture)
+    table = dodged(table, "iterations", "error")
+    picture = svg(lines(table, x, y, below=gutter_band(list(table["error"]), y_scale, axis)), title)
+    return Figure(f"fig-iterations-{scene}-{dimension}", title, f"dt = {format_dt(dt)} s. {DODGED}", picture)
 
 
 def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure | None:
@@ -99,28 +121,40 @@ def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure |
     if len(table) == 0:
         return None
     primary = PRIMARY[scene]
-    table["shown"] = table["error"].clip(lower=FLOOR)
+    table["shown"] = gutter(table["error"])
     table["label"] = [_point_text(row) for row in table.to_dict("records")]
-    x_scale, x_ticks = log_scale(list(table["cost"]), 1.4)
-    y_scale, y_ticks = log_scale(list(table["shown"]), 2.0)
+    x_scale, x_ticks = log_scale([*table["cost_low"], *table["cost_high"]], 1.2)
+    y_scale, axis, _ = error_axis(list(table["shown"]), with_unit(primary.name, primary.unit))
     x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU time per simulated second [s/s]", x_ticks))
-    y = alt.Y("shown:Q", scale=y_scale, axis=power_axis(with_unit(primary.name, primary.unit), y_ticks))
+    y = alt.Y("shown:Q", scale=y_scale, axis=axis)
     style = styled(table)
     best = table[table["best"]].sort_values("cost")
     front = alt.Chart(best).mark_line(
         interpolate="step-after", color="currentColor", opacity=0.25, strokeWidth=5, aria=False
     )
-    plain = table[["cost", "shown", "engine", "profile", "label", "on_front"]]
-    own = alt.Chart(plain[plain["on_front"]]).mark_line(strokeWidth=1, opacity=0.55, aria=False)
+    plain = named(table[["cost", "cost_low", "cost_high", "shown", "engine", "profile", "label", "on_front"]])
+    own = alt.Chart(plain[plain["on_front"]]).mark_line(strokeWidth=1, opacity=0.55)
     mark = alt.Chart(plain).mark_point(size=46, filled=True, opacity=0.9)
     chart = alt.layer(
+        *gutter_band(list(table["shown"]), y_scale, axis),
         front.encode(x=x, y=y),
-        own.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"]),
+        own.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"], description="who:N"),
+        intervals(plain, x, y, style["color"]),
         mark.encode(x=x, y=y, description="label:N", **style),
     ).properties(width=WIDTH, height=HEIGHT)
     title = f"{scene} {dimension}-D: {primary.name} against cost"
-    caption = "Lower left is better. Grey steps: the best of all engines. Lines join the best settings of one profile."
+    caption = (
+        "Lower left is better. Bars: interval of the median time. Grey steps: the best of all engines. Lines join the "
+        "best settings of one profile."
+    )
     return Figure(f"fig-work-{scene}-{dimension}", title, caption, svg(chart, title))
+
+
+def intervals(table: pd.DataFrame, x: alt.X, y: alt.Y, colour: alt.Color) -> alt.Chart:
+    """Error bars along x, from ``cost_low`` to ``cost_high``."""
+    bar = alt.Chart(table).mark_rule(strokeWidth=1.6, opacity=0.6)
+    low = alt.X("cost_low:Q", scale=x["scale"], axis=x["axis"])
+    return bar.encode(x=low, x2="cost_high:Q", y=y, color=colour, description="who:N")
 
 
 def _point_text(row: Mapping[Hashable, Any]) -> str:
@@ -144,8 +178,8 @@ def motion(table: pd.DataFrame, truth: pd.DataFrame | None, what: str, title: st
     else:
         y = alt.Y("value:Q", axis=alt.Axis(title=what), scale=alt.Scale(zero=False))
     style = styled(table)
-    own = alt.Chart(thinned(table)).mark_line(strokeWidth=1.6, opacity=0.9, aria=False).encode(
-        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"]
+    own = alt.Chart(named(thinned(table))).mark_line(strokeWidth=1.6, opacity=0.9).encode(
+        x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"], description="who:N"
     )  # fmt: skip
     layers = [own]
     if truth is not None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from reports.page import figures
-from reports.page.charts import FLOOR, with_unit
+from reports.page.charts import with_unit
 from reports.page.figures import Figure
 from reports.page.source import Source
 from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
@@ -83,7 +83,7 @@ def _iteration_table(observations: Sequence[Observation]) -> pd.DataFrame:
         for (dt, iterations), error in errors.items():
             if dt == QUICK_DT and iterations is not None:
                 said = f"{engine}/{profile}, {iterations} iterations: error {number(error, 2)}"
-                rows.append((scene, dimension, engine, profile, iterations, max(error, FLOOR), said))
+                rows.append((scene, dimension, engine, profile, iterations, error, said))
     return pd.DataFrame(rows, columns=["scene", "dimension", "engine", "profile", "iterations", "error", "label"])
 
 

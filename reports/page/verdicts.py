@@ -11,7 +11,7 @@ from typing import Any
 
 from reports.matrix import Field, matrix_of
 from reports.page.source import Source
-from reports.wording import MARKS, mark_of, number, params_text, reproduce
+from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
 
 Plain = Mapping[str, Any]
@@ -101,14 +101,26 @@ class Mark:
         return " ".join(SAID[self.mark])
 
 
-def matrix(source: Source) -> list[tuple[tuple[str, int], list[Mark]]]:
-    """Verdict matrix: a line per scene and dimension, a mark per engine and profile."""
+@dataclass(frozen=True)
+class MatrixLine:
+    """A line of the matrix: what it is, where it leads, a mark per engine and profile."""
+
+    label: str
+    anchor: str
+    marks: list[Mark]
+
+
+def matrix(source: Source) -> list[MatrixLine]:
+    """Verdict matrix: a line per scene and dimension, and one for its sweep over iterations where there is one."""
     found = matrix_of(source.rows)
     lines = []
     for line in source.lines:
-        fields = [found.fields.get((line, column)) for column in source.columns]
-        marks = [_matrix_mark(f, line, c) for f, c in zip(fields, source.columns, strict=True)]
-        lines.append((line, marks))
+        scene, dimension = line
+        for fields, label in ((found.fields, ""), (found.swept, ", swept")):
+            own = [fields.get((line, column)) for column in source.columns]
+            if any(own) or not label:
+                marks = [_matrix_mark(f, line, c) for f, c in zip(own, source.columns, strict=True)]
+                lines.append(MatrixLine(f"{scene} {dimension}-D{label}", slug(*line), marks))
     return lines
 
 
@@ -116,9 +128,7 @@ def _matrix_mark(field: Field | None, line: tuple[str, int], column: tuple[str, 
     if field is None:
         return Mark("unsupported", "")
     mark = field.mark
-    judged = sum(n for m, n in field.marks.items() if m not in ("unsupported", "none", "not_installed"))
-    missed = judged - field.marks["pass"]
-    text = "" if not judged else f"{missed}/{judged}" if missed else str(judged)
+    text = "" if not field.judged else f"{field.missed}/{field.judged}" if field.missed else str(field.judged)
     said = ", ".join(f"{n} {SAID[m][1]}" for m, n in field.marks.most_common())
     where = f"{line[0]} {line[1]}-D, {column[0]}/{column[1]}"
     return Mark(mark, text, "#" + slug(*line, *column), f"{where}: {said}")
@@ -231,7 +241,7 @@ def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
         Mark(mark, times(ratio)),
         row,
         (where.strip() or "defaults") + own,
-        number(row["value"], 6),
+        NEVER if measured(row) == NEVER else number(row["value"], 6),
         number(row["truth"], 6),
         number(row["error"], 3),
         number(row["tolerance"], 2),

@@ -230,3 +230,12 @@ def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
     slide = 9.81 * (math.sin(0.3) - 0.1 * math.cos(0.3))
     assert check.truth == pytest.approx(math.cos(0.3) * slide * scene.duration, abs=5e-4)
     assert len(canonical.notes) == 2
+
+
+def test_a_body_may_have_a_slash_in_its_name():
+    from validation.scene_format import parts_of
+
+    names = ["a/b", "b", "a"]
+    assert parts_of("a/b.y", names) == (None, "a/b", "y")
+    assert parts_of("a/a/b.fy", names) == ("a", "a/b", "fy")
+    assert parts_of("floor/box.fy") == ("floor", "box", "fy")

@@ -37,7 +37,7 @@
   function points(e) {
     const near = data.measured.find((m) => Math.abs(m - e) < 0.006);
     if (near === undefined) return null;
-    const own = data.series.filter((one) => one.heights[String(near)]);
+    const own = data.series.filter((one) => one.heights[String(near)] && !hidden.has(one.name));
     own.forEach((one, k) => one.heights[String(near)].forEach((h, i) => {
       if (i >= bounces) return;
       /* Side by side, so that equal answers do not hide each other. */
@@ -63,7 +63,10 @@
   }
   live.hidden = false;
   document.getElementById("explorer-still").hidden = true;
+  if (view.has("e")) slider.value = view.get("e");
   slider.addEventListener("input", draw);
+  slider.addEventListener("change", () => remember("e", slider.value));
+  addEventListener("filtered", draw);
   logarithmic.addEventListener("change", draw);
   for (const preset of $$(".preset", live)) preset.addEventListener("click", () => { slider.value = preset.dataset.e; draw(); });
   draw();

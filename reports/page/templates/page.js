@@ -35,14 +35,74 @@ for (const button of $$("button.copy")) {
   });
 }
 
+/* What is shown stands behind a "?" in the address' fragment: #speed?hide=bullet%2Fone&t=34. A file has no other place. */
+const view = new URLSearchParams(location.hash.split("?")[1] ?? "");
+function remember(name, value) {
+  if (value === null || value === "") view.delete(name);
+  else view.set(name, value);
+  const text = view.toString(), anchor = location.hash.slice(1).split("?")[0];
+  history.replaceState(null, "", "#" + anchor + (text ? "?" + text : ""));
+}
+
 /* A link into closed details opens them. */
 function openTarget() {
-  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const target = document.getElementById(decodeURIComponent(location.hash.slice(1).split("?")[0]));
   for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
   target?.scrollIntoView();
 }
-addEventListener("hashchange", openTarget);
+addEventListener("hashchange", () => {
+  openTarget();
+  if (view.size && !location.hash.includes("?")) remember("", "");
+});
 if (location.hash) openTarget();
+
+/* Filter: engines and profiles that are switched off leave tables, charts and the replay. */
+const hidden = new Set((view.get("hide") ?? "").split(" ").filter(Boolean));
+const filter = document.getElementById("filter"), boxes = $$("input", filter ?? document.createElement("p"));
+const names = boxes.map((box) => box.value);
+const nameIn = (text) => names.find((name) => text === name || text.startsWith(name + ",") || text.startsWith(name + ":"));
+function applyFilter() {
+  for (const box of boxes) box.checked = !hidden.has(box.value);
+  for (const node of $$("[data-who]")) node.classList.toggle("off", hidden.has(node.dataset.who));
+  for (const head of $$("[data-engine]")) {
+    const shown = names.filter((name) => name.startsWith(head.dataset.engine + "/") && !hidden.has(name)).length;
+    head.classList.toggle("off", shown === 0);
+    if (shown) head.colSpan = shown;
+  }
+  dispatchEvent(new Event("filtered"));
+}
+if (filter && names.length > 1) {
+  filter.hidden = false;
+  /* Every row, column and mark that belongs to one engine and profile gets its name, once. */
+  for (const who of $$("main .who")) {
+    const name = who.textContent.trim(), row = who.closest("tbody tr"), item = who.closest(".key li");
+    const owner = row && who.closest("th") === row.cells[0] ? row : item;
+    if (owner && names.includes(name)) owner.dataset.who = name;
+  }
+  for (const table of $$("table:not(.matrix)")) {
+    [...(table.tHead?.rows[0]?.cells ?? [])].forEach((cell, k) => {
+      const name = cell.textContent.trim();
+      if (names.includes(name)) for (const row of table.rows) if (row.cells[k]) row.cells[k].dataset.who = name;
+    });
+  }
+  for (const mark of $$(".canvas [role='graphics-symbol'][aria-label]")) {
+    const name = nameIn(mark.getAttribute("aria-label"));
+    if (name) mark.dataset.who = name;
+  }
+  filter.addEventListener("change", (event) => {
+    if (event.target.checked) hidden.delete(event.target.value);
+    else hidden.add(event.target.value);
+    remember("hide", [...hidden].join(" "));
+    applyFilter();
+  });
+  document.getElementById("filter-all").addEventListener("click", () => { hidden.clear(); remember("hide", ""); applyFilter(); });
+  const link = document.getElementById("copy-link");
+  link.addEventListener("click", async () => {
+    try { await navigator.clipboard.writeText(location.href); link.textContent = "copied"; } catch { link.textContent = "it is in the address bar"; }
+    setTimeout(() => { link.textContent = "copy link to this view"; }, 1500);
+  });
+  applyFilter();
+}
 
 /* Taking away: every table as CSV, every plot as SVG and PNG. */
 function save(name, content, type) {

@@ -27,7 +27,7 @@
       one.first = new Int32Array(one.frames + 1).fill(one.contacts);
       for (let c = one.contacts - 1; c >= 0; c--) one.first[one.frame[c]] = c;
       for (let k = one.frames - 1; k >= 0; k--) one.first[k] = Math.min(one.first[k], one.first[k + 1]);
-      one.shown = true;
+      one.shown = !hidden.has(one.name);
     }
     data.exact = data.tracked === null ? null : summed(take(data.t.length * d), d);
     data.parts = parts;
@@ -98,25 +98,37 @@
     const data = show, d = data.dimension, k = Number(slider.value);
     const plane = d === 2 ? [0, 1] : { xz: [0, 2], yz: [1, 2], xy: [0, 1] }[$("plane").value];
     const scale = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    if (!width || !height) return; /* not laid out, as while the page closes */
     if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
       canvas.width = Math.round(width * scale);
       canvas.height = Math.round(height * scale);
     }
     pen.setTransform(scale, 0, 0, scale, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const low = plane.map((c) => data.low[c]), high = plane.map((c) => data.high[c]);
+    const upright = uprightOf(data, plane), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (const a of [data.low, data.high]) for (const b of [data.low, data.high]) {
+      const corner = upright([a[plane[0]], b[plane[1]]]);
+      for (const c of [0, 1]) { low[c] = Math.min(low[c], corner[c]); high[c] = Math.max(high[c], corner[c]); }
+    }
     const shown = data.series.filter((one) => one.shown);
     if ($("layout").value === "over") drawLane(data, shown, k, plane, low, high, [0, 0, width, height], "");
     else {
       /* Lanes stand beside each other where the motion is upright, and above each other where it is level. */
-      const upright = (high[1] - low[1]) / (high[0] - low[0]) > 0.6, n = shown.length || 1;
+      const tall = (high[1] - low[1]) / (high[0] - low[0]) > 0.6, n = shown.length || 1;
       shown.forEach((one, i) => {
-        const lane = upright ? [(i * width) / n, 0, width / n, height] : [0, (i * height) / n, width, height / n];
+        const lane = tall ? [(i * width) / n, 0, width / n, height] : [0, (i * height) / n, width, height / n];
         drawLane(data, [one], k, plane, low, high, lane, one.name);
       });
     }
     $("clock").textContent = data.t[k].toFixed(3) + " s";
     slider.setAttribute("aria-valuetext", data.t[k].toFixed(3) + " seconds");
+  }
+  /* A scene may be posed with its floor level and gravity aslant: it is shown with gravity pointing down. */
+  function uprightOf(data, plane) {
+    const g = plane.map((c) => data.gravity[c]), size = Math.hypot(...g);
+    if (!plane.includes(data.dimension - 1) || size === 0) return (p) => p;
+    const c = -g[1] / size, s = g[0] / size;
+    return (p) => [c * p[0] + s * p[1], c * p[1] - s * p[0]];
   }
   function drawLane(data, series, k, plane, low, high, [x0, y0, width, height], title) {
     const d = data.dimension, ink = getComputedStyle(document.body).color, pad = title ? 18 : 28;
@@ -127,12 +139,13 @@
     pen.translate(x0, y0);
     const zoom = Math.min((width - 2 * pad) / (high[0] - low[0]), (height - 2 * pad) / (high[1] - low[1]));
     const left = width / 2 - zoom * (low[0] + high[0]) / 2, base = height / 2 + zoom * (low[1] + high[1]) / 2;
-    const to = (p) => [left + zoom * p[0], base - zoom * p[1]];
+    const upright = uprightOf(data, plane);
+    const to = (p) => { const q = upright(p); return [left + zoom * q[0], base - zoom * q[1]]; };
     const path = (body, pose) => {
       pen.beginPath();
       if (body.type === "ball") {
         const [x, y] = to([pose[0][plane[0]], pose[0][plane[1]]]), r = zoom * body.radius;
-        const spoke = d === 2 ? [Math.cos(pose[1][0]), Math.sin(pose[1][0])] : plane.map((c) => rotated(pose[1], [1, 0, 0])[c]);
+        const spoke = upright(d === 2 ? [Math.cos(pose[1][0]), Math.sin(pose[1][0])] : plane.map((c) => rotated(pose[1], [1, 0, 0])[c]));
         pen.arc(x, y, r, 0, 2 * Math.PI);
         pen.moveTo(x, y);
         pen.lineTo(x + r * spoke[0], y - r * spoke[1]);
@@ -186,7 +199,7 @@
       const from = one.first[j], until = one.first[j + 1];
       for (let c = from; c < until; c++) {
         const [x, y] = to(plane.map((axis) => one.point[c * d + axis] * coarse));
-        const vector = plane.map((axis) => one.impulse[c * d + axis] / 250);
+        const vector = uprightOf(data, plane)(plane.map((axis) => one.impulse[c * d + axis] / 250));
         const length = Math.hypot(...vector);
         if (length * longest < 3) continue;
         const ex = x + vector[0] * longest, ey = y - vector[1] * longest, turn = Math.atan2(ey - y, ex - x);
@@ -264,6 +277,7 @@
       check.type = "checkbox";
       check.checked = one.shown;
       check.addEventListener("change", () => { one.shown = check.checked; draw(); });
+      label.classList.toggle("off", hidden.has(one.name));
       swatch.className = "swatch";
       swatch.style.background = one.colour;
       label.append(check, swatch, document.createTextNode(one.name));
@@ -289,14 +303,15 @@
       box.append(jump);
     }
   }
-  async function choose(id) {
+  async function choose(id, frame = 0) {
     play(false);
     show = await load(id);
+    remember("scene", id === $("scene").options[0].value ? "" : id);
     slider.max = show.t.length - 1;
     $("plane-label").hidden = show.dimension === 2;
     listSeries();
     listJumps();
-    go(0);
+    go(Math.min(frame, show.t.length - 1));
   }
 
   player.hidden = false;
@@ -318,7 +333,17 @@
     else return;
     event.preventDefault();
   });
+  slider.addEventListener("change", () => remember("t", slider.value === "0" ? "" : slider.value));
+  addEventListener("filtered", () => {
+    for (const data of loaded.values()) for (const one of data.series) one.shown = !hidden.has(one.name);
+    if (show) { listSeries(); draw(); }
+  });
   addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  choose($("scene").value);
+  for (const id of ["layout", "magnify", "plane"]) {
+    if (view.has(id)) $(id).value = view.get(id);
+    $(id).addEventListener("change", () => remember(id, $(id).value));
+  }
+  if (view.has("scene")) $("scene").value = view.get("scene");
+  choose($("scene").value || $("scene").options[0].value, Number(view.get("t") ?? 0));
 })();

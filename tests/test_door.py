@@ -1,0 +1,47 @@
+"""Whatever packages a user's path holds, an entry either runs ours or names the foreign one in one line."""
+
+import subprocess
+import sys
+
+import pytest
+
+from contact_crosscheck import PACKAGES, foreign
+
+
+def start(folder, *arguments):
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, cwd=folder, timeout=120)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_foreign_package_is_named_with_its_place_and_nothing_runs(tmp_path, name):
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("")
+    result = start(tmp_path, "-m", "contact_crosscheck", "list", "scenes")
+    assert result.returncode == 2 and result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert f"{name!r} at {tmp_path / name}" in line
+
+
+def test_the_readme_snippet_says_so_as_well(tmp_path):
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports" / "__init__.py").write_text("")
+    result = start(tmp_path, "-c", "from contact_crosscheck import load; load('x')")
+    assert f"'reports' at {tmp_path / 'reports'}" in result.stderr.splitlines()[-1]
+
+
+def test_a_foreign_neighbour_stops_our_own_modules_too(tmp_path):
+    (tmp_path / "adapters").mkdir()
+    (tmp_path / "adapters" / "__init__.py").write_text("")
+    result = start(tmp_path, "-c", "import reports.exports")
+    assert "'adapters' at" in result.stderr.splitlines()[-1]
+
+
+def test_a_folder_without_code_hides_nothing(tmp_path):
+    for name in PACKAGES:
+        (tmp_path / name).mkdir()
+    result = start(tmp_path, "-m", "contact_crosscheck", "list", "scenes", "--json")
+    assert result.returncode == 0, result.stderr
+
+
+def test_here_everything_is_ours():
+    assert foreign() == {}
