@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bullet_law import DEFAULT, ONE, loss_in_one_second, rebound_range
+from adapters.bullet_law import DEFAULT, ONE, drag_share, loss_in_one_second, rebound_range
 from adapters.engine import (
     Array,
     Contacts,
@@ -33,7 +33,15 @@ from adapters.engine import (
     Simulation,
 )
 from adapters.needs import Needs
-from adapters.probes import REBOUND_LEAD, REBOUND_RADIUS, REBOUND_SPEED, REBOUND_TIME
+from adapters.probes import (
+    GRAVITY,
+    REBOUND_LEAD,
+    REBOUND_RADIUS,
+    REBOUND_SPEED,
+    REBOUND_TIME,
+    SLIDE_TIME,
+    slide_speed,
+)
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
@@ -560,11 +568,12 @@ class BulletEngine(Engine):
         return BulletSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains from Baumgarte."""
+        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
+        declared = _sliding(profile, needs.friction, dt) if needs.friction > 0.0 else {}
         if profile == "one":
-            return {"restitution": _gain_of_one(needs.restitution, dt)}
+            declared["restitution"] = _gain_of_one(needs.restitution, dt)
         if profile != "default":
-            return {}
+            return declared
         # 1e-12: round-off of up to a thousand steps.
         loss = Declared(loss_in_one_second(DEFAULT, dt), 1e-12, "drag of a multibody, 0.04 (1 + v) v, for spin as well")
         time = (REBOUND_LEAD + 4) * dt + REBOUND_TIME
@@ -572,7 +581,24 @@ class BulletEngine(Engine):
         least, greatest = rebound_range(DEFAULT, *ball)
         because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
         rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
-        return {"linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+        return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+
+
+def _sliding(profile: str, friction: float, dt: float) -> dict[str, Declared]:
+    """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
+
+    A contact point that comes or goes holds the friction of a step without its load, or a load without its friction;
+    a slide has one of each at most, so that two steps of the window may be wrong by all of it.
+    """
+    band = 2.0 * dt / SLIDE_TIME * friction
+    because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
+    reported = Declared(friction, band, because)
+    if profile != "default":
+        return {"friction": reported, "friction_impulse": reported}
+    slowed = drag_share(DEFAULT, slide_speed(friction), friction * GRAVITY, dt, SLIDE_TIME)
+    value = friction * (1.0 + slowed)
+    measured = Declared(value, band, f"{because}; and drag 0.04 (1 + v) v, by its recurrence")
+    return {"friction": measured, "friction_impulse": reported}
 
 
 def _gain_of_one(e: float, dt: float) -> Declared:

@@ -7,6 +7,9 @@ The tests plant every one of them; the report shows the table, so that a reader 
 CAUGHT_BY = {
     "restitution ignored": "receipt restitution",
     "friction applied twice": "receipt friction",
+    "friction 2 % low": "receipt friction",
+    "impulses reported 2 % low": "receipt impulse",
+    "friction reported 2 % low": "receipt friction_impulse",
     "gravity sign": "receipt gravity",
     "half against full extents": "receipt size",
     "state sampled one step late": "receipt sampling",
