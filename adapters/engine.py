@@ -8,7 +8,7 @@ never sees a scene's truth, and contains no loop over steps: the only one is `ad
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -190,6 +190,14 @@ class Engine(ABC):
 
         Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
         """
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
+
+        Written out for the material of the scene's first pair and step ``dt`` [s]; empty where an adapter knows no
+        such words.
+        """
+        return ""
 
     def settings(self, profile: str, needs: Needs, dt: float, iterations: int | None = None) -> list[Setting]:
         """Settings of ``profile``; ``iterations`` replaces the profile's own count.

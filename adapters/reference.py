@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -155,6 +155,11 @@ class ReferenceEngine(Engine):
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Nothing: single contacts and constant forces are exact in both profiles."""
         return {}
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: the solver's settings."""
+        changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
+        return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
 
 
 def _package_version() -> str:

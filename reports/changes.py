@@ -14,7 +14,7 @@ from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.comparison import Change, Kind
 from validation.rows import rows_of
-from validation.store import Store, StoreError
+from validation.store import MissingError, Store
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def load_side(argument: str, out: Path) -> Side:
 
     Raises
     ------
-    StoreError
+    MissingError
         If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
     """
     path = Path(argument)
@@ -61,11 +61,11 @@ def _load_lines(path: Path) -> Side:
     try:
         lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise StoreError(f"run: cannot read {path}: {error}") from None
+        raise MissingError(f"run: cannot read {path}: {error}") from None
     rows = [line for line in lines if isinstance(line, dict) and {"slot", "metric", "value"} <= set(line)]
     times = [line for line in lines if isinstance(line, dict) and {"slot", "purpose", "ratio"} <= set(line)]
     if len(rows) + len(times) != len(lines):
-        raise StoreError(f"run: {path} does not hold rows of this project")
+        raise MissingError(f"run: {path} does not hold rows of this project")
     return Side(rows, times)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ from adapters import registry
 from reports.wording import number
 from validation.bench import agreement, reading, work
 from validation.bench.primary import PRIMARY
-from validation.cells import format_dt
+from validation.cells import Observation, Outcome, format_dt
+from validation.posed import resolve
 from validation.store import Run, Store
+from validation.verdicts import judge_physics
 
 Tables = dict[str, pd.DataFrame]
 #: Levels that fit a terminal.
@@ -70,6 +73,48 @@ def write_all(folder: Path, run: Run, protocol: Mapping[str, Any], tables: Table
 def raw_of(store: Store, run: Run) -> pd.DataFrame:
     """Raw timings, one row each."""
     return pd.json_normalize([timing.as_dict() for timing in store.timings(run)])
+
+
+def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], float]:
+    """Cost [s/s] of the largest step from which on a profile passes every check of its bench cells.
+
+    Keys are (scene, dimension, engine, profile). A step counts only if every smaller one passes as well: what passes
+    once by luck is no recommendation.
+    """
+    passes: dict[tuple[Any, ...], dict[float, bool]] = defaultdict(lambda: defaultdict(lambda: True))
+    for observation in store.observations(run):
+        slot = observation.slot
+        if slot.iterations is None:
+            good = all(row["physics"] == "pass" or row["value"] is None for row in physics(observation))
+            passes[slot.scene, slot.dimension, slot.engine, slot.profile][slot.dt] &= (
+                good and observation.outcome is Outcome.OK
+            )
+    points = work.work_points(store, run)
+    own = points[points["iterations"].isna()].to_dict("records") if len(points) else []
+    cost = {(p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): p["cost"] for p in own}
+    found = {}
+    for key, steps in passes.items():
+        order = sorted(steps, reverse=True)
+        safe = [dt for k, dt in enumerate(order) if all(steps[finer] for finer in order[k:])]
+        if safe and math.isfinite(cost.get((*key, safe[0]), math.nan)):
+            found[key] = cost[*key, safe[0]]
+    return found
+
+
+def physics(observation: Observation) -> list[dict[str, Any]]:
+    """Rows of a bench's cell that say PASS or FAIL and nothing else: standings belong to the run, and cost time."""
+    slot = observation.slot
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
+    rows: list[dict[str, Any]] = []
+    for check in canonical.checks(scene, slot.dt):
+        value = observation.metrics.get(check.metric, (None, ""))[0]
+        said = judge_physics(value, check) if observation.outcome is Outcome.OK else None
+        error = None if value is None or check.truth is None else value - check.truth
+        row = {"metric": check.metric, "value": value, "error": error, "tolerance": check.bound, "standing": None}
+        rows.append({**same, **row, "physics": said and said.value, "outcome": observation.outcome.value})
+    return rows
 
 
 def level_tables(points: pd.DataFrame) -> list[Table]:

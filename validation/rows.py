@@ -15,7 +15,7 @@ from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.deviations import covering
 from validation.findings import Known, known_of
 from validation.findings.files import findings_of
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 from validation.studies import STUDIES, StudyResult
 from validation.verdicts import (
     Physics,
@@ -136,7 +136,7 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings = findings_of(slot.engine)
-    if outcome is Outcome.UNSUPPORTED and findings is not None:
+    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene):
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)

@@ -68,7 +68,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, out: Pat
 
 def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Console) -> list[Row]:
     """Rows of the engine with their scatter, which is measured here where the store does not have it."""
-    store = Store(out, create=False)
+    store = Store(out, create=False, write=True)
     try:
         chosen = store.run(run)
         own = [o for o in store.observations(chosen) if o.slot.engine == engine]

@@ -19,7 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from adapters.scene import SceneError
 from reports import speed
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, parameter, request_from, selection
 from reports.progress import run_plan
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
@@ -27,7 +27,7 @@ from validation.bench.primary import PRIMARY
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.units import Unit, prepared
 from validation.cells import Slot, parse_dt
-from validation.store import Run, Store, StoreError
+from validation.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
 #: Two bench runs on one machine must agree within their intervals on this share of their ratios.
@@ -36,8 +36,8 @@ AGREEMENT = 0.9
 
 @main.command()
 @selection
-@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes for the errors; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=click.FloatRange(1.0), help="Per cell [s].")
+@click.option("--jobs", default=0, type=JOBS, help="Worker processes for the errors; 0: one per core.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--seed", type=int, help="Of the random order; drawn and printed if not given.")
 @click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
@@ -85,7 +85,7 @@ def _earlier(store: Store, name: str | None) -> Run | None:
         return None
     found = [run for run in reading.bench_runs(store) if name in ("latest", run.id)]
     if not found:
-        raise StoreError(f"against: there is no bench run {name!r} in {store.path}")
+        raise MissingError(f"against: there is no bench run {name!r} in {store.path}")
     return found[-1]
 
 

@@ -10,7 +10,8 @@ from typing import Any
 from adapters import registry
 from adapters.engine import EngineFacts
 from adapters.planted_faults import CAUGHT_BY
-from reports.page.choosing import Cure, cures, setting_text
+from reports.cures import setting_text
+from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
 from reports.page.source import Source
 from reports.page.verdicts import slug
