@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test lint setup publish clean
+.PHONY: run test lint setup publish tune clean
 
 setup: $(STAMP)
 
@@ -17,13 +17,17 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" -c constraints.txt
 	@touch $@
 
-# The verdicts decide the exit status; time and report are made whatever they are.
+# The verdicts decide the exit status; time and report are made whatever they are. Matrix and report's path come last,
+# where they are seen; the verdicts stand on the terminal before the bench as well.
 run: $(STAMP)
-	@status=0; \
+	@status=0; begun=$$(date +%s); \
 	$(BIN)/crosscheck run --quick --out $(OUT) || status=$$?; \
 	test $$status -le 1 || exit $$status; \
-	$(BIN)/crosscheck bench --quick --out $(OUT) || exit 2; \
-	echo "report:"; $(BIN)/crosscheck report --out $(OUT) || exit 2; \
+	echo "matrix after $$(( $$(date +%s) - begun )) s; now time and report"; \
+	$(BIN)/crosscheck bench --quick --brief --out $(OUT) || exit 2; \
+	$(BIN)/crosscheck report --out $(OUT) >/dev/null || exit 2; \
+	$(BIN)/crosscheck show --out $(OUT) || exit 2; \
+	echo "all of it took $$(( $$(date +%s) - begun )) s"; \
 	exit $$status
 
 # `setup` has installed the engines and Pinocchio: if one is not there, its tests fail instead of being skipped. PyBullet
@@ -45,6 +49,11 @@ publish: $(STAMP)
 	mkdir -p reports/published
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
+
+# Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
+tune: $(STAMP)
+	@test -n "$(ENGINE)" || { echo "which engine? make tune ENGINE=bullet"; exit 2; }
+	$(BIN)/crosscheck tune $(ENGINE) --jobs 2
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from reports.stages import stage, warm_up
 from validation.cells import Slot
 from validation.store import Run, Store
 from validation.tracks import representatives
@@ -48,11 +50,15 @@ def run_plan(
     def leave(slot: Slot, reason: str) -> None:
         left[reason] = left.get(reason, 0) + 1
 
+    warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    with (
+        stage(console, f"{len(todo)} cells"),
+        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
+    ):
         task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
         try:
             record = partial(store.add_recording, run)

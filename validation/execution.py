@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, EngineError
-from adapters.foreign import checked_refusal, checked_settings, said_by
+from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
 from adapters.plain import one_line, plain
 from adapters.receipts import Receipt, receipts
@@ -21,7 +21,8 @@ from adapters.scene import SceneError
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
-from validation.cells import Observation, Outcome, Prepared, Slot, prepare
+from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
+from validation.certification import fully_certified
 from validation.posed import resolve
 from validation.tracks import Recording, record
 
@@ -81,15 +82,17 @@ def _observe(
 ) -> tuple[Observation, Trajectory | None]:
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
-    settings = checked_settings(engine.settings(slot.profile, wanted, slot.dt, slot.iterations))
+    settings = settings_of(engine, slot, scene)
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
-        slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # What a profile declares holds for its own settings; an experiment with others is about what they change.
+        slips = () if slot.switched else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
             sampling = replace(sampling, contacts_from=0.0)
         trajectory = run(engine, scene, slot.dt, values, sampling)
+        trajectory = fully_certified(engine, prepared, slot, values, trajectory)
         return _measured(blank, prepared, slips, trajectory), trajectory
     except BaseException as error:
         return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None

@@ -31,6 +31,8 @@ from validation.verdicts import (
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
+#: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
+TRUTH_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Row:
     slot: dict[str, Any] = field(default_factory=dict)
     cells: list[str] = field(default_factory=list)
     floor: float | None = None
+    certificate: str = ""
 
     @property
     def alarming(self) -> bool:
@@ -122,6 +125,9 @@ def _cell_rows(run: str, observation: Observation) -> list[Row]:
 
 def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
     value, why = observation.metrics.get(check.metric, (None, "it was not measured"))
+    doubt = _doubt(observation, check)
+    if doubt:
+        observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
     verdict = _verdict(observation, scene, check, value, why)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
@@ -144,6 +150,29 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     return known_of(slot, check.metric, observation.engine_version, findings_of(slot.engine))
+
+
+def _doubt(observation: Observation, check: Check) -> str:
+    """Why a certified run cannot be truth for this check: its error for the step is not small beside the tolerance."""
+    errors = observation.certificate.get("metric_errors")
+    if observation.outcome is not Outcome.OK or errors is None or check.bound is None:
+        return ""
+    error, most = errors.get(check.metric, 0.0), TRUTH_SHARE * check.bound
+    if error is not None and error <= most:
+        return ""
+    known = "infinite" if error is None else f"{error:.3g}"
+    return f"certificate: error for the step {known}, at most {most:.3g}, a tenth of the tolerance"
+
+
+def _certificate(observation: Observation, check: Check) -> str:
+    """Which certificate ran, and to what the value is certified."""
+    found = observation.certificate
+    if "certified" not in found:
+        return ""
+    if "full" not in found:
+        return "light"
+    error = found.get("metric_errors", {}).get(check.metric)
+    return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
@@ -204,6 +233,7 @@ def _assemble(
         initial_change=list(observation.initial_change),
         slot=slot.as_dict(),
         cells=[observation.cell],
+        certificate=_certificate(observation, check),
     )
 
 

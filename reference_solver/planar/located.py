@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import close_step
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import row_work
@@ -24,6 +25,7 @@ from reference_solver.planar.columns import (
     PT,
     RELEASE,
 )
+from reference_solver.planar.entries import enter_release, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import (
     LANDED,
@@ -125,8 +127,10 @@ def sub_step(
     if end < length:
         cut_work(bodies, rows, sub, tally, end, end / length)
     enter_contacts(bodies, rows, ledger)
+    enter_sub_step(bodies, rows, sub, options, end)
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
+        enter_release(bodies, rows, sub, options, end)
     if end < left:
         count_event(sub.clock, len(bodies.kind), tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
@@ -211,6 +215,7 @@ def run_located(
             return k
         if not located_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return k
+        close_step(sub.journal)
         if sampled:
             sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
     return steps

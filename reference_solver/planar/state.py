@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from reference_solver.model import Array, Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, smallest_extent
 from reference_solver.needs import Needs
+from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
     BODY_REALS,
@@ -107,6 +108,7 @@ class SubStep(NamedTuple):
     tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    journal: Journal
 
 
 class Ledger(NamedTuple):
@@ -147,6 +149,7 @@ class Buffer(NamedTuple):
     offset: Indices  # (s + 1,)
     integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
+    journal: Journal
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -232,7 +235,8 @@ def allocate_sub_step(n: int) -> SubStep:
     before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
     turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
     tally = np.zeros((2, TALLY_SIZE))
-    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4))
+    clock, probe, journal = np.zeros(CLOCK_SIZE), allocate_rows(4), allocate_journal(2, n, 0)
+    return SubStep(clock, before, start, gain, pose, turn, tally, closing, probe, journal)
 
 
 def allocate_ledger(capacity: int) -> Ledger:

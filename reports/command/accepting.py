@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters import registry
-from reports.command.group import OUT, main
+from reports.command.group import AS_JSON, OUT, main
 from reports.progress import run_plan
 from reports.wording import number
 from validation.acceptance import Change, Proposal, accepted, propose, slots_to_move
@@ -32,8 +33,9 @@ SHOWN = 12
 @click.option("--engine", required=True, metavar="E", help="Whose findings to write.")
 @click.option("--family", "families", multiple=True, metavar="ID", help="Accept this family (repeat for more).")
 @click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes; 0: one per core.")
+@AS_JSON
 @OUT
-def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, out: Path) -> None:
+def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
     """List rows of RUN that do not pass as findings, each with its value and band, each family with its reason.
 
     Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
@@ -57,10 +59,14 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, out: Pat
     add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
     write_members(folder, members)
-    click.echo(f"{engine}: {len(members)} rows of {len({m.family.id for m in members.values()})} families listed in "
-               f"{folder / MEMBERS}")  # fmt: skip
-    _show_refused(proposal.refused)
     left = [change.family.id for change in changed if change.family.id not in chosen]
+    listed = sorted({m.family.id for m in members.values()})
+    if as_json:
+        said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
+        click.echo(json.dumps({**said, "refused": len(proposal.refused), "not_accepted": left}, indent=1))
+    else:
+        click.echo(f"{engine}: {len(members)} rows of {len(listed)} families listed in {folder / MEMBERS}")
+    _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)
     sys.exit(1 if left or proposal.refused else 0)

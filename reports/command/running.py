@@ -16,6 +16,7 @@ from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports import exports
 from reports.command import statuses
+from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
@@ -35,8 +36,8 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--junit", type=Path, help="Also write JUnit XML to this file.")
-@click.option("--markdown", type=Path, help="Also write a Markdown summary to this file.")
+@click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
+@click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
@@ -47,13 +48,17 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
+    for name in ("junit", "markdown"):
+        if options[name]:
+            writable(options[name], name)
     request = request_from(options)
     chosen = slots(request)
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
+    folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:
             console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)

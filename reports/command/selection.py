@@ -9,6 +9,7 @@ import click
 
 from adapters import registry
 from adapters.scene import SceneError
+from reports.command.completion import engine_names, scene_names
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.plan import Request
 from validation.posed import is_file, pinned
@@ -84,9 +85,15 @@ def request_from(options: dict[str, Any]) -> Request:
 def selection(command: Callable[..., None]) -> Callable[..., None]:
     """Options that choose cells; shared by every command that runs some."""
     options = (
-        click.argument("scenes", nargs=-1),
+        click.argument("scenes", nargs=-1, shell_complete=scene_names),
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
-        click.option("--engine", multiple=True, metavar="E", help="Only this engine (repeat for more)."),
+        click.option(
+            "--engine",
+            multiple=True,
+            metavar="E",
+            shell_complete=engine_names,
+            help="Only this engine (repeat for more).",
+        ),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
         click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
