@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test lint setup publish tune clean
+.PHONY: run test lint setup publish tune mutants mutants-check detection clean
 
 setup: $(STAMP)
 
@@ -57,3 +57,17 @@ tune: $(STAMP)
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+
+# Mutation score of the modules that decide verdicts, and the list of survivors (tests/mutation); takes long.
+mutants: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
+	$(BIN)/python tests/mutation/run.py $(MODULES)
+
+# A sample of them, chosen by the commit: only a survivor that is not listed is a failure.
+mutants-check: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
+	$(BIN)/python tests/mutation/run.py --check 40
+
+# What every check and receipt can see, from planted faults.
+detection: $(STAMP)
+	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity --engine chipmunk --profile tuned > validation/detection.txt

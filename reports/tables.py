@@ -163,6 +163,4 @@ def sensitivity(entries: Sequence[Plain], console: Console) -> None:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
         table.add_row(Text(entry["name"]), Text(", ".join(seen) or "none of these faults"))
     console.print(table)
-    console.print(
-        Text("faults: parameters told or readings reported 10, 1 or 0.1 % too low; drift: 0.1, 0.01, 0.001 m/s")
-    )
+    console.print(Text("faults: told or reported 10, 1 or 0.1 % too low; drift: 0.1, 0.01 or 0.001 m/s along x"))
