@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test soak lint setup publish tune clean
+.PHONY: run test soak lint setup publish tune mutants mutants-check detection clean
 
 setup: $(STAMP)
 
@@ -30,9 +30,12 @@ run: $(STAMP)
 	echo "all of it took $$(( $$(date +%s) - begun )) s"; \
 	exit $$status
 
-# `setup` has installed Pinocchio: if it is not there, the comparison with it fails instead of being skipped.
+# `setup` has installed the engines and Pinocchio: if one is not there, its tests fail instead of being skipped. PyBullet
+# has wheels for CPython 3.11 only.
+REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys; print(",bullet" * (sys.version_info < (3, 12)))' 2>/dev/null)
+
 test: $(STAMP)
-	CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
+	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
 
 # All faults, 12 000 scene files, 2 000 cells, 60 kills, from a seed of its own (CROSSCHECK_SEED=N repeats one).
 soak: $(STAMP)
@@ -59,3 +62,17 @@ tune: $(STAMP)
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+
+# Mutation score of the modules that decide verdicts, and the list of survivors (tests/mutation); takes long.
+mutants: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
+	$(BIN)/python tests/mutation/run.py $(MODULES)
+
+# A sample of them, chosen by the commit: only a survivor that is not listed is a failure.
+mutants-check: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
+	$(BIN)/python tests/mutation/run.py --check 40
+
+# What every check and receipt can see, from planted faults.
+detection: $(STAMP)
+	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity --engine chipmunk --profile tuned > validation/detection.txt

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bullet_law import DEFAULT, ONE, loss_in_one_second, rebound_range
+from adapters.bullet_law import DEFAULT, ONE, drag_share, loss_in_one_second, rebound_range
 from adapters.engine import (
     Array,
     Contacts,
@@ -33,7 +33,16 @@ from adapters.engine import (
     Simulation,
 )
 from adapters.needs import Needs
-from adapters.probes import REBOUND_LEAD, REBOUND_RADIUS, REBOUND_SPEED, REBOUND_TIME
+from adapters.probes import (
+    GRAVITY,
+    REBOUND_LEAD,
+    REBOUND_RADIUS,
+    REBOUND_SPEED,
+    REBOUND_TIME,
+    SLIDE_TIME,
+    slide_speed,
+)
+from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
@@ -589,11 +598,12 @@ class BulletEngine(Engine):
         return "\n".join(lines)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains from Baumgarte."""
+        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
+        declared = _sliding(profile, needs.friction, dt) if needs.friction > 0.0 else {}
         if profile == "one":
-            return {"restitution": _gain_of_one(needs.restitution, dt)}
+            declared["restitution"] = _gain_of_one(needs.restitution, dt)
         if profile != "default":
-            return {}
+            return declared
         # 1e-12: round-off of up to a thousand steps.
         loss = Declared(loss_in_one_second(DEFAULT, dt), 1e-12, "drag of a multibody, 0.04 (1 + v) v, for spin as well")
         time = (REBOUND_LEAD + 4) * dt + REBOUND_TIME
@@ -601,7 +611,26 @@ class BulletEngine(Engine):
         least, greatest = rebound_range(DEFAULT, *ball)
         because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
         rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
-        return {"linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+        return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+
+
+def _sliding(profile: str, friction: float, dt: float) -> dict[str, Declared]:
+    """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
+
+    A contact point under a fast box that comes or goes holds the friction of a step without its load; a slide has one
+    at each end at most. On the rigid-body path that adds friction and never takes any (measured at 1/60 .. 1/960 s).
+    """
+    share = dt / SLIDE_TIME
+    because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
+    if profile != "default":
+        more = Declared(friction * (1.0 + share), friction * (share + FRICTION_SHARE), because)
+        return {"friction": more, "friction_impulse": more}
+    slowed = drag_share(DEFAULT, slide_speed(friction), friction * GRAVITY, dt, SLIDE_TIME)
+    drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
+    return {
+        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction, drag),
+        "friction_impulse": Declared(friction, 2.0 * share * friction, because),
+    }
 
 
 def _gain_of_one(e: float, dt: float) -> Declared:

@@ -129,6 +129,24 @@ def loss_in_one_second(law: ContactLaw, dt: float) -> float:
     return 1.0 - speed ** (1.0 / (steps * dt))
 
 
+def drag_share(law: ContactLaw, speed: float, braking: float, dt: float, time: float) -> float:
+    """What drag takes from a slide, over what friction takes.
+
+    Parameters
+    ----------
+    speed
+        At the start [m/s]; the slide does not stop within ``time`` [s].
+    braking
+        Deceleration by friction [m/s^2].
+    """
+    lost, steps = 0.0, math.ceil(time / dt - 1e-9)
+    for _ in range(steps):
+        drag = law.drag(speed, dt)
+        lost += drag
+        speed -= braking * dt + drag
+    return lost / (braking * steps * dt)
+
+
 @lru_cache(maxsize=256)
 def rebound_range(law: ContactLaw, radius: float, v: float, e: float, dt: float, lead: float, time: float) -> Range:
     """Least and greatest v+/v, over the phases of a step, of a ball that starts ``lead`` steps above a face.

@@ -34,7 +34,8 @@ from adapters.engine import (
 )
 from adapters.mujoco_law import ContactLaw, softness_of
 from adapters.needs import Needs
-from adapters.probes import REBOUND_SPEED, STEPS
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, STEPS
+from adapters.receipts import IMPULSE_SHARE
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 DOC = "MuJoCo documentation"
@@ -295,9 +296,9 @@ class MujocoEngine(Engine):
         return MujocoSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Rebound of the spring and damper as shipped, over all phases of a step; RK4's second-order fall."""
+        """Rebound of the spring and damper as shipped, over all phases of a step; sums of forces; RK4's fall."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
-        declared: dict[str, Declared] = {}
+        declared = {"impulse": _impulses(settings, dt)}
         if settings["integrator"] == "RK4":
             declared |= _second_order_fall()
         if settings["solref"] != "reflect" and needs.regime == "impact":
@@ -347,6 +348,21 @@ def _element(name: str, attributes: Mapping[str, Any]) -> str:
         return f"{value:.9g}" if isinstance(value, float) else str(value)
 
     return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, value in attributes.items()) + "/>"
+
+
+def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
+    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance.
+
+    Newton stops when a step gains less than ``tolerance`` of its cost, which counts in units of the mean inertia times
+    the unknowns, 6 for each of the four bodies. Short of its minimum by that, the gradient (what forces and momentum
+    differ by) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance /
+    (1 - d)) m/s^2 in each step of the probe.
+    """
+    deep = min(float(settings["solimp"][1]), 0.9999)  # mjMAXIMP
+    gradient = math.sqrt(2.0 * 24.0 * float(settings["tolerance"]) / (1.0 - deep))
+    steps = math.ceil(2.0 * LANDING_LEAD + 1.0)
+    because = "forces are solved to a tolerance: so much may they and the momentum differ in each step of the landing"
+    return Declared(1.0, IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED, because)
 
 
 def _second_order_fall() -> dict[str, Declared]:

@@ -1,12 +1,27 @@
-"""What the bench is known to catch: faults that were planted in a healthy toy engine, and what caught each.
+"""What the bench is known to catch: faults planted in a healthy engine, and what caught each.
 
-The tests plant every one of them; the report shows the table, so that a reader knows how far "all receipts hold" goes.
+`CAUGHT_BY` are faults of a toy engine; the tests plant every one of them and the report shows the table, so that a
+reader knows how far "all receipts hold" goes. `Planted` gives any engine a fault of a given size, from which
+`validation.detection` computes what every check and every receipt can see.
 """
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from adapters.engine import Array, Contacts, Declared, Engine, EngineError, Simulation
+from adapters.needs import Needs
+from adapters.scene import Body, Box, Disc, Scene, Sphere
 
 #: Fault -> what catches it: a receipt by its quantity, or a conformance check.
 CAUGHT_BY = {
     "restitution ignored": "receipt restitution",
     "friction applied twice": "receipt friction",
+    "friction 2 % low": "receipt friction",
+    "impulses reported 2 % low": "receipt impulse",
+    "friction reported 2 % low": "receipt friction_impulse",
     "gravity sign": "receipt gravity",
     "half against full extents": "receipt size",
     "state sampled one step late": "receipt sampling",
@@ -29,3 +44,101 @@ CAUGHT_BY = {
     "refusal of several lines": "check refusals",
     "nothing read back": "check readback",
 }
+
+#: Faults of a given size that any engine can be given from outside, in what it is told or in what it reports.
+SIZED = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step", "velocity", "impulse", "drift")
+
+
+class Planted(Engine):
+    """An engine with one parameter off by a share: it is told, or it reports, ``(1 - size)`` times what it should.
+
+    Parameters
+    ----------
+    fault
+        One of `SIZED`. The last three are faults of what is read, the others of what is built; ``drift`` moves every
+        body along x by ``size`` times 1 m/s.
+    size
+        Share by which it is off, 0.02 for two per cent.
+    """
+
+    def __init__(self, inner: Engine, fault: str, size: float) -> None:
+        if fault not in SIZED:
+            raise EngineError(f"fault: {fault!r} is none of {', '.join(SIZED)}")
+        self.inner, self.fault, self.factor = inner, fault, 1.0 - size
+        self.facts, self.profiles = inner.facts, inner.profiles
+
+    def version(self) -> str:
+        """Version of the engine that got the fault."""
+        return self.inner.version()
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """What the engine refuses."""
+        return self.inner.refuses(scene, profile)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """What the healthy engine declares: a fault is not declared."""
+        return self.inner.declares(profile, needs, dt)
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Build what the faulty engine was told."""
+        told = dt * self.factor if self.fault == "step" else dt
+        return _Misread(self.inner.build(self._told(scene), told, settings), self.fault, self.factor, dt)
+
+    def _told(self, scene: Scene) -> Scene:
+        k = self.factor
+        if self.fault == "gravity":
+            return replace(scene, gravity=tuple(k * g for g in scene.gravity))
+        if self.fault in ("friction", "restitution"):
+            pairs = tuple(replace(p, **{self.fault: k * getattr(p, self.fault)}) for p in scene.pairs)
+            return replace(scene, pairs=pairs)
+        return replace(scene, bodies=tuple(self._body(b) if b.motion == "free" else b for b in scene.bodies))
+
+    def _body(self, body: Body) -> Body:
+        k, shape = self.factor, body.shape
+        if self.fault == "mass":
+            return replace(body, mass=k * body.mass)
+        if self.fault == "inertia":
+            moments = body.inertia
+            if isinstance(moments, tuple):
+                return replace(body, inertia=(k * moments[0], k * moments[1], k * moments[2]))
+            return replace(body, inertia=k * moments)
+        if self.fault == "extent" and isinstance(shape, Box):
+            return replace(body, shape=Box(tuple(k * h for h in shape.half_extents)))
+        if self.fault == "extent" and isinstance(shape, Disc | Sphere):
+            return replace(body, shape=type(shape)(k * shape.radius))
+        return body
+
+
+class _Misread(Simulation):
+    """A simulation whose velocities or contact impulses are reported with a factor, or whose bodies seem to drift."""
+
+    def __init__(self, inner: Simulation, fault: str, factor: float, dt: float) -> None:
+        self.inner, self.fault, self.factor = inner, fault, factor
+        self.drift = dt * (1.0 - factor) if fault == "drift" else 0.0
+        self.steps = 0
+        self.initial_change = inner.initial_change
+
+    def advance(self, steps: int) -> None:
+        self.inner.advance(steps)
+        self.steps += steps
+
+    def pose(self) -> Array:
+        pose = self.inner.pose()
+        if self.drift:
+            pose = pose.copy()
+            pose[:, 0] += self.drift * self.steps
+        return pose
+
+    def twist(self) -> Array:
+        twist = self.inner.twist()
+        return self.factor * twist if self.fault == "velocity" else twist
+
+    def contacts(self) -> Contacts:
+        found = self.inner.contacts()
+        return replace(found, impulse=self.factor * found.impulse) if self.fault == "impulse" else found
+
+    def readback(self) -> dict[str, Any]:
+        return self.inner.readback()
+
+    def close(self) -> None:
+        self.inner.close()

@@ -3,9 +3,9 @@
     fall      gravity, step, sampling       a ball released from rest
     load      mass, inertia, turn           bodies under a constant force and torque
     flight    dampings                      bodies that nothing acts on, for a second
-    landing   size                          a ball and a box on each of its faces touch a floor
+    landing   size, impulse                 a ball and a box on each of its faces touch a floor
     rebound   restitution                   balls hit a floor at several phases of a step
-    slide     friction                      a box slides on a floor
+    slide     friction, friction_impulse    a box slides on a floor; its weight is an impulse as well
     corner    turn                          boxes land on a corner
 
 A probe has the pair values of the scene that is judged and is stepped by the same loop. A reader gives samples of a
@@ -62,7 +62,8 @@ class Case:
 class Probe:
     """A scene, the quantities it shows, and how they are read from its trajectory.
 
-    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet.
+    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``contacts``: contact
+    impulses are read, of every step.
     """
 
     quantities: tuple[str, ...]
@@ -70,9 +71,12 @@ class Probe:
     read: Callable[[Case, Scene, Trajectory], Samples]
     only_ends: bool = False
     touches: bool = True
+    contacts: bool = False
 
     def sampling(self, case: Case, scene: Scene) -> Sampling:
-        """Every step, or the ends alone."""
+        """Every step, with contacts or without, or the ends alone."""
+        if self.contacts:
+            return Sampling(contacts_from=0.0)
         return Sampling(max(1, round(scene.duration / case.dt))) if self.only_ends else Sampling()
 
 
@@ -260,7 +264,7 @@ def landing(case: Case) -> Scene:
 
 
 def read_landing(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """Height of the centre above the floor when the body is first slowed, over what its shape says.
+    """Height of the centre above the floor when the body is first slowed; impulses over the momentum they changed.
 
     Slowed means: by more than its whole speed in a second, ten times the largest drag known and a hundredth of the
     softest contact. A body that is never slowed is given the height that it reached: it is at most that large.
@@ -271,7 +275,28 @@ def read_landing(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
         v, x = trajectory.twist[:, i, up], trajectory.pose[:, i, up] - 0.25
         slowed = np.flatnonzero(np.abs(np.diff(v)) > LANDING_SPEED * case.dt)
         ratios.append(float(x[slowed[0] if len(slowed) else -1]) / height)
-    return {"size": tuple(ratios)}
+    return {"size": tuple(ratios), **_reported(_landing_impulses(case, scene, trajectory))}
+
+
+def _landing_impulses(case: Case, scene: Scene, trajectory: Trajectory) -> list[float]:
+    """Reported contact impulse over m dv, for every body; a body that kept its speed has no such ratio."""
+    up, ratios = case.dimension - 1, []
+    for i, body in enumerate(scene.bodies[1:], start=1):
+        change = body.mass * float(trajectory.twist[-1, i, up] - trajectory.twist[0, i, up])
+        if abs(change) > body.mass * LANDING_SPEED * case.dt:  # slowed, as in `read_landing`
+            ratios.append(_impulse_on(trajectory, i)[up] / change)
+    return ratios
+
+
+def _impulse_on(trajectory: Trajectory, i: int) -> np.ndarray:
+    """Sum of all impulses that the floor (body 0) is reported to give to body ``i`` (d,) [N s]; NaN if unavailable."""
+    assert trajectory.contacts is not None
+    return np.asarray(trajectory.contacts.impulse_between(0, i).sum(axis=0))
+
+
+def _reported(ratios: list[float], quantity: str = "impulse") -> Samples:
+    """Samples of what contacts report; none where the engine reports no impulses."""
+    return {} if not ratios or any(math.isnan(ratio) for ratio in ratios) else {quantity: tuple(ratios)}
 
 
 # ---- rebound -----------------------------------------------------------------------------------------------------
@@ -313,11 +338,21 @@ def slide(case: Case) -> Scene:
 
 
 def read_slide(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """Friction impulse over normal impulse, both from the change of momentum, so that a hop does not count."""
-    change = trajectory.twist[-1, 1] - trajectory.twist[0, 1]
-    normal = change[case.dimension - 1] + GRAVITY * trajectory.t[-1]
+    """Friction impulse over normal impulse, from the change of momentum (a hop does not count) and as reported.
+
+    What is reported does not contain what slows the box besides contact; the reported weight is an impulse as well.
+    """
+    up, mass = case.dimension - 1, scene.bodies[1].mass
+    change = mass * (trajectory.twist[-1, 1] - trajectory.twist[0, 1])
+    normal = change[up] + mass * GRAVITY * trajectory.t[-1]
+    reported = _impulse_on(trajectory, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return {"friction": (float(np.divide(-change[0], normal)),)}
+        friction = float(np.divide(-change[0], normal))
+        told = float(np.divide(-reported[0], reported[up]))
+        weight = float(np.divide(reported[up], normal))
+    silent = bool(np.isnan(reported).any())
+    samples: Samples = {"friction": (friction,)}
+    return samples if silent else {**samples, "friction_impulse": (told,), "impulse": (weight,)}
 
 
 # ---- corner ------------------------------------------------------------------------------------------------------
@@ -349,9 +384,9 @@ def read_corner(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 PROBES = {
     "fall": Probe(("gravity", "step", "sampling"), fall, read_fall, touches=False),
     "load": Probe(("mass", "inertia", "turn"), load, read_load, touches=False),
-    "landing": Probe(("size",), landing, read_landing),
+    "landing": Probe(("size", "impulse"), landing, read_landing, contacts=True),
     "flight": Probe(("linear_damping", "angular_damping"), flight, read_flight, only_ends=True, touches=False),
     "rebound": Probe(("restitution",), rebound, read_rebound, only_ends=True),
-    "slide": Probe(("friction",), slide, read_slide, only_ends=True),
+    "slide": Probe(("friction", "friction_impulse", "impulse"), slide, read_slide, contacts=True),
     "corner": Probe(("turn",), corner, read_corner, only_ends=True),
 }

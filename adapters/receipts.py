@@ -21,6 +21,7 @@ from adapters.needs import Needs
 from adapters.probes import (
     GRAVITY,
     HALF_EXTENTS,
+    LANDING_LEAD,
     LANDING_SPEED,
     PROBES,
     SLIDE_TIME,
@@ -31,10 +32,11 @@ from adapters.probes import (
 )
 from adapters.stepping import posed_for, run
 
-#: What the probes measure. ``restitution`` and ``friction`` are the pair's effective coefficients; ``mass``,
-#: ``inertia``, ``gravity``, ``step`` and ``size`` are ratios measured / asked; ``sampling`` is how many steps late a
-#: state is read; the dampings are the fraction of speed lost in one second; ``turn`` is +1 if positive torques and
-#: contact forces turn bodies counter-clockwise where they should, -1 if not.
+#: What the probes measure. ``restitution`` and ``friction`` are the pair's effective coefficients, the latter from
+#: momentum; ``friction_impulse`` is the coefficient that reported contact impulses have, ``impulse`` their sum over the
+#: momentum that changed; ``mass``, ``inertia``, ``gravity``, ``step`` and ``size`` are ratios measured / asked;
+#: ``sampling`` is how many steps late a state is read; the dampings are the fraction of speed lost in one second;
+#: ``turn`` is +1 if positive torques and contact forces turn bodies counter-clockwise where they should, -1 if not.
 QUANTITIES = (
     "gravity",
     "step",
@@ -46,11 +48,20 @@ QUANTITIES = (
     "angular_damping",
     "restitution",
     "friction",
+    "friction_impulse",
+    "impulse",
     "turn",
 )
 
 #: Band of everything an engine gets exactly: some thousand roundings of 2.2e-16 each.
 ROUND_OFF = 1e-12
+#: What a profile's own solve may leave of friction, as a share of the coefficient, unless it declares more: what a
+#: sliding box is judged to at 1/240 s (`validation.tolerances`, dt/100 s = 4e-5), rounded up.
+FRICTION_SHARE = 1e-4
+#: What a solver's tolerance may leave of the sum of contact impulses, as a share of the momentum they change.
+IMPULSE_SHARE = 1e-6
+#: Band of a quantity that a receipt cannot tell: wider than any measured value, and still a number.
+UNTOLD = 1e9
 
 
 @dataclass(frozen=True)
@@ -92,7 +103,9 @@ def receipts(
     for quantity in wanted:
         told = declared.get(quantity)
         if told is None:
-            told = Declared(_asked(quantity, needs), *_default_band(quantity, case, declared, iterations))
+            told = Declared(_asked(quantity, needs), *_default_band(quantity, case, declared))
+        if iterations is not None:
+            told = _starved(quantity, told, case, iterations, quantity in declared)
         slips.append(_receipt(quantity, _asked(quantity, needs), told, samples.get(quantity, ()), silent.get(quantity)))
     return tuple(slips)
 
@@ -153,19 +166,21 @@ def _receipt(
     """Compare the sample farthest from what is declared with it; a quantity without samples tells why."""
     if silent and not (silent[1] and samples):
         return Receipt(quantity, asked, declared.value, declared.band, math.nan, silent[1], silent[0])
+    if not samples:
+        why = "contact impulses are not reported at these settings"
+        return Receipt(quantity, asked, declared.value, declared.band, math.nan, True, why)
     measured = max(samples, key=lambda x: math.inf if math.isnan(x) else abs(x - declared.value))
     holds = abs(measured - declared.value) <= declared.band
     return Receipt(quantity, asked, declared.value, declared.band, measured, holds, declared.because)
 
 
 def _asked(quantity: str, needs: Needs) -> float:
-    given = {"restitution": needs.restitution, "friction": needs.friction, "sampling": 0.0}
+    given = {"restitution": needs.restitution, "sampling": 0.0}
+    given |= dict.fromkeys(("friction", "friction_impulse"), needs.friction)
     return given.get(quantity, 0.0 if quantity.endswith("damping") else 1.0)
 
 
-def _default_band(
-    quantity: str, case: Case, declared: Mapping[str, Declared], iterations: int | None
-) -> tuple[float, str]:
+def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -> tuple[float, str]:
     """Band of what is as asked, and why: round-off, what the probe can resolve, and drag that is declared."""
     if quantity == "turn":
         return 0.0, "a sign"
@@ -174,28 +189,46 @@ def _default_band(
         path = (1.0 + case.restitution) * LANDING_SPEED * case.dt
         return path / HALF_EXTENTS[0] + ROUND_OFF, "one step of motion, and a predicted rebound"
     band, because = ROUND_OFF, "exact but for round-off"
-    if quantity == "friction":
-        band = 2.0 * case.dt / SLIDE_TIME * case.friction + ROUND_OFF
-        because = "one step at each end of the window may hold a friction without its load"
-        if iterations is not None:
-            # A sweep clips friction at the load known so far; what is left falls faster than 1/N with N sweeps. The
-            # first one knows no load: anything from no friction to a stop within the window. A starved solve is for
-            # the scene's checks to judge, a receipt is about the coefficient.
-            stop = slide_speed(case.friction) / (GRAVITY * SLIDE_TIME)
-            band += case.friction / iterations if iterations > 1 else stop
-            because = f"{because}; {iterations} iterations were asked for, and a load may be off by 1/{iterations}"
+    if quantity == "impulse":
+        band, because = IMPULSE_SHARE, "impulses are bookkeeping: they add up to m dv but for a solver's tolerance"
+    if quantity in ("friction", "friction_impulse"):
+        band = FRICTION_SHARE * case.friction + ROUND_OFF
+        because = "a sliding box is solved to a share of 1e-4 of its friction"
     drag = _drag(quantity, case, declared)
     return (band + drag, f"{because}; and declared drag") if drag else (band, because)
 
 
+def _starved(quantity: str, told: Declared, case: Case, iterations: int, is_declared: bool) -> Declared:
+    """What is told at a number of sweeps that was asked for: a receipt is about a parameter, not about a starved solve.
+
+    A sweep clips friction at the load known so far; what is left falls faster than 1/N with N sweeps. The first one
+    knows no load: anything from no friction to a stop within the window. The first and the last step of the window may
+    hold a friction without its load. Impulses add up at any count where they are what moves the bodies; where a profile
+    declares that they do so to its solver's tolerance only, a solve that is cut off tells nothing about them.
+    """
+    if quantity == "impulse" and is_declared:
+        return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations were asked for: not told")
+    if quantity not in ("friction", "friction_impulse"):
+        return told
+    stop = slide_speed(case.friction) / (GRAVITY * SLIDE_TIME)
+    band = case.friction / iterations if iterations > 1 else stop
+    band += 2.0 * case.dt / SLIDE_TIME * case.friction
+    because = f"{told.because}; {iterations} iterations were asked for, and a load may be off by 1/{iterations}"
+    return Declared(told.value, told.band + band, because)
+
+
 def _drag(quantity: str, case: Case, declared: Mapping[str, Declared]) -> float:
-    """Largest effect of declared damping on a probe; drag may grow with the square of a speed above 1 m/s."""
+    """Largest effect of declared damping on a probe; drag may grow with the square of a speed above 1 m/s.
+
+    What drag does to a slide is large and has a law: a profile that has drag declares its friction itself.
+    """
     which = "angular_damping" if quantity == "inertia" else "linear_damping"
-    if which not in declared or quantity in ("step", "linear_damping", "angular_damping", "restitution"):
+    untouched = ("step", "linear_damping", "angular_damping", "restitution", "friction", "friction_impulse")
+    if which not in declared or quantity in untouched:
         return 0.0
-    rate, window = -math.log1p(-min(declared[which].value + declared[which].band, 0.99)), STEPS * case.dt
-    if quantity == "friction":
-        speed = slide_speed(case.friction)
-        return rate * speed * speed / GRAVITY
+    rate = -math.log1p(-min(declared[which].value + declared[which].band, 0.99))
+    if quantity == "impulse":
+        return rate * (2.0 * LANDING_LEAD + 1.0) * case.dt
+    window = STEPS * case.dt
     share = rate * window * max(1.0, GRAVITY * window)
     return STEPS * share if quantity == "sampling" else share

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
@@ -13,6 +14,9 @@ from adapters.plain import NAME, is_visible, one_line
 GROUP = "contact_crosscheck.engines"
 #: Order in which our own engines are shown; others follow by name.
 SHOWN_FIRST = ("reference", "chipmunk", "bullet", "mujoco")
+#: Environment variable with the engines that must be installed, separated by commas: where an engine that is not
+#: there must be a failure rather than rows that say so, as in a check of every change.
+REQUIRED = "CROSSCHECK_REQUIRE_ENGINES"
 
 
 _here = False
@@ -119,3 +123,25 @@ def load(name: str) -> Engine:
     if found.engine is None:
         raise EngineError(f"engine: {name} is not installed: {found.reason}")
     return found.engine
+
+
+def check_required() -> None:
+    """Make sure that every engine named in `REQUIRED` can be loaded.
+
+    Raises
+    ------
+    EngineError
+        Naming those that cannot, with the reason of each.
+    """
+    wanted = os.environ.get(REQUIRED, "").replace(",", " ").split()
+    absent = [f"{name} ({reason})" for name in wanted if (reason := _why_not(name))]
+    if absent:
+        raise EngineError(f"{REQUIRED}: not installed: {', '.join(absent)}")
+
+
+def _why_not(name: str) -> str:
+    """Why an engine cannot be loaded; empty if it can."""
+    if name not in _entries():
+        return "no such engine"
+    found = find(name)
+    return "" if found.engine is not None else found.reason

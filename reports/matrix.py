@@ -110,7 +110,7 @@ def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[T
     words = LABELS if width >= ROOMY else SHORT
     texts = [[_styled(field, words) for field in fields] for _, fields in body]
     first = max((len(label) for label, _ in body), default=0)
-    wide = [max(len(scene), *(len(row[k]) for row in texts if row)) for k, scene in enumerate(scenes)]
+    wide = [max([len(scene), *(len(row[k]) for row in texts if row)]) for k, scene in enumerate(scenes)]
     return [_table(scenes, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
 
 

@@ -76,7 +76,9 @@ def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> No
 
 def _answers(rows: Sequence[Plain], console: Console) -> None:
     found = answers(rows)
-    _heading("What is wrong, and what cures it" if found else "Every row passes", console)
+    fails = any(row["physics"] != "pass" for row in rows)
+    nothing = "Only rows at other iteration counts, or without a verdict, do not pass" if fails else "Every row passes"
+    _heading("What is wrong, and what cures it" if found else nothing, console)
     for answer in found:
         console.print(_folded(answer.line, console))
 

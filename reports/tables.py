@@ -154,3 +154,13 @@ def health(data: Plain, console: Console) -> None:
     console.print(Text("no problem found" if not problems else f"{len(problems)} problem(s)", style="bold"))
     for problem in problems:
         console.print(Text(f"  {problem}"))
+
+
+def sensitivity(entries: Sequence[Plain], console: Console) -> None:
+    """Print from which size on every check and receipt sees a planted fault."""
+    table = grid("check or receipt", "sees a fault from this size on")
+    for entry in entries:
+        seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
+        table.add_row(Text(entry["name"]), Text(", ".join(seen) or "none of these faults"))
+    console.print(table)
+    console.print(Text("faults: told or reported 10, 1 or 0.1 % too low; drift: 0.1, 0.01 or 0.001 m/s along x"))

@@ -8,6 +8,16 @@ import textwrap
 import pytest
 
 from adapters import registry
+from adapters.engine import EngineError
+
+
+def pytest_configure():
+    """Without its engines whole files are skipped: where they are required, that is a failure and not a skip."""
+    try:
+        registry.check_required()
+    except EngineError as error:
+        raise pytest.UsageError(str(error)) from None
+
 
 EVIL = '''
 """An engine that misbehaves in a different way in each profile."""

@@ -6,30 +6,47 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 from rich.console import Console
 
 from adapters import registry
+from adapters.scene import SceneError
 from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
+from validation.detection import detection, lines
 from validation.store import Store
 
 
 @main.command("list")
 @click.argument("what", type=click.Choice(["scenes", "engines", "checks", "runs"]))
+@click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
+@click.option("--engine", default="reference", show_default=True, metavar="E", help="Engine that gets the faults.")
+@click.option("--profile", default="reference", show_default=True, metavar="P", help="Its profile that passes.")
 @AS_JSON
 @OUT
-def list_(what: str, as_json: bool, out: Path) -> None:
-    """List scenes, engines, checks, or the runs in OUT."""
-    if what == "runs":
+def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool, out: Path) -> None:
+    """List scenes, engines, checks, or the runs in OUT.
+
+    With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
+    receipt; takes a minute.
+    """
+    data: list[Any]
+    if sensitivity:
+        if what != "checks":
+            raise SceneError("sensitivity: checks have one, not " + what)
+        data = list(lines(detection(registry.load(engine), profile, 2)))
+    elif what == "runs":
         store = Store(out, create=False)
         data = [{"id": r.id, "date": r.date, "title": r.title, "finished": r.finished} for r in store.runs()]
     else:
         data = {"scenes": listing.scenes, "engines": listing.engines, "checks": listing.checks}[what]()
     if as_json:
         click.echo(json.dumps(data, indent=1))
+    elif sensitivity:
+        tables.sensitivity(data, Console())
     else:
         tables.listed(what, data, Console())
 

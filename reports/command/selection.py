@@ -66,6 +66,7 @@ def _scene_names(arguments: Sequence[str]) -> list[str]:
 
 def request_from(options: dict[str, Any]) -> Request:
     """Turn the options of `selection` into a request; raises what a wrong call raises, before anything runs."""
+    registry.check_required()
     for name in options["engine"]:
         registry.find(name)
     dimensions = list(options["dim"])

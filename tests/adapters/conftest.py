@@ -20,6 +20,9 @@ FAULTS = (
     "",
     "restitution ignored",
     "friction applied twice",
+    "friction 2 % low",
+    "impulses reported 2 % low",
+    "friction reported 2 % low",
     "gravity sign",
     "half against full extents",
     "state sampled one step late",
@@ -124,6 +127,9 @@ class ToySimulation(Simulation):
                 twist[i, :3] += dt * (gravity + self.inverse_mass[i] * np.array(body.force))
                 twist[i, 3:] += dt * self.inverse_inertia[i] @ torque
         friction_times = 2 if self.fault == "friction applied twice" else 1
+        if self.fault == "friction 2 % low":
+            for row in rows:
+                row.friction *= 0.98
         for _ in range(self.iterations):
             if max((row.solve(twist, friction_times) for row in rows), default=0.0) < 1e-15:
                 break  # nothing moves any more
@@ -189,6 +195,11 @@ class ToySimulation(Simulation):
         found = Contacts.from_rows(self.world.contacts, 3)
         if self.fault == "impulse of the wrong body":
             found.impulse[:] *= -1
+        if self.fault == "impulses reported 2 % low":
+            found.impulse[:] *= 0.98
+        if self.fault == "friction reported 2 % low":
+            normal = (found.impulse * found.normal).sum(axis=1, keepdims=True) * found.normal
+            found.impulse[:] = normal + 0.98 * (found.impulse - normal)
         if self.fault == "normal points from the second body":
             found.normal[:] *= -1
         if self.fault == "bodies not in order of the scene":

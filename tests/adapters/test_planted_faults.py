@@ -39,13 +39,16 @@ def test_every_fault_that_can_be_planted_is_in_the_table(faults):
 #: Faults of one parameter, and all receipts they break: the others must not be drawn in.
 ALONE = {
     "restitution ignored": {"restitution"},
-    "friction applied twice": {"friction"},
-    "state sampled one step late": {"sampling"},
+    "friction applied twice": {"friction", "friction_impulse"},
+    "friction 2 % low": {"friction", "friction_impulse"},
+    "impulses reported 2 % low": {"impulse"},
+    "friction reported 2 % low": {"friction_impulse"},
+    "state sampled one step late": {"sampling", "friction"},  # the last step of a slide is missing, its weight is not
     "disc inertia given to a sphere": {"inertia"},
     "angle sign": {"turn"},
     "mass ignored": {"mass"},
     "spin damped": {"inertia", "angular_damping"},
-    "impulse of the wrong body": set(),
+    "impulse of the wrong body": {"impulse"},
     "world shared between builds": set(),
 }
 

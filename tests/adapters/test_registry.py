@@ -146,3 +146,30 @@ def test_importing_adapters_imports_no_engine_and_no_numba() -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("wanted", ["zeta", "zeta, healthy", ""])
+def test_required_engines_that_are_there_are_no_matter(plugins, monkeypatch, wanted):
+    monkeypatch.setenv(registry.REQUIRED, wanted)
+    registry.check_required()
+
+
+def test_required_engines_that_are_not_there_are_named_with_the_reason(plugins, monkeypatch):
+    monkeypatch.setenv(registry.REQUIRED, "healthy,broken_init,havok")
+    with pytest.raises(EngineError) as caught:
+        registry.check_required()
+    assert "CROSSCHECK_REQUIRE_ENGINES" in str(caught.value)
+    assert "broken_init (RuntimeError: cannot start)" in str(caught.value)
+    assert "havok (no such engine)" in str(caught.value)
+    assert "healthy" not in str(caught.value)
+
+
+def test_a_run_and_the_tests_fail_without_a_required_engine(monkeypatch, tmp_path):
+    monkeypatch.setenv(registry.REQUIRED, "havok")
+    for command in (
+        [sys.executable, "-m", "reports.command", "run", "impact", "--dry-run", "--out", str(tmp_path)],
+        [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", __file__],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+        assert done.returncode != 0
+        assert "CROSSCHECK_REQUIRE_ENGINES: not installed: havok" in done.stdout + done.stderr

@@ -106,3 +106,45 @@ def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):
     result = accept(out)
     assert result.exit_code == 2
     assert "was made by other code" in result.stderr
+
+
+# ---- the exit status of a run says whether there is an alarm -------------------------------------------------------
+
+
+def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findings):
+    findings.mkdir()
+    (findings / files.FAMILIES).write_text(FAMILY)
+    assert call(*CELL, "--out", out).exit_code == 1  # new
+    accept(out, "--family", "starved")
+    assert call(*CELL, "--out", out).exit_code == 0
+    path = findings / files.MEMBERS
+    lines = path.read_text().splitlines()
+    fields = lines[1].split(",")
+    fields[7] = str(float(fields[7]) + 3.0 * float(fields[8]))
+    path.write_text("\n".join([lines[0], ",".join(fields), *lines[2:]]) + "\n")
+    files.findings_of.cache_clear()
+    assert call(*CELL, "--out", out).exit_code == 1  # drifted
+
+
+def test_a_run_fails_on_a_planned_cell_that_left_nothing(tmp_path, monkeypatch):
+    from validation.store import Store
+
+    kept = Store.observations
+    monkeypatch.setattr(Store, "observations", lambda self, run: kept(self, run)[1:])
+    cell = [
+        "run",
+        "impact",
+        "--param",
+        "v=6",
+        "--engine",
+        "chipmunk",
+        "--profile",
+        "tuned",
+        "--jobs",
+        "1",
+        "--dim",
+        "2",
+    ]
+    result = call(*cell, "--out", tmp_path)
+    assert result.exit_code == 1
+    assert "MISSING" in result.stderr

@@ -3,7 +3,7 @@
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
-from validation.store import Store, StoreError
+from validation.store import SCATTER_TITLE, Store, StoreError
 
 SLOTS = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", 1 / 240) for v in (1.0, 2.0, 3.0)]
 
@@ -42,6 +42,25 @@ def test_another_plan_is_another_run(tmp_path):
     first, _ = store.start("test", SLOTS)
     second, _ = store.start("test", SLOTS[:2])
     assert first.id != second.id
+
+
+def test_the_same_plan_of_other_code_is_another_run(tmp_path, monkeypatch):
+    store = Store(tmp_path)
+    first, _ = store.start("test", SLOTS)
+    store.add(first, observed(SLOTS[0]))
+    monkeypatch.setattr("validation.store.code_hash", lambda: "other code")
+    second, done = store.start("test", SLOTS)
+    assert second.id != first.id
+    assert done == set()
+
+
+def test_a_run_of_moved_starts_is_the_latest_only_if_there_is_nothing_else(tmp_path):
+    store = Store(tmp_path)
+    first, _ = store.start("quick: impact", SLOTS)
+    store.finish(first)
+    second, _ = store.start(f"{SCATTER_TITLE}{first.id}", SLOTS)
+    assert store.run().id == first.id
+    assert store.run(second.id).id == second.id
 
 
 def test_missing_results_and_runs_are_said_in_one_line(tmp_path):

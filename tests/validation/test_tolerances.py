@@ -11,6 +11,13 @@ from validation.scenes import CATALOGUE
 DTS = (1 / 60, 1 / 240, 1 / 1000)
 
 
+#: Orders of forcing and moving within a step, none a shift of another: where contact is looked for (old or new pose),
+#: and what moves the ball (the new velocity, the mean of both, or the exact parabola cut at the impact).
+ORDERS = ("velocity first", "mean velocity", "cut at the impact")
+#: An order that loses v dt of height at every bounce: its way down is that of the new velocity, its way up as well.
+LOSING = "velocity first, reflected after the move"
+
+
 def bounce_by(scene, dt, order, e=None, g_factor=1.0, damping=0.0):
     """Independent scalar stepper of a bouncing ball: rigid law, ``order`` of moving and forcing within a step."""
     e = scene.params["e"] if e is None else e
@@ -18,18 +25,66 @@ def bounce_by(scene, dt, order, e=None, g_factor=1.0, damping=0.0):
     y, v = scene.params["height"], 0.0
     rows = [(y, v)]
     for _ in range(math.ceil(scene.duration / dt - 1e-9)):
-        if order == "position first":
-            y += v * dt
-            v = -e * v if y <= 0.0 and v < 0.0 else (0.0 if y <= 0.0 and v == 0.0 else v - g * dt)
-        else:
-            v = -e * v if y <= 0.0 and v < 0.0 else (0.0 if y <= 0.0 and v == 0.0 else v - g * dt)
-            y += v * dt
+        y, v = STEPS[order](y, v, e, g, dt)
         v *= 1.0 - damping * dt
         rows.append((y, v))
     states = np.array(rows)
     pose, twist = np.zeros((len(rows), 2, 3)), np.zeros((len(rows), 2, 3))
     pose[:, 1, 1], twist[:, 1, 1] = states[:, 0] + 0.5, states[:, 1]
     return Trajectory(np.arange(len(rows)) * dt, pose, twist, None, dt, "completed")
+
+
+def velocity_first(y, v, e, g, dt):
+    """Contact at the old pose replaces gravity: a ball that touches leaves with e times its speed, or rests."""
+    v = -e * v if y <= 0.0 and v < 0.0 else (0.0 if y <= 0.0 and v == 0.0 else v - g * dt)
+    return y + v * dt, v
+
+
+def reflected_after_the_move(y, v, e, g, dt):
+    """The ball moves by its new velocity, and is reflected if that has brought it below the floor."""
+    if y <= 0.0 and abs(v) <= g * dt:
+        return y, 0.0
+    new = v - g * dt
+    y += new * dt
+    return (y, -e * new) if y <= 0.0 and new < 0.0 else (y, new)
+
+
+def mean_velocity(y, v, e, g, dt):
+    """Parabolas without an error of their own; the impact is found at the end of its step."""
+    if y <= 0.0 and abs(v) <= g * dt:
+        return y, 0.0
+    new = v - g * dt
+    y += 0.5 * (v + new) * dt
+    return (y, -e * new) if y <= 0.0 and new < 0.0 else (y, new)
+
+
+def cut_at_the_impact(y, v, e, g, dt):
+    """The exact answer of the step: all impacts within it at their times, up to a rest."""
+    left = dt
+    for _ in range(1000):
+        # y + v t - g t^2/2 = 0, the root ahead
+        t = (v + math.sqrt(max(0.0, v * v + 2.0 * g * max(y, 0.0)))) / g
+        if t > left:
+            return y + v * left - 0.5 * g * left * left, v - g * left
+        left, v, y = left - t, -e * (v - g * t), 0.0
+        if v <= 1e-9:
+            return 0.0, 0.0
+    return 0.0, v
+
+
+STEPS = dict(zip(ORDERS, (velocity_first, mean_velocity, cut_at_the_impact), strict=True))
+STEPS[LOSING] = reflected_after_the_move
+
+
+@pytest.mark.parametrize("first, second", [(a, b) for i, a in enumerate(STEPS) for b in list(STEPS)[i + 1 :]])
+def test_the_orders_are_alternatives_and_no_shifts_of_each_other(first, second):
+    scene = CATALOGUE["bounce"].scene(2, {"e": 0.8})
+    dt = 1 / 60
+    one, other = (bounce_by(scene, dt, order).pose[:, 1, 1] for order in (first, second))
+    for shift in (-2, -1, 0, 1, 2):
+        n = len(one) - abs(shift)
+        a, b = one[max(0, shift) :][:n], other[max(0, -shift) :][:n]
+        assert np.abs(a - b).max() > 0.1 * scene.params["g"] * dt**2, shift
 
 
 def failing(scene, trajectory):
@@ -42,23 +97,29 @@ def failing(scene, trajectory):
     }
 
 
-@pytest.mark.parametrize("order", ["position first", "velocity first"])
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("dt", DTS)
 @pytest.mark.parametrize("e", [0.5, 0.8, 0.95, 1.0])
-def test_a_rigid_bounce_passes_in_both_orders_whatever_the_phase(e, dt, order):
+def test_a_rigid_bounce_passes_in_every_order_whatever_the_phase(e, dt, order):
     canonical = CATALOGUE["bounce"]
     for height in np.linspace(1.0, 1.15, 7):
         scene = canonical.scene(2, {"e": e, "height": float(height)})
         assert failing(scene, bounce_by(scene, dt, order)) == set(), height
 
 
-@pytest.mark.parametrize("order", ["position first", "velocity first"])
+@pytest.mark.parametrize("order", ORDERS)
 def test_wrong_physics_fails_the_bounce(order):
     scene = CATALOGUE["bounce"].scene(2, {"e": 0.8})
     dt = 1 / 240
     assert "apex[1]" in failing(scene, bounce_by(scene, dt, order, e=0.75))
     assert "apex[3]" in failing(scene, bounce_by(scene, dt, order, damping=0.1))
     assert "rest_time" in failing(scene, bounce_by(scene, dt, order, g_factor=0.7))
+
+
+def test_an_order_that_loses_height_at_every_bounce_fails():
+    """At e = 0.8 it rests 0.6 s early, where scatter and location of the impacts allow 0.25 s."""
+    scene = CATALOGUE["bounce"].scene(2, {"e": 0.8})
+    assert failing(scene, bounce_by(scene, 1 / 240, LOSING)) == {"rest_time"}
 
 
 def test_energy_growth_is_caught_where_e_is_below_one():

@@ -41,28 +41,61 @@ def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(build, shape,
     assert np.abs(record.pose[-1, 1, :3] - [0.2, -0.1, 0.5]).max() <= 1e-13
 
 
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.8, 1.0])
-@pytest.mark.parametrize("speed", [1e-3, 0.1, 6.0, 1e3])
-@pytest.mark.parametrize("dt", [1 / 60, 1 / 1000])
-@pytest.mark.parametrize("phase", [0.0, 0.137, 0.5, 0.999])
-def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, e, speed, dt, phase):
-    """It starts where it reaches the floor after a share of the step; what counts is the impulse of the impact."""
+def falling(speed, dt, phase):
+    """Height [m] and speed [m/s] from which a sphere reaches the floor after a share of a step, when, and how fast."""
     early = phase * dt
     start = speed - G * early
     place = 0.5 + start * early + 0.5 * G * early**2
     if start < 0.0 or place < 0.5:
-        place, early, speed = 0.5 + speed * early + 0.5 * G * early**2, early, speed + G * early
+        place, speed = 0.5 + speed * early + 0.5 * G * early**2, speed + G * early
         start = speed - G * early
+    return place, start, early, speed
+
+
+FALLS = [
+    (e, speed, dt, phase)
+    for e in (0.0, 0.3, 0.8, 1.0)
+    for speed in (1e-3, 0.1, 6.0, 1e3)
+    for dt in (1 / 60, 1 / 1000)
+    for phase in (0.0, 0.137, 0.5, 0.999)
+]
+
+
+def bounces_once(e, speed, dt, phase):
+    """Whether the flight after the impact lasts beyond the step."""
+    _, _, early, speed = falling(speed, dt, phase)
+    return 2.0 * e * speed > G * (dt - early)
+
+
+def after_a_step(build, e, speed, dt, phase):
+    place, start, _, _ = falling(speed, dt, phase)
     ball = build.sphere((0.0, 0.0, place), (0.0, 0.0, -start), mass=0.5)
     simulation = build.simulation([build.floor(), ball], Settings.reference(dt), DOWN, e)
     simulation.advance(1)
-    rebound, left = e * speed, dt - early
-    if 2 * rebound > G * left:  # one bounce in this step
-        scale = max(speed, G * dt)
-        # The place itself is rounded by 1e-16 m, which the fall turns into g / speed of it.
-        assert abs(simulation.twist[1, 2] - (rebound - G * left)) <= 1e-14 * scale + 4e-16 * G / speed
-        impulse = simulation.contacts().impulse.sum(axis=0)
-        assert impulse[2] == pytest.approx(0.5 * (1 + e) * speed, rel=1e-14 * scale / speed + 4e-16 * G / speed**2)
+    return simulation
+
+
+@pytest.mark.parametrize("e, speed, dt, phase", [fall for fall in FALLS if bounces_once(*fall)])
+def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, e, speed, dt, phase):
+    """It starts where it reaches the floor after a share of the step; what counts is the impulse of the impact."""
+    simulation = after_a_step(build, e, speed, dt, phase)
+    _, _, early, speed = falling(speed, dt, phase)
+    scale = max(speed, G * dt)
+    # The place itself is rounded by 1e-16 m, which the fall turns into g / speed of it.
+    lasting = e * speed - G * (dt - early)
+    assert abs(simulation.twist[1, 2] - lasting) <= 1e-14 * scale + 4e-16 * G / speed
+    impulse = simulation.contacts().impulse.sum(axis=0)
+    assert impulse[2] == pytest.approx(0.5 * (1 + e) * speed, rel=1e-14 * scale / speed + 4e-16 * G / speed**2)
+
+
+@pytest.mark.parametrize("e, speed, dt, phase", [fall for fall in FALLS if not bounces_once(*fall)])
+def test_a_sphere_that_bounces_more_than_once_in_a_step_gains_no_energy_and_stays_above(build, e, speed, dt, phase):
+    simulation = after_a_step(build, e, speed, dt, phase)
+    place, start, _, _ = falling(speed, dt, phase)
+    before = 0.5 * start**2 + G * (place - 0.5)
+    height, fast = simulation.pose[1, 2] - 0.5, simulation.twist[1, 2]
+    assert height >= -1e-15
+    assert 0.5 * fast**2 + G * height <= before + 1e-14 * max(1.0, before)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])

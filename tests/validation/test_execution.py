@@ -1,0 +1,56 @@
+"""A cell whose receipts or certificate do not hold is INVALID: its numbers are no answer of that profile."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from adapters.receipts import Receipt
+from validation import execution
+from validation.cells import Outcome, Slot
+from validation.execution import execute
+from validation.rows import rows_of
+
+pytest.importorskip("pymunk")
+SLOT = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
+HOLDS = Receipt("mass", 1.0, 1.0, 1e-12, 1.0, True, "exact")
+BROKEN = Receipt("friction", 0.5, 0.5, 1e-6, 0.49, False, "exact")
+
+
+def observed(monkeypatch, *slips, certificate=None):
+    monkeypatch.setattr(execution, "receipts", lambda *arguments: slips)
+    if certificate is not None:
+        run = execution.run
+        monkeypatch.setattr(execution, "run", lambda *a: replace(run(*a), certificate=certificate))
+    found = execute(SLOT)
+    return found[0] if isinstance(found, tuple) else found
+
+
+def test_receipts_that_hold_leave_the_cell_its_verdicts(monkeypatch):
+    observation = observed(monkeypatch, HOLDS)
+    assert observation.outcome is Outcome.OK
+    assert [slip["quantity"] for slip in observation.receipts] == ["mass"]
+    assert {row.physics for row in rows_of("run", [observation])} == {"pass"}
+
+
+def test_one_broken_receipt_makes_the_cell_invalid_and_every_row_an_alarm(monkeypatch):
+    observation = observed(monkeypatch, HOLDS, BROKEN)
+    assert observation.outcome is Outcome.INVALID
+    assert observation.reason == "receipt friction: measured 0.49, declared 0.5 +- 1e-06"
+    rows = rows_of("run", [observation])
+    assert rows and all(row.alarming and row.physics is None for row in rows)
+
+
+def test_a_receipt_that_could_not_be_measured_and_does_not_hold_is_broken_too(monkeypatch):
+    silent = replace(BROKEN, measured=math.nan, because="probe slide diverged")
+    assert observed(monkeypatch, silent).outcome is Outcome.INVALID
+
+
+@pytest.mark.parametrize(
+    ("certificate", "outcome"),
+    [({"certified": False, "reasons": ["gap"]}, Outcome.INVALID), ({"certified": True}, Outcome.OK), ({}, Outcome.OK)],
+)
+def test_a_certificate_that_does_not_hold_makes_the_cell_invalid(monkeypatch, certificate, outcome):
+    observation = observed(monkeypatch, HOLDS, certificate=certificate)
+    assert observation.outcome is outcome
+    assert ("certificate: gap" in observation.reason) == (outcome is Outcome.INVALID)
