@@ -11,8 +11,8 @@ With these the gap is a smooth function of the poses, so that its second derivat
 
     d/dt (J v) = J dv/dt + gamma,      gamma = (d/ds J(q + s v)) v   (v, w held, orientations turned by exp(s w)).
 
-Let u be the relative velocity of the two bodies at the contact point, n the normal, r_a and r_b the levers, and dots the
-rates along that motion. Then beta = w_b x r_b' - w_a x r_a' and
+Let u be the relative velocity of the two bodies at the contact point, n the normal, r_a and r_b the levers, and primes
+the rates along that motion. Then beta = w_b x r_b' - w_a x r_a' and
 
     gamma_n = n . beta + n' . u,        gamma_t = t . beta - (t . n') u_n
 
@@ -22,15 +22,12 @@ normal part is used). Levers lead to the *geometric* point of contact, which mov
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
-
-import numpy as np
+import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.spatial.points import share_of_gap
-from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, Bodies, Manifolds
+from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, POINTS, Bodies, Manifolds
 from reference_solver.spatial.vector import (
-    ZERO,
     Vector,
     add,
     add_scaled,
@@ -45,77 +42,68 @@ from reference_solver.spatial.vector import (
     times,
     times_transposed,
 )
+from reference_solver.stepping.lasting import Lasting
 
 #: Cores.
 POINT, LINE, PLANE = 0, 1, 2
 
-#: One held contact point. Features in the axes of their bodies; what follows from the poses in world axes.
-HELD = np.dtype(
-    [
-        ("body", "i8", 2),  # a, b
-        ("manifold", "i8"),  # where it was found
-        ("point", "i8"),
-        ("core", "i8", 2),  # POINT, LINE or PLANE of either body
-        ("place", "f8", (2, 3)),  # a point of the core, body axes [m]
-        ("direction", "f8", (2, 3)),  # unit direction of a line, outward normal of a plane, body axes
-        ("radius", "f8", 2),  # by which the core is grown [m]
-        ("side", "f8"),  # line on line: sign of e_a x e_b along the normal
-        ("friction", "f8"),  # mu
-        ("gap", "f8"),  # [m]
-        ("frame", "f8", (3, 3)),  # rows n, t1, t2; n from A to B
-        ("arm", "f8", (2, 3)),  # contact point minus centre of either body [m]
-        ("velocity", "f8", 3),  # u along n, t1, t2 [m/s]
-        ("gamma", "f8", 3),  # along n, t1, t2 [m/s^2]
-        ("mode", "i8"),  # see `phase`
-        ("slip", "f8", 3),  # unit direction of the slip, world axes
-        ("force", "f8", 3),  # on B along n, t1, t2 [N]
-        ("along", "f8", (2,)),  # place on a line, from `place` [m]: where it reaches the end the feature changes
-    ],
-    align=True,
-)
-Held: TypeAlias = Any
+#: Entries of `Lasting.kind`: the cores of A and B.
+CORE = 0
+#: Entries of `Lasting.place`, those of B after those of A: a point of the core [m], the direction of a line or the
+#: outward normal of a plane (body axes), the radius by which the core is grown [m], and, as they follow from the poses,
+#: the place on a line, from its middle [m]. Then the sign of e_a x e_b along n where lines cross.
+PLACE, DIRECTION, RADIUS, ALONG, SIDE = 0, 6, 12, 14, 16
 
 #: Coordinates this near to a face, as a share of its half extent, lie on it.
 ON_FACE = 1e-6
-#: Cosines this near to 1 belong to parallel directions: the normal of a face against the one that was found.
+#: Squared sines below this belong to parallel directions: the normal of a face against the one that was found.
 PARALLEL = 1e-12
 
 
-def allocate_held(capacity: int) -> Held:
-    """Return room for ``capacity`` held contacts."""
-    return np.zeros(capacity, HELD).view(np.recarray)
+@inner_kernel
+def part(lasting: Lasting, k: int, entry: int, side: int) -> Vector:
+    """Vector of a feature, body axes."""
+    return row(lasting.place, k, entry + 3 * side)
+
+
+@inner_kernel
+def set_part(lasting: Lasting, k: int, entry: int, side: int, v: Vector) -> None:
+    """Write a vector of a feature."""
+    for d in range(3):
+        lasting.place[k, entry + 3 * side + d] = v[d]
 
 
 @kernel
-def name_features(bodies: Bodies, manifolds: Manifolds, m: int, p: int, held: Held, c: int) -> bool:
-    """Write the features that touch at point p of manifold m into record c; False where they have no normal.
+def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> bool:
+    """Note the features that touch at row c (point c % 4 of manifold c // 4) as contact k; False without a normal.
 
-    A face is taken where the normal is its own and the other body has a point there; else edges that cross; else an edge
-    or a corner against whatever is round.
+    A face is taken where the normal is its own and the other body has a point there; else edges that cross; else an
+    edge or a corner against whatever is round.
     """
+    m, p = c // POINTS, c % POINTS
     a, b = manifolds.body_a[m], manifolds.body_b[m]
-    held.body[c, 0], held.body[c, 1] = a, b
-    held.manifold[c], held.point[c] = m, p
-    held.friction[c] = manifolds.friction[m]
-    held.side[c] = 1.0
+    lasting.body[k, 0], lasting.body[k, 1] = a, b
+    lasting.friction[k] = manifolds.friction[m]
+    lasting.place[k, SIDE] = 1.0
     n = row(manifolds.frame[m], 2, 0)
-    arm_a, arm_b = row(manifolds.arm_a[m], p, 0), row(manifolds.arm_b[m], p, 0)
     face_a, face_b = facing(bodies, a, n), facing(bodies, b, scale(-1.0, n))
-    core_a = nearest_core(bodies, a, arm_a, n, held, c, 0)
-    core_b = nearest_core(bodies, b, arm_b, scale(-1.0, n), held, c, 1)
+    core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
+    core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
     if face_a >= 0 and core_b == POINT:
-        set_face(bodies, a, face_a, n, held, c, 0)
+        set_face(bodies, a, face_a, n, lasting, k, 0)
         return True
     if face_b >= 0 and core_a == POINT:
-        set_face(bodies, b, face_b, scale(-1.0, n), held, c, 1)
+        set_face(bodies, b, face_b, scale(-1.0, n), lasting, k, 1)
         return True
-    if core_a == PLANE or core_b == PLANE:
-        return False
     if core_a == LINE and core_b == LINE:
-        across = cross(times(bodies.axes, a, row(held.direction[c], 0, 0)), times(bodies.axes, b, row(held.direction[c], 1, 0)))
-        held.side[c] = 1.0 if dot(across, n) > 0.0 else -1.0
+        e_a, e_b = (
+            times(bodies.axes, a, part(lasting, k, DIRECTION, 0)),
+            times(bodies.axes, b, part(lasting, k, DIRECTION, 1)),
+        )
+        across = cross(e_a, e_b)
+        lasting.place[k, SIDE] = 1.0 if dot(across, n) > 0.0 else -1.0
         return dot(across, across) > ON_FACE
-    return True
+    return core_a != PLANE and core_b != PLANE
 
 
 @inner_kernel
@@ -133,74 +121,77 @@ def facing(bodies: Bodies, i: int, n: Vector) -> int:
 
 
 @inner_kernel
-def set_face(bodies: Bodies, i: int, k: int, n: Vector, held: Held, c: int, side: int) -> None:
+def set_face(bodies: Bodies, i: int, k: int, n: Vector, lasting: Lasting, c: int, side: int) -> None:
     """Take face k of body i, outward normal n, as its core."""
-    held.core[c, side] = PLANE
-    held.radius[c, side] = 0.0
-    sign = 1.0
-    if bodies.kind[i] == BOX:
+    lasting.kind[c, CORE + side] = PLANE
+    lasting.place[c, RADIUS + side] = 0.0
+    if bodies.kind[i] == HALF_SPACE:
+        normal = row(bodies.geometry, i, 0)
+        far = bodies.geometry[i, 3]
+    else:
         sign = 1.0 if dot(axis(bodies.axes, i, k), n) > 0.0 else -1.0
-    for d in range(3):
-        if bodies.kind[i] == HALF_SPACE:
-            held.direction[c, side, d] = bodies.geometry[i, d]
-            held.place[c, side, d] = bodies.geometry[i, 3] * bodies.geometry[i, d]
-        else:
-            held.direction[c, side, d] = sign if d == k else 0.0
-            held.place[c, side, d] = sign * bodies.geometry[i, k] if d == k else 0.0
+        normal = (sign if k == 0 else 0.0, sign if k == 1 else 0.0, sign if k == 2 else 0.0)
+        far = bodies.geometry[i, k]
+    set_part(lasting, c, DIRECTION, side, normal)
+    set_part(lasting, c, PLACE, side, scale(far, normal))
 
 
 @inner_kernel
-def nearest_core(bodies: Bodies, i: int, arm: Vector, n: Vector, held: Held, c: int, side: int) -> int:
+def nearest_core(bodies: Bodies, i: int, arm: Vector, n: Vector, lasting: Lasting, c: int, side: int) -> int:
     """Core of body i under the point ``arm`` from its centre, n its outward normal; its name."""
     local = times_transposed(bodies.axes, i, arm)
-    held.radius[c, side] = 0.0
-    for d in range(3):
-        held.place[c, side, d] = held.direction[c, side, d] = 0.0
-    kind = bodies.kind[i]
+    place, direction = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    lasting.place[c, RADIUS + side] = 0.0
     core = POINT
-    if kind == HALF_SPACE:
+    if bodies.kind[i] == HALF_SPACE:
         core = PLANE
-    elif kind == BOX:
-        on = 0
-        for d in range(3):
-            half = bodies.geometry[i, d]
-            if abs(local[d]) >= half * (1.0 - ON_FACE):
-                held.place[c, side, d] = half if local[d] > 0.0 else -half
-                on += 1
-            else:
-                held.direction[c, side, d] = 1.0
-        core = POINT if on == 3 else LINE if on == 2 else PLANE
-    elif kind == CAPSULE:
-        held.radius[c, side] = bodies.geometry[i, 1]
-        outward = times_transposed(bodies.axes, i, n)
-        half, x = bodies.geometry[i, 0], local[0] - bodies.geometry[i, 1] * outward[0]
-        if abs(x) >= half * (1.0 - ON_FACE):
-            held.place[c, side, 0] = half if x > 0.0 else -half
-        else:
-            held.direction[c, side, 0] = 1.0
+    elif bodies.kind[i] == BOX:
+        half = row(bodies.geometry, i, 0)
+        x, y, z = on_face(local[0], half[0]), on_face(local[1], half[1]), on_face(local[2], half[2])
+        place = (x, y, z)
+        direction = (0.0 if x != 0.0 else 1.0, 0.0 if y != 0.0 else 1.0, 0.0 if z != 0.0 else 1.0)
+        free = direction[0] + direction[1] + direction[2]
+        core = POINT if free == 0.0 else LINE if free == 1.0 else PLANE
+    elif bodies.kind[i] == CAPSULE:
+        radius = bodies.geometry[i, 1]
+        lasting.place[c, RADIUS + side] = radius
+        x = on_face(local[0] - radius * dot(axis(bodies.axes, i, 0), n), bodies.geometry[i, 0])
+        place = (x, 0.0, 0.0)
+        if x == 0.0:
+            direction = (1.0, 0.0, 0.0)
             core = LINE
     else:
-        held.radius[c, side] = bodies.geometry[i, 0]
-    held.core[c, side] = core
+        lasting.place[c, RADIUS + side] = bodies.geometry[i, 0]
+    set_part(lasting, c, PLACE, side, place)
+    set_part(lasting, c, DIRECTION, side, direction)
+    lasting.kind[c, CORE + side] = core
     return core
 
 
+@inner_kernel
+def on_face(x: float, half: float) -> float:
+    """Coordinate of the face on which x lies, 0 if on neither."""
+    if abs(x) < half * (1.0 - ON_FACE):
+        return 0.0
+    return math.copysign(half, x)
+
+
 @kernel
-def follow(bodies: Bodies, held: Held, c: int) -> None:
-    """Gap, frame, levers, velocity and gamma of held contact c at the poses and twists of its bodies."""
-    a, b = held.body[c, 0], held.body[c, 1]
+def follow(bodies: Bodies, lasting: Lasting, k: int) -> None:
+    """Gap, frame, levers, velocity and gamma of noted contact k at the poses and twists of its bodies."""
+    a, b = lasting.body[k, 0], lasting.body[k, 1]
     w_a, w_b = row(bodies.twist, a, 3), row(bodies.twist, b, 3)
-    p_a = times(bodies.axes, a, row(held.place[c], 0, 0))
-    p_b = times(bodies.axes, b, row(held.place[c], 1, 0))
-    e_a = times(bodies.axes, a, row(held.direction[c], 0, 0))
-    e_b = times(bodies.axes, b, row(held.direction[c], 1, 0))
+    p_a = times(bodies.axes, a, part(lasting, k, PLACE, 0))
+    p_b = times(bodies.axes, b, part(lasting, k, PLACE, 1))
+    e_a = times(bodies.axes, a, part(lasting, k, DIRECTION, 0))
+    e_b = times(bodies.axes, b, part(lasting, k, DIRECTION, 1))
     centres = sub(row(bodies.pose, b, 0), row(bodies.pose, a, 0))
     centres_rate = sub(row(bodies.twist, b, 0), row(bodies.twist, a, 0))
     p_a_rate, p_b_rate = cross(w_a, p_a), cross(w_b, p_b)
     e_a_rate, e_b_rate = cross(w_a, e_a), cross(w_b, e_b)
     between = sub(add(centres, p_b), p_a)
     between_rate = sub(add(centres_rate, p_b_rate), p_a_rate)
-    core_a, core_b = held.core[c, 0], held.core[c, 1]
+    core_a, core_b = lasting.kind[k, CORE], lasting.kind[k, CORE + 1]
     # n and its rate, the distance of the cores, and the lever of the core's point on the body that tells the place.
     of_b = True
     tip, tip_rate = p_b, p_b_rate
@@ -212,39 +203,39 @@ def follow(bodies: Bodies, held: Held, c: int) -> None:
         distance = dot(n, between)
         of_b, tip, tip_rate = False, p_a, p_a_rate
     elif core_a == LINE and core_b == LINE:
-        n, n_rate = crossed_normal(e_a, e_b, e_a_rate, e_b_rate, held.side[c])
+        n, n_rate = crossed_normal(e_a, e_b, e_a_rate, e_b_rate, lasting.place[k, SIDE])
         distance = dot(n, between)
         cosine, cosine_rate = dot(e_a, e_b), dot(e_a_rate, e_b) + dot(e_a, e_b_rate)
         on_a, on_b = dot(between, e_a), dot(between, e_b)
         on_a_rate = dot(between_rate, e_a) + dot(between, e_a_rate)
         on_b_rate = dot(between_rate, e_b) + dot(between, e_b_rate)
         squared_sine = 1.0 - cosine * cosine
-        held.along[c, 0] = (on_a - cosine * on_b) / squared_sine
+        lasting.place[k, ALONG] = (on_a - cosine * on_b) / squared_sine
         y = (cosine * on_a - on_b) / squared_sine
         y_rate = cosine_rate * on_a + cosine * on_a_rate - on_b_rate + 2.0 * cosine * cosine_rate * y
-        held.along[c, 1] = y
+        lasting.place[k, ALONG + 1] = y
         tip = add_scaled(p_b, y, e_b)
         tip_rate = add_scaled(add_scaled(p_b_rate, y, e_b_rate), y_rate / squared_sine, e_b)
     elif core_a == LINE:
         distance, n, n_rate, x = line_normal(e_a, e_a_rate, between, between_rate)
-        held.along[c, 0] = x
+        lasting.place[k, ALONG] = x
     elif core_b == LINE:
         distance, n, n_rate, y = line_normal(e_b, e_b_rate, scale(-1.0, between), scale(-1.0, between_rate))
         n, n_rate = scale(-1.0, n), scale(-1.0, n_rate)
-        held.along[c, 1] = y
+        lasting.place[k, ALONG + 1] = y
         of_b, tip, tip_rate = False, p_a, p_a_rate
     else:
         distance = length(between)
         n = scale(1.0 / distance, between)
         n_rate = scale(1.0 / distance, add_scaled(between_rate, -dot(n, between_rate), n))
-    gap = distance - held.radius[c, 0] - held.radius[c, 1]
+    gap = distance - lasting.place[k, RADIUS] - lasting.place[k, RADIUS + 1]
     share = share_of_gap(bodies, a, b)
     if of_b:
-        reach = held.radius[c, 1] + (1.0 - share) * gap
+        reach = lasting.place[k, RADIUS + 1] + (1.0 - share) * gap
         arm_b = add_scaled(tip, -reach, n)
         arm_a = add(centres, arm_b)
     else:
-        reach = held.radius[c, 0] + share * gap
+        reach = lasting.place[k, RADIUS] + share * gap
         arm_a = add_scaled(tip, reach, n)
         arm_b = sub(arm_a, centres)
     u = sub(add(row(bodies.twist, b, 0), cross(w_b, arm_b)), add(row(bodies.twist, a, 0), cross(w_a, arm_a)))
@@ -257,20 +248,18 @@ def follow(bodies: Bodies, held: Held, c: int) -> None:
         arm_b_rate = sub(arm_a_rate, centres_rate)
     beta = sub(cross(w_b, arm_b_rate), cross(w_a, arm_a_rate))
     t1, t2 = tangents(n)
-    held.gap[c] = gap
-    held.velocity[c, 0], held.velocity[c, 1], held.velocity[c, 2] = gap_rate, dot(t1, u), dot(t2, u)
-    held.gamma[c, 0] = dot(n, beta) + dot(n_rate, u)
-    held.gamma[c, 1] = dot(t1, beta) - dot(t1, n_rate) * gap_rate
-    held.gamma[c, 2] = dot(t2, beta) - dot(t2, n_rate) * gap_rate
+    lasting.gap[k] = gap
+    lasting.speed[k, 0], lasting.speed[k, 1], lasting.speed[k, 2] = gap_rate, dot(t1, u), dot(t2, u)
+    lasting.gamma[k, 0] = dot(n, beta) + dot(n_rate, u)
+    lasting.gamma[k, 1] = dot(t1, beta) - dot(t1, n_rate) * gap_rate
+    lasting.gamma[k, 2] = dot(t2, beta) - dot(t2, n_rate) * gap_rate
     for d in range(3):
-        held.frame[c, 0, d], held.frame[c, 1, d], held.frame[c, 2, d] = n[d], t1[d], t2[d]
-        held.arm[c, 0, d], held.arm[c, 1, d] = arm_a[d], arm_b[d]
+        lasting.frame[k, 0, d], lasting.frame[k, 1, d], lasting.frame[k, 2, d] = n[d], t1[d], t2[d]
+    set_rows(bodies, lasting, k, arm_a, arm_b)
 
 
 @inner_kernel
-def crossed_normal(
-    e_a: Vector, e_b: Vector, e_a_rate: Vector, e_b_rate: Vector, side: float
-) -> tuple[Vector, Vector]:
+def crossed_normal(e_a: Vector, e_b: Vector, e_a_rate: Vector, e_b_rate: Vector, side: float) -> tuple[Vector, Vector]:
     """Unit normal of two lines and its rate."""
     across = cross(e_a, e_b)
     across_rate = add(cross(e_a_rate, e_b), cross(e_a, e_b_rate))
@@ -298,12 +287,53 @@ def line_normal(
 
 
 @inner_kernel
-def half_length(bodies: Bodies, held: Held, c: int, side: int) -> float:
-    """Half length of the line that body ``side`` offers [m]."""
-    i = held.body[c, side]
-    if bodies.kind[i] == CAPSULE:
-        return bodies.geometry[i, 0]
-    for d in range(3):
-        if held.direction[c, side, d] != 0.0:
-            return bodies.geometry[i, d]
-    return 0.0
+def set_rows(bodies: Bodies, lasting: Lasting, k: int, arm_a: Vector, arm_b: Vector) -> None:
+    """Rows of contact k and their responses, from its frame and levers (E2, E3)."""
+    for side in range(2):
+        i, arm, sign = lasting.body[k, side], arm_b if side else arm_a, 2.0 * side - 1.0
+        jacobian, response = lasting.jacobian[k, side], lasting.response[k, side]
+        for r in range(3):
+            along = scale(sign, row(lasting.frame[k], r, 0))
+            turning = cross(arm, along)
+            spin = times(bodies.inverse_inertia, i, turning)
+            for d in range(3):
+                jacobian[r, d], jacobian[r, 3 + d] = along[d], turning[d]
+                response[r, d], response[r, 3 + d] = bodies.inverse_mass[i] * along[d], spin[d]
+
+
+@kernel
+def distance_to_limit(bodies: Bodies, lasting: Lasting, k: int) -> float:
+    """How far contact k is from where its features end, < 0 beyond, infinite if they have no end [m].
+
+    A line ends where it is as long as its body, a face at its edges. An edge or a corner of a box, and the end of a
+    capsule, meets what is round, or another edge, only while the normal looks out of it.
+    """
+    limit = math.inf
+    for side in range(2):
+        i, core, other = lasting.body[k, side], lasting.kind[k, CORE + side], lasting.kind[k, CORE + 1 - side]
+        if bodies.kind[i] != BOX and bodies.kind[i] != CAPSULE:
+            continue
+        outward = times_transposed(bodies.axes, i, scale(1.0 - 2.0 * side, row(lasting.frame[k], 0, 0)))
+        arm = lever(lasting, k, side)
+        local = times_transposed(bodies.axes, i, arm)
+        for d in range(3):
+            if bodies.kind[i] == CAPSULE and d > 0:
+                continue
+            along = part(lasting, k, DIRECTION, side)[d]
+            at = part(lasting, k, PLACE, side)[d]
+            half = bodies.geometry[i, d]
+            if core == PLANE and along == 0.0:
+                limit = min(limit, half - abs(local[d]))
+            elif core == LINE and along != 0.0:
+                limit = min(limit, half - abs(lasting.place[k, ALONG + side]))
+            elif core != PLANE and other != PLANE:
+                reach = half if bodies.kind[i] == BOX else bodies.geometry[i, 1]
+                limit = min(limit, reach * outward[d] * (1.0 if at > 0.0 else -1.0))
+    return limit
+
+
+@inner_kernel
+def lever(lasting: Lasting, k: int, side: int) -> Vector:
+    """Lever of contact k on one of its bodies, without its part along the normal: n x (r x n)."""
+    n, turning = row(lasting.frame[k], 0, 0), row(lasting.jacobian[k, side], 0, 3)
+    return scale(2.0 * side - 1.0, cross(n, turning))

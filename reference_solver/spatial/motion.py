@@ -21,8 +21,8 @@ from reference_solver.spatial.vector import (
     length,
     normalised,
     quaternion_product,
-    rotation_quaternion,
     rotated_back,
+    rotation_quaternion,
     row,
     scale,
     times,
@@ -131,9 +131,7 @@ def spin_of(bodies: Bodies, i: int, momentum: Vector) -> Vector:
 @inner_kernel
 def split_turn(bodies: Bodies, i: int, momentum: Vector, dt: float) -> Quaternion:
     """Quaternion of body i after dt with constant angular momentum [kg m^2/s], by the splitting E18."""
-    return split_flow(
-        quaternion(bodies, i), times_transposed(bodies.axes, i, momentum), row(bodies.moments, i, 0), dt
-    )
+    return split_flow(quaternion(bodies, i), times_transposed(bodies.axes, i, momentum), row(bodies.moments, i, 0), dt)
 
 
 @inner_kernel
