@@ -1,7 +1,7 @@
 """Kinematics of held contacts and of rotation vectors, against finite differences over random poses.
 
-Central differences of fourth order over 1e-3 err by 3e-14 of the fifth derivative, and round-off by 1e-12; poses at which lines nearly
-meet or run nearly parallel, where derivatives have no bound, are left out.
+Central differences of fourth order over .3 ms err by 3e-16 of the fifth derivative, and round-off by 1e-12; poses at
+which lines nearly meet or run nearly parallel, where derivatives have no bound, are left out.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from reference_solver.spatial.turning import spin_from_rate, vector_curvature, v
 from reference_solver.spatial.vector import quaternion_product, rotation_quaternion
 from reference_solver.stepping.lasting import allocate_lasting
 
-STEP = 1e-3
+STEP = 3e-4
 PAIRS = {
     "face and vertex": (PLANE, POINT),
     "vertex and face": (POINT, PLANE),
