@@ -58,6 +58,8 @@ PLACE, DIRECTION, RADIUS, ALONG, SIDE = 0, 6, 12, 14, 16
 ON_FACE = 1e-6
 #: Squared sines below this belong to parallel directions: the normal of a face against the one that was found.
 PARALLEL = 1e-12
+#: A tangent that the new normal leaves less of is replaced: it turned by more than 80 degrees.
+NEAR_TANGENT = 0.2
 
 
 @inner_kernel
@@ -86,6 +88,8 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
     lasting.friction[k] = manifolds.friction[m]
     lasting.place[k, SIDE] = 1.0
     n = row(manifolds.frame[m], 2, 0)
+    for d in range(3):
+        lasting.frame[k, 1, d] = manifolds.frame[m, 0, d]
     face_a, face_b = facing(bodies, a, n), facing(bodies, b, scale(-1.0, n))
     core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
     core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
@@ -247,7 +251,7 @@ def follow(bodies: Bodies, lasting: Lasting, k: int) -> None:
         arm_a_rate = add_scaled(add_scaled(tip_rate, reach, n_rate), share * gap_rate, n)
         arm_b_rate = sub(arm_a_rate, centres_rate)
     beta = sub(cross(w_b, arm_b_rate), cross(w_a, arm_a_rate))
-    t1, t2 = tangents(n)
+    t1, t2 = turned_tangents(row(lasting.frame[k], 1, 0), n)
     lasting.gap[k] = gap
     lasting.speed[k, 0], lasting.speed[k, 1], lasting.speed[k, 2] = gap_rate, dot(t1, u), dot(t2, u)
     lasting.gamma[k, 0] = dot(n, beta) + dot(n_rate, u)
@@ -256,6 +260,17 @@ def follow(bodies: Bodies, lasting: Lasting, k: int) -> None:
     for d in range(3):
         lasting.frame[k, 0, d], lasting.frame[k, 1, d], lasting.frame[k, 2, d] = n[d], t1[d], t2[d]
     set_rows(bodies, lasting, k, arm_a, arm_b)
+
+
+@inner_kernel
+def turned_tangents(t1: Vector, n: Vector) -> tuple[Vector, Vector]:
+    """Tangents of n nearest to those of a normal a moment ago, so that components along them go on smoothly."""
+    across = add_scaled(t1, -dot(t1, n), n)
+    size = length(across)
+    if size < NEAR_TANGENT:
+        return tangents(n)
+    t1 = scale(1.0 / size, across)
+    return t1, cross(n, t1)
 
 
 @inner_kernel

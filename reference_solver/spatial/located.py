@@ -20,6 +20,7 @@ from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
 from reference_solver.spatial.next_impact import begin_flight, move_along, next_impact, undo
+from reference_solver.spatial.phase import cut_phase, end_phase, enter_phase, part_points
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.slide import certify_press, press_until_stick
 from reference_solver.spatial.state import (
@@ -42,7 +43,6 @@ from reference_solver.tally import (
     LOAD_WORK,
     SURFACE_WORK,
     SWEEPS,
-    UNCONVERGED,
     WORST_SWEEPS,
 )
 
@@ -88,7 +88,14 @@ def sub_step(
         return False
     manifolds = room[:found]
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
-    pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
+    smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
+    pushed = False
+    if smooth > 0.0:
+        length = smooth
+        part_points(bodies, manifolds, options, length)
+    else:
+        certify_press(bodies, manifolds, options, tally, length)
+        pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
     begin_flight(bodies, manifolds, options, length)
     end = length
     if sub.clock[EVENTS] < most_events(len(bodies)):
@@ -96,11 +103,16 @@ def sub_step(
         if end < 0.0:
             undo(bodies)
             return False
+    if smooth > 0.0 and end < length:
+        cut_phase(bodies, manifolds, sub, end)
+        length = end
     remember_forces(bodies, detection, manifolds, memory, length, options.dt)
     if end < length:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
     enter_contacts(manifolds, ledger)
-    move_along(bodies, end, end == length)
+    move_along(bodies, end, end == length and smooth == 0.0)
+    if smooth > 0.0:
+        end_phase(bodies, sub, tally, end)
     if pushed:
         displace(bodies, options.dt)
     if options.restitution and release(bodies, manifolds, problem, options, tally):
@@ -132,9 +144,11 @@ def solve_sub_step(
         sub.saved[k] = tally[k]
     for _ in range(SERIES_PASSES):
         for k in range(len(tally)):
-            if k != SWEEPS and k != WORST_SWEEPS and k != UNCONVERGED:
+            if k != SWEEPS and k != WORST_SWEEPS:
                 tally[k] = sub.saved[k]
         found = collide_now(bodies, detection, manifolds, problem, options, tally)
+        for k in range(len(tally)):
+            sub.struck[k] = tally[k]
         struck, held = found >= LANDED, sub.clock[HELD] > 0.0
         length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck, held)
         if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
@@ -143,7 +157,7 @@ def solve_sub_step(
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
     for k in range(len(tally)):
         sub.saved[k] = tally[k]
-    certify_press(bodies, manifolds, options, tally, length)
+    copy_twists(bodies.twist, bodies.last)
     return length
 
 

@@ -38,8 +38,13 @@ def quaternion(bodies: Bodies, i: int) -> Quaternion:
 
 @inner_kernel
 def set_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
-    """Store a unit quaternion with the rotation matrix and world inertia that belong to it."""
-    q = normalised(q)
+    """Store a quaternion, made a unit one, with the rotation matrix and world inertia that belong to it."""
+    put_orientation(bodies, i, normalised(q))
+
+
+@inner_kernel
+def put_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
+    """Store a unit quaternion, to the bit, with the rotation matrix and world inertia that belong to it."""
     for d in range(4):
         bodies.pose[i, 3 + d] = q[d]
     axes_of_quaternion(q, bodies.axes, i)

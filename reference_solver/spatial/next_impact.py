@@ -8,7 +8,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.flight import DRIFT
 from reference_solver.planar.state import HELD, Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
-from reference_solver.spatial.flight import place_at, reach_of
+from reference_solver.spatial.flight import path_bound, place_at, reach_of
 from reference_solver.spatial.impact import carries
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import momentum_of, spin_of
@@ -116,6 +116,8 @@ def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
         for k in range(3):
             v = bodies.twist[i, k]
             way = t * max(abs(v), abs(v + t * share * bodies.rate[i, k]))
+            if bodies.curved[i]:
+                way = path_bound(bodies, i, 0, 1, t) * t
             moves = moves or way > AT_REST * bodies.extent[i]
             if turns and bodies.kind[i] != HALF_SPACE:
                 far = reach_of(bodies, i) + radius_of(bodies, i)

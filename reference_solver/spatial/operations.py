@@ -7,10 +7,19 @@ from typing import Any, NamedTuple
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.features import distance_to_limit, follow, name_features
-from reference_solver.spatial.motion import momentum_of, set_orientation
+from reference_solver.spatial.motion import momentum_of, put_orientation, set_orientation
 from reference_solver.spatial.state import FREE, Manifolds
 from reference_solver.spatial.turning import vector_curvature, vector_rate
-from reference_solver.spatial.vector import Quaternion, cross, quaternion_product, rotation_quaternion, row, sub, times
+from reference_solver.spatial.vector import (
+    ZERO,
+    Quaternion,
+    cross,
+    quaternion_product,
+    rotation_quaternion,
+    row,
+    sub,
+    times,
+)
 from reference_solver.stepping import operations
 from reference_solver.stepping.lasting import CONTACTS, Lasting
 
@@ -65,10 +74,12 @@ def displace(bodies: Spatial, lasting: Lasting, i: int) -> None:
     record = bodies.record
     for d in range(3):
         record.pose[i, d] = lasting.base[i, d] + lasting.displacement[i, d]
-    if record.turning[i]:
-        q: Quaternion = (lasting.base[i, 3], lasting.base[i, 4], lasting.base[i, 5], lasting.base[i, 6])
-        turn = rotation_quaternion(row(lasting.displacement, i, 3))
-        set_orientation(record, i, quaternion_product(turn, q))
+    psi = row(lasting.displacement, i, 3)
+    q: Quaternion = (lasting.base[i, 3], lasting.base[i, 4], lasting.base[i, 5], lasting.base[i, 6])
+    if psi == ZERO:
+        put_orientation(record, i, q)
+    elif record.turning[i]:
+        set_orientation(record, i, quaternion_product(rotation_quaternion(psi), q))
 
 
 @inner_kernel

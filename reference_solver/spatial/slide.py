@@ -19,6 +19,7 @@ from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
+from reference_solver.tally import RESIDUAL, UNCONVERGED
 
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.
 AT_END = 1e-13
@@ -159,6 +160,7 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
+    residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
     press(bodies, manifolds, problem, options, tally, left, left, struck, held)
     length, slipped = left, 0.0
     for _ in range(STICK_SOLVES if options.friction and not held else 0):
@@ -170,5 +172,6 @@ def press_until_stick(
         slipped = max(slipped, length) if end > length else slipped
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
+        tally[RESIDUAL], tally[UNCONVERGED] = residual, unconverged  # of the solve that is used, as in the plane
         press(bodies, manifolds, problem, options, tally, length, left, struck, held)
     return length

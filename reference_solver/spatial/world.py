@@ -42,7 +42,7 @@ class World:
         self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
-        self._sub_step = allocate_sub_step()
+        self._sub_step = allocate_sub_step(n)
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
