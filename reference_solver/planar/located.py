@@ -24,6 +24,7 @@ from reference_solver.planar.columns import (
     PT,
     RELEASE,
 )
+from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import (
     LANDED,
@@ -44,7 +45,9 @@ from reference_solver.planar.state import (
     CONTACTS,
     EVENTS,
     FREE,
+    HELD,
     LEFT,
+    OUTCOME,
     REMEMBERED,
     Bodies,
     Buffer,
@@ -56,6 +59,7 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
+from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: What is left of a step below this share of it is nothing.
@@ -110,13 +114,21 @@ def sub_step(
     copy_vectors(bodies.twist, sub.before)
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
     begin_flight(bodies, rows, sub, length)
+    curved = 0.0
+    if sub.clock[HELD] == 0.0 and turns(bodies, rows, sub, length):
+        curved = curve(bodies, rows, sub, tally)
+    length = curved if curved > 0.0 else length
     end = length
     if sub.clock[EVENTS] < most_events(len(bodies.kind)):
         end = next_impact(bodies, pairs, rows, sub, options, length)
         if end < 0.0:
             copy_vectors(sub.before, bodies.twist)
             return False
-    if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
+    if curved > 0.0:
+        end = follow_curve(bodies, pairs, rows, sub, options, length, end)
+        enter_curve(bodies, rows, sub, tally)
+        length = end
+    elif rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move_along(bodies, sub, end, end == length)
         move(bodies, bodies.pseudo, options.dt)
     else:
@@ -127,7 +139,7 @@ def sub_step(
     enter_contacts(bodies, rows, ledger)
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
-    if end < left:
+    if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
         count_event(sub.clock, len(bodies.kind), tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
@@ -161,9 +173,8 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         if k > 0:
             go_back(tally, sub.tally[0])
         found = collide_now(bodies, rows, problem, sub, options, tally)
-        struck = found >= LANDED
-        length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
-        if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
+        length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
+        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
             break
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)

@@ -35,6 +35,8 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -51,9 +53,10 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 FEATURES = 5 * MOST_VERTICES**2
 
 #: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, and 1 where what is left of it goes by the fixed-step law (E28).
-LEFT, EVENTS, SOFT, PATIENCE, HELD = 0, 1, 2, 3, 4
-CLOCK_SIZE = 5
+#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), and what
+#: the last phase of turning rows was.
+LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME = 0, 1, 2, 3, 4, 5
+CLOCK_SIZE = 6
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
@@ -96,17 +99,21 @@ class Rows(NamedTuple):
 
 
 class SubStep(NamedTuple):
-    """One sub-step of the located scheme, in which accelerations are constant (E19)."""
+    """One sub-step of the located scheme: frozen, with constant accelerations (E19), or a phase of turning rows."""
 
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD
     before: Array  # (n, 3): velocities at its start
     start: Array  # (n, 3): after its impacts
-    gain: Array  # (n, 3): accelerations in it
+    after: Array  # (n, 3): velocities at its end
+    gain: Array  # (n, 3): accelerations in it where it is frozen
+    path: Array  # (n, 3, 6): displacement as a polynomial of the time in it
     pose: Array  # (n, 3): poses at its start
     turn: Array  # (n, 2): cosine and sine of the angle there
-    tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
+    final: Array  # (n, 3): poses at its end where rows turn
+    tally: Array  # (3, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    lasting: Lasting
 
 
 class Ledger(NamedTuple):
@@ -227,12 +234,23 @@ def allocate_rows(capacity: int) -> Rows:
     )
 
 
-def allocate_sub_step(n: int) -> SubStep:
-    """Return room for the sub-steps of ``n`` bodies."""
-    before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
-    turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
-    tally = np.zeros((2, TALLY_SIZE))
-    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4))
+def allocate_sub_step(n: int, contacts: int) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies with ``contacts`` contacts."""
+    return SubStep(
+        clock=np.zeros(CLOCK_SIZE),
+        before=np.zeros((n, 3)),
+        start=np.zeros((n, 3)),
+        after=np.zeros((n, 3)),
+        gain=np.zeros((n, 3)),
+        path=np.zeros((n, 3, COEFFICIENTS)),
+        pose=np.zeros((n, 3)),
+        turn=np.zeros((n, 2)),
+        final=np.zeros((n, 3)),
+        tally=np.zeros((3, TALLY_SIZE)),
+        closing=np.zeros(n, np.int64),
+        probe=allocate_rows(4),
+        lasting=allocate_lasting(2, n, contacts),
+    )
 
 
 def allocate_ledger(capacity: int) -> Ledger:

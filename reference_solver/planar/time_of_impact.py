@@ -8,7 +8,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.box_box import axis_separation
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.columns import FEATURE, GAP, NX, NY, PN, REACH, ROUNDING, SHAPE, TARGET, A, B
-from reference_solver.planar.flight import bound_flight, curvature, fastest, place, put_back
+from reference_solver.planar.flight import bending, bound_flight, fastest, place, put_back
 from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.narrowphase import collide
@@ -90,7 +90,14 @@ def gap_at(bodies: Bodies, sub: SubStep, a: int, b: int, held: int, t: float) ->
 @inner_kernel
 def spins(bodies: Bodies, sub: SubStep, i: int) -> bool:
     """Whether turning moves any point of body i's surface."""
-    return bodies.real[i, REACH] > bodies.real[i, ROUNDING] and (sub.start[i, 2] != 0.0 or sub.gain[i, 2] != 0.0)
+    moves = sub.path[i, 2, 1] != 0.0 or sub.path[i, 2, 2] != 0.0 or bending(sub, i, 2, 1.0) > 0.0
+    return bodies.real[i, REACH] > bodies.real[i, ROUNDING] and moves
+
+
+@inner_kernel
+def is_parabola(sub: SubStep, i: int) -> bool:
+    """Whether accelerations of body i are constant."""
+    return bending(sub, i, 0, 1.0) + bending(sub, i, 1, 1.0) == 0.0
 
 
 @inner_kernel
@@ -99,9 +106,11 @@ def closing_bound(bodies: Bodies, sub: SubStep, a: int, b: int, t: float) -> flo
     bound = 0.0
     for end in range(2):
         s = t * end
-        x = sub.start[b, 0] - sub.start[a, 0] + s * (curvature(sub, b, 0) - curvature(sub, a, 0))
-        y = sub.start[b, 1] - sub.start[a, 1] + s * (curvature(sub, b, 1) - curvature(sub, a, 1))
+        x = sub.path[b, 0, 1] - sub.path[a, 0, 1] + s * (2.0 * (sub.path[b, 0, 2] - sub.path[a, 0, 2]))
+        y = sub.path[b, 1, 1] - sub.path[a, 1, 1] + s * (2.0 * (sub.path[b, 1, 2] - sub.path[a, 1, 2]))
         bound = max(bound, math.sqrt(x * x + y * y))
+    for k in range(2):
+        bound += bending(sub, a, k, t) + bending(sub, b, k, t)
     return bound + spin_bound(bodies, sub, a, b, t) + spin_bound(bodies, sub, b, a, t)
 
 
@@ -125,12 +134,12 @@ def straight_impact(bodies: Bodies, sub: SubStep, a: int, b: int) -> float:
     """Impact with a half-space that does not turn, of a body whose turning does not matter (E25)."""
     collide(bodies, a, b, UNLIMITED, sub.probe, 0)
     nx, ny = sub.probe.real[0, NX], sub.probe.real[0, NY]
-    rate = nx * (sub.start[b, 0] - sub.start[a, 0]) + ny * (sub.start[b, 1] - sub.start[a, 1])
-    gain = nx * (curvature(sub, b, 0) - curvature(sub, a, 0)) + ny * (curvature(sub, b, 1) - curvature(sub, a, 1))
+    closing = nx * (sub.path[b, 0, 1] - sub.path[a, 0, 1]) + ny * (sub.path[b, 1, 1] - sub.path[a, 1, 1])
+    gain = nx * (sub.path[b, 0, 2] - sub.path[a, 0, 2]) + ny * (sub.path[b, 1, 2] - sub.path[a, 1, 2])
     gap = pair_gap(bodies, sub, a, b, NONE)
-    if gap <= 0.0 and rate <= 0.0:
+    if gap <= 0.0 and closing <= 0.0:
         return math.inf  # it touches: rows, not the time of impact, keep it from sinking
-    return first_fall(max(gap, 0.0), rate, gain)
+    return first_fall(max(gap, 0.0), closing, 2.0 * gain)
 
 
 @inner_kernel
@@ -211,7 +220,8 @@ def pair_impact(bodies: Bodies, rows: Rows, sub: SubStep, a: int, b: int, m: int
     plane = a if bodies.kind[a, SHAPE] == HALF_SPACE else b
     other = b if plane == a else a
     if pressed == 0 and bodies.kind[plane, SHAPE] == HALF_SPACE:
-        if not spins(bodies, sub, plane) and not spins(bodies, sub, other):
+        straight = is_parabola(sub, plane) and is_parabola(sub, other)
+        if straight and not spins(bodies, sub, plane) and not spins(bodies, sub, other):
             return straight_impact(bodies, sub, a, b)
     if pressed == 1 and not spins(bodies, sub, a) and not spins(bodies, sub, b):
         return math.inf

@@ -30,6 +30,7 @@ from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.lasting import allocate_lasting
 from reference_solver.tally import new_tally
 
 
@@ -43,7 +44,7 @@ class World:
         # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
         self._pairs = allocate_pairs(model, 8 * n + 64)
         self._rows = allocate_rows(8 * n + 64)
-        self._sub = allocate_sub_step(n)
+        self._sub = allocate_sub_step(n, len(self._rows.real))
         self._ledger = allocate_ledger(8 * n + 64)
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
@@ -130,6 +131,7 @@ class World:
             self._ledger = bigger
         else:
             self._rows = grown(self._rows)
+            self._sub = self._sub._replace(lasting=allocate_lasting(2, len(self.pose), len(self._rows.real)))
             self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))
 
 
