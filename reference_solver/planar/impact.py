@@ -33,8 +33,20 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
+from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import CONTACTS, HELD, LEFT, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import (
+    CONTACTS,
+    HELD,
+    LEFT,
+    MANIFOLDS,
+    REMEMBERED,
+    Bodies,
+    Options,
+    Pairs,
+    Rows,
+    SubStep,
+)
 from reference_solver.tally import RELEASED_SPEED
 
 #: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
@@ -99,6 +111,30 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
             manifolds += 1
     rows.manifold[manifolds] = kept
     rows.counts[CONTACTS], rows.counts[MANIFOLDS] = kept, manifolds
+
+
+@inner_kernel
+def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
+    """Drop all rows but those that carried load in the sub-step that has ended; False if none is left."""
+    kept, manifolds, old = 0, 0, 0
+    for m in range(rows.counts[MANIFOLDS]):
+        first = kept
+        for c in range(rows.manifold[m], rows.manifold[m + 1]):
+            key = row_key(bodies, rows, c)
+            while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
+                old += 1
+            if old < rows.counts[REMEMBERED] and rows.old_key[old] == key and rows.old_impulse[old, 0] > 0.0:
+                describe(bodies, rows, c)
+                copy_row(rows, c, kept)
+                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.real[kept, RESTITUTION] = 0.0
+                kept += 1
+        if kept > first:
+            rows.manifold[manifolds] = first
+            manifolds += 1
+    rows.manifold[manifolds] = kept
+    rows.counts[CONTACTS], rows.counts[MANIFOLDS] = kept, manifolds
+    return kept > 0
 
 
 @inner_kernel

@@ -53,10 +53,10 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 FEATURES = 5 * MOST_VERTICES**2
 
 #: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), and what
-#: the last phase of turning rows was.
-LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME = 0, 1, 2, 3, 4, 5
-CLOCK_SIZE = 6
+#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the
+#: last phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
+LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
+CLOCK_SIZE = 7
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
