@@ -90,7 +90,8 @@ class World:
 
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
-        trial = deepcopy(self)
+        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
+        trial = deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
         trial._options = self._options._replace(scheme=FIXED_STEP)
         while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
             trial._grow()
