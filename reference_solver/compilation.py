@@ -57,6 +57,15 @@ def cache_folder() -> Path | None:
 CACHE_FOLDER = cache_folder()
 
 
+#: How kernels are compiled that only kernels call.
+INNER_OPTIONS = {
+    "error_model": "numpy",  # no hidden zero-division branches; zero denominators are excluded by validation
+    "_nrt": False,  # kernels allocate nothing; counting references to arrays cost two thirds of the time
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+
+
 def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
     before = config.CACHE_DIR
     if CACHE_FOLDER is not None:
@@ -65,10 +74,7 @@ def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
         result: F = njit(
             function,
             cache=CACHE_FOLDER is not None,
-            error_model="numpy",  # no hidden zero-division branches; zero denominators are excluded by validation
-            _nrt=False,  # kernels allocate nothing; counting references to arrays cost two thirds of the time
-            no_cpython_wrapper=inner,
-            no_cfunc_wrapper=True,
+            **(INNER_OPTIONS | {"no_cpython_wrapper": inner}),
             inline="always" if inline else "never",
         )
         return result
