@@ -77,7 +77,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
     tally[OPENED] += 1.0
     for i in range(len(bodies.kind)):
         place = max(abs(bodies.pose[i, 0]), abs(bodies.pose[i, 1]))
-        enter_share(tally, RESOLUTION, LAST_PLACE * place, bodies.real[i, EXTENT])
+        tally[RESOLUTION] = max(tally[RESOLUTION], LAST_PLACE * place / bodies.real[i, EXTENT])
         for k in range(3):
             bodies.start[i, k] = bodies.twist[i, k]
         if bodies.kind[i, MOTION] != FREE:

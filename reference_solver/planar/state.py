@@ -6,7 +6,7 @@ points of one pair of bodies are neighbours and form a manifold ``m``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,7 @@ class SubStep(NamedTuple):
     tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
 
 
 class Ledger(NamedTuple):
@@ -240,12 +241,12 @@ def allocate_rows(capacity: int) -> Rows:
     )
 
 
-def allocate_sub_step(n: int) -> SubStep:
-    """Return room for the sub-steps of ``n`` bodies."""
+def allocate_sub_step(n: int, meeting: Any) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies, that of their pairs included."""
     before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
     turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
     tally = np.zeros((2, TALLY_SIZE))
-    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4))
+    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4), meeting)
 
 
 def allocate_ledger(capacity: int) -> Ledger:

@@ -59,7 +59,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
     tally[OPENED] += 1.0
     for i in range(len(bodies)):
         place = max(abs(bodies.pose[i, 0]), abs(bodies.pose[i, 1]), abs(bodies.pose[i, 2]))
-        enter_share(tally, RESOLUTION, LAST_PLACE * place, bodies.extent[i])
+        tally[RESOLUTION] = max(tally[RESOLUTION], LAST_PLACE * place / bodies.extent[i])
         for k in range(6):
             bodies.start[i, k] = bodies.twist[i, k]
         if bodies.motion[i] != FREE:
