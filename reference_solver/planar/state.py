@@ -6,12 +6,23 @@ points of one pair of bodies are neighbours and form a manifold ``m``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, smallest_extent
+from reference_solver.model import (
+    Array,
+    Body,
+    Box,
+    Capsule,
+    Disc,
+    HalfSpace,
+    Model,
+    Polygon,
+    pair_table,
+    smallest_extent,
+)
 from reference_solver.needs import Needs
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
@@ -78,8 +89,8 @@ class Bodies(NamedTuple):
 class Pairs(NamedTuple):
     """Laws of the pairs and room for candidates of the broadphase."""
 
-    restitution: Array  # (n, n)
-    friction: Array  # (n, n)
+    restitution: Array  # (n, n), strided: one number where all pairs have the same
+    friction: Array  # (n, n), likewise
     bounds: Array  # (n, 4): lower and upper corner of the bounding box
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
@@ -114,6 +125,7 @@ class SubStep(NamedTuple):
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
     lasting: Lasting
+    meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
 
 
 class Ledger(NamedTuple):
@@ -215,9 +227,11 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    n = len(model.bodies)
+    # Sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves.
+    order = np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64)
     room = np.zeros(capacity, np.int64)
-    return Pairs(model.restitution.copy(), model.friction.copy(), np.zeros((n, 4)), np.arange(n), room)
+    bounds = np.zeros((len(order), 4))
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), bounds, order, room)
 
 
 def allocate_rows(capacity: int) -> Rows:
@@ -234,7 +248,7 @@ def allocate_rows(capacity: int) -> Rows:
     )
 
 
-def allocate_sub_step(n: int, contacts: int) -> SubStep:
+def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
     """Return room for the sub-steps of ``n`` bodies with ``contacts`` contacts."""
     return SubStep(
         clock=np.zeros(CLOCK_SIZE),
@@ -250,6 +264,7 @@ def allocate_sub_step(n: int, contacts: int) -> SubStep:
         closing=np.zeros(n, np.int64),
         probe=allocate_rows(4),
         lasting=allocate_lasting(2, n, contacts),
+        meeting=meeting,
     )
 
 
