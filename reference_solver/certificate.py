@@ -33,6 +33,10 @@ GATES = (
     Gate("excess", entries.EXCESS, 1e-14, "friction exceeds mu p_n"),
     # Past the smallest half width the nearest surface may be that on the other side.
     Gate("penetration", entries.PENETRATION, 1.0, "overlap deeper than the smallest half width"),
+    # What the start state says is not what a scene means: bodies do not share space. A millionth is a rounded input.
+    Gate("start_overlap", entries.START_OVERLAP, 1e-6, "bodies overlap at the start"),
+    # A hundred roundings of a coordinate have to stay within a millionth of the body.
+    Gate("resolution", entries.RESOLUTION, 1e-8, "coordinates too large for the size of a body"),
     # Velocities gather round-off with every sweep, 1e5 of them at most: 2e-11 if none cancelled.
     Gate("momentum", entries.MOMENTUM, 2e-11, "momentum does not balance"),
     # Twice the defect of momentum: energy is the square of it, and is measured against energies.

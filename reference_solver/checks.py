@@ -9,6 +9,9 @@ import numpy as np
 
 #: A quaternion or a normal this close to unit length is normalised in silence; further off it is a mistake.
 UNIT_TOLERANCE = 1e-6
+#: The largest principal moment may exceed the sum of the others by this share: a flat plate's moments, each rounded to
+#: six digits.
+FLAT = 1e-5
 
 
 def require_finite(name: str, value: float) -> None:
@@ -24,6 +27,19 @@ def require_positive(name: str, value: float) -> None:
     require_finite(name, value)
     if value <= 0.0:
         raise ValueError(f"{name}: {value!r} must be positive")
+
+
+def require_moments(name: str, moments: tuple[float, ...]) -> None:
+    """Raise ValueError unless three principal moments fulfil the triangle inequality.
+
+    ``I_1 + I_2 - I_3 = 2 sum m z^2 >= 0`` for every distribution of mass; a flat one has equality.
+    """
+    largest = max(moments)
+    others = math.fsum(moments) - largest
+    if largest > others * (1.0 + FLAT):
+        raise ValueError(
+            f"{name}: {moments!r} are no principal moments of a body, the largest exceeds the sum of the others"
+        )
 
 
 def vector(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
-from reference_solver.checks import load, require_positive, unit, vector
+from reference_solver.checks import load, require_moments, require_positive, unit, vector
 from reference_solver.shapes import Box, Capsule, Disc, HalfSpace, Polygon, Shape, Sphere, smallest_extent
 
 Motion = Literal["free", "fixed", "prescribed"]
@@ -40,6 +41,7 @@ __all__ = [
     "Polygon",
     "Shape",
     "Sphere",
+    "pair_table",
     "smallest_extent",
 ]
 
@@ -104,6 +106,8 @@ class Body:
         inertia = load("inertia", self.inertia, 1 if dimension == 2 else 3)
         for value in inertia if isinstance(inertia, tuple) else (inertia,):
             require_positive("inertia", value)
+        if isinstance(inertia, tuple):
+            require_moments("inertia", inertia)
         self._set(inertia=inertia)
 
     def _set(self, **fields: Any) -> None:
@@ -130,7 +134,8 @@ class Model:
         (dimension,) [m/s^2].
     restitution, friction
         (n, n) symmetric pair values: Newton's e, clamped to [0, 1] with a warning, and Coulomb's mu >= 0. A
-        number stands for the same value in all pairs.
+        number stands for the same value in all pairs; it is kept as a read-only view of that one number, so that
+        memory grows with the number of bodies, not with that of pairs.
 
     Raises
     ------
@@ -160,8 +165,8 @@ class Model:
             raise ValueError("friction: must not be negative")
         object.__setattr__(self, "bodies", tuple(self.bodies))
         object.__setattr__(self, "gravity", vector("gravity", self.gravity, (self.dimension,)))
-        object.__setattr__(self, "restitution", np.clip(restitution, 0.0, 1.0))
-        object.__setattr__(self, "friction", friction)
+        object.__setattr__(self, "restitution", _spread(np.clip(restitution, 0.0, 1.0), n))
+        object.__setattr__(self, "friction", _spread(friction, n))
 
 
 def _require_dimension(name: str, body: Body, dimension: int) -> None:
@@ -181,13 +186,30 @@ def _require_dimension(name: str, body: Body, dimension: int) -> None:
 
 
 def _pair_table(name: str, value: Any, n: int) -> Array:
+    """Return pair values (n, n), or one number as an array without axes."""
     table = np.array(value, dtype=np.float64)
-    if table.ndim == 0:
-        table = np.full((n, n), float(table))
-    if table.shape != (n, n):
+    if table.shape not in ((), (n, n)):
         raise ValueError(f"{name}: shape {table.shape} where ({n}, {n}) is needed")
     if not np.isfinite(table).all():
         raise ValueError(f"{name}: not finite")
     if (table != table.T).any():
         raise ValueError(f"{name}: not symmetric")
     return table
+
+
+def _spread(table: Array, n: int) -> Array:
+    return table if table.ndim == 2 else np.broadcast_to(table, (n, n))
+
+
+def pair_table(table: Array) -> Array:
+    """Return pair values in the one layout that kernels are compiled for, of their own: (n, n), strided.
+
+    One number for all pairs stays one number (strides of zero). At least two rows, and a column of padding where values
+    differ: an array that happens to be contiguous has another type, for which all kernels would be compiled anew.
+    """
+    n = max(len(table), 2)
+    if table.strides == (0, 0):
+        return as_strided(np.array([table[0, 0]]), (n, n), (0, 0))
+    padded = np.zeros((n, n + 1))
+    padded[: len(table), : len(table)] = table
+    return padded[:, :n]

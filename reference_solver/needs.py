@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference_solver.model import Box, Capsule, Model, Polygon
+from reference_solver.model import Array, Box, Capsule, Model, Polygon
 
 #: Up to this many bodies all pairs are tested; sorting pays off beyond (performance notes: indifferent to ~100).
 ALL_PAIRS_LIMIT = 64
@@ -35,10 +35,7 @@ def needs(model: Model) -> Needs:
     Rotation is the response of spins to impulses and torques: a frictionless contact acts through the centre of
     a disc or sphere, so that without torque its spin stays what it was.
     """
-    free = np.array([body.motion == "free" for body in model.bodies])
-    meets = free[:, None] | free[None, :]
-    np.fill_diagonal(meets, False)
-    friction = bool((model.friction[meets] > 0.0).any())
+    friction = _acts(model.friction, model)
     turned = any(
         body.motion == "free" and (isinstance(body.shape, Box | Capsule | Polygon) or np.any(np.asarray(body.torque)))
         for body in model.bodies
@@ -46,6 +43,14 @@ def needs(model: Model) -> Needs:
     return Needs(
         rotation=friction or turned,
         friction=friction,
-        restitution=bool((model.restitution[meets] > 0.0).any()),
+        restitution=_acts(model.restitution, model),
         broadphase=len(model.bodies) > ALL_PAIRS_LIMIT,
     )
+
+
+def _acts(table: Array, model: Model) -> bool:
+    """Whether a pair value is positive for any two bodies one of which is free; one row at a time, to save memory."""
+    indices = [i for i, body in enumerate(model.bodies) if body.motion == "free"]
+    if table.strides == (0, 0):
+        return bool(indices) and len(model.bodies) > 1 and bool(table[0, 0] > 0.0)
+    return any((table[i, :i] > 0.0).any() or (table[i, i + 1 :] > 0.0).any() for i in indices)

@@ -27,7 +27,7 @@ from reference_solver.needs import EVERYTHING, Needs, needs
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
-from reference_solver.tally import merge, new_tally
+from reference_solver.tally import OPENED, merge, new_tally
 
 
 class World(Protocol):
@@ -117,6 +117,7 @@ class Simulation:
         whole, parts, tallies = self._world.tally.copy(), [], []
         for chunk in [stride] * (steps // stride) + [steps % stride] * (steps % stride > 0):
             self._world.tally[:] = 0.0
+            self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
             parts.append(self._world.run(chunk, stride, contacts))
             tallies.append(self._world.tally.copy())
             merge(whole, tallies[-1])
@@ -166,6 +167,10 @@ class Simulation:
             impulse, friction beyond mu p_n.
         ``penetration``, ``projected``
             Worst overlap at detection as a share of the smaller half width; worst position correction of a step [m].
+        ``start_overlap``
+            Worst overlap at the start of the run, as a share of the smaller half width.
+        ``resolution``
+            Coarsest last place of a body's coordinates, as a share of its smallest half width.
         ``momentum``, ``energy``
             Worst shares by which a body's momentum (E61) or a solve's kinetic energy (E62) does not balance.
         ``pumped``, ``created``, ``kane``

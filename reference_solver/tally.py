@@ -49,7 +49,14 @@ RELEASED_SPEED = 24
 #: Contact solves whose velocities are proven to be the only answer (E66).
 UNIQUE = 25
 
-SIZE = 26
+#: Worst overlap at the start of the run, as a share of the smaller half width.
+START_OVERLAP = 26
+#: Contact solves opened, contacts or none; tells the first.
+OPENED = 27
+#: Coarsest last place of a body's coordinates, as a share of its smallest half width.
+RESOLUTION = 28
+
+SIZE = 29
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (

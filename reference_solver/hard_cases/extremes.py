@@ -34,7 +34,7 @@ def deep_overlap(share: float) -> HardCase:
         Settings.reference(DT),
         20 * DT,
         judge,
-        excused=("penetration",),
+        excused=("penetration", "start_overlap"),
     )
 
 

@@ -53,10 +53,13 @@ from reference_solver.tally import (
     MOMENTUM,
     NATURAL,
     NOT_FINITE,
+    OPENED,
     PENETRATION,
     PULL,
     PUMPED,
+    RESOLUTION,
     SOLVES,
+    START_OVERLAP,
     SURFACE_WORK,
     UNIQUE,
 )
@@ -64,12 +67,17 @@ from reference_solver.tally import (
 #: Created energy up to this share of a solve's work is round-off of its impulses: 1e4 units in the last place, what
 #: cancels where thousands of contacts each do their work.
 CREATED_NOISE = 1e-12
+#: Unit in the last place of a number, as a share of it.
+LAST_PLACE = 2.0**-52
 
 
 @kernel
 def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
     """Keep v* before impulses act, and enter the work of the loads that brought it about within ``dt``."""
+    tally[OPENED] += 1.0
     for i in range(len(bodies.kind)):
+        place = max(abs(bodies.pose[i, 0]), abs(bodies.pose[i, 1]))
+        tally[RESOLUTION] = max(tally[RESOLUTION], LAST_PLACE * place / bodies.real[i, EXTENT])
         for k in range(3):
             bodies.start[i, k] = bodies.twist[i, k]
         if bodies.kind[i, MOTION] != FREE:
@@ -96,6 +104,8 @@ def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
         done, moved, size = row_work(bodies, rows, c)
         work, surface, effort = work + done, surface + moved, effort + size
         restored = restored or rows.real[c, TARGET] > 0.0
+    if tally[OPENED] <= 1.0:
+        tally[START_OVERLAP] = tally[PENETRATION]
     tally[CONTACT_WORK] += work
     tally[SURFACE_WORK] += surface
     enter_creation(work, effort, restored, tally)

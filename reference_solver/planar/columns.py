@@ -40,13 +40,11 @@ A, B = 0, 1
 FEATURE = 2
 #: 1 where bodies meet or part faster than the loads of one step explain.
 IMPACT = 3
-#: 1 where the contact carried load in the sub-step before: it lasts (E20).
-LASTS = 4
 #: How a rebound ends: OPEN_ENDED, SERIES_ENDS or RELEASED, see impact.py (E22).
-ENDING = 5
+ENDING = 4
 #: 1 where the points touch, 0 where a gap is left to close.
-MEETS = 6
-ROW_INTEGERS = 7
+MEETS = 5
+ROW_INTEGERS = 6
 
 # Rows.real.
 #: Normal from A to B; the tangent is the normal turned by +90 degrees.

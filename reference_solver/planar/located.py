@@ -11,11 +11,14 @@ from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import row_work
+from reference_solver.planar.certificate import certify, open_solve, row_work
 from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
 from reference_solver.planar.columns import (
+    APPROACH,
     FORCE_N,
     FORCE_T,
+    IMPACT_N,
+    IMPACT_T,
     INVERSE_INERTIA,
     INVERSE_MASS,
     LOAD,
@@ -23,29 +26,39 @@ from reference_solver.planar.columns import (
     PN,
     PT,
     RELEASE,
+    SPEED,
+    TARGET,
 )
+from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import (
     LANDED,
     NO_IMPACT,
+    NOISE,
     REBOUNDED,
     collide_now,
     end_series,
+    keep_loaded,
     keep_touching,
     release,
 )
+from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
 from reference_solver.planar.position import correct_positions
+from reference_solver.planar.rows import measure_speed
 from reference_solver.planar.slide import go_back, keep, press_until_stick
 from reference_solver.planar.state import (
     BLOCK,
     CONTACTS,
     EVENTS,
     FREE,
+    HELD,
     LEFT,
+    OUTCOME,
     REMEMBERED,
+    UNSETTLED,
     Bodies,
     Buffer,
     Ledger,
@@ -56,6 +69,7 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
+from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: What is left of a step below this share of it is nothing.
@@ -78,11 +92,14 @@ def located_step(
     tally: Array,
 ) -> bool:
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
-    if sub.clock[LEFT] == 0.0:
+    if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
         open_step(sub.clock, len(bodies.kind), options.dt)
         ledger.used[0] = 0
-    while sub.clock[LEFT] > 0.0:
-        if not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
+    while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
+        if sub.clock[UNSETTLED] > 0.0:
+            if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
+                return False
+        elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
     return True
 
@@ -110,13 +127,23 @@ def sub_step(
     copy_vectors(bodies.twist, sub.before)
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
     begin_flight(bodies, rows, sub, length)
+    curved, frozen = 0.0, sub.clock[HELD] > 0.0
+    if not frozen and turns(bodies, rows, sub, length):
+        curved = curve(bodies, rows, sub, tally)
+        frozen = curved == 0.0
+    sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
+    length = curved if curved > 0.0 else length
     end = length
     if sub.clock[EVENTS] < most_events(len(bodies.kind)):
         end = next_impact(bodies, pairs, rows, sub, options, length)
         if end < 0.0:
             copy_vectors(sub.before, bodies.twist)
             return False
-    if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
+    if curved > 0.0:
+        end = follow_curve(bodies, pairs, rows, sub, options, length, end)
+        enter_curve(bodies, rows, sub, tally)
+        length = end
+    elif rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move_along(bodies, sub, end, end == length)
         move(bodies, bodies.pseudo, options.dt)
     else:
@@ -127,9 +154,49 @@ def sub_step(
     enter_contacts(bodies, rows, ledger)
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
-    if end < left:
+    if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
         count_event(sub.clock, len(bodies.kind), tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
+    return True
+
+
+@inner_kernel
+def settle(
+    bodies: Bodies,
+    pairs: Pairs,
+    rows: Rows,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+) -> bool:
+    """Take out the approach of contacts that were frozen while they turned: an impact with e = 0 (E28).
+
+    Otherwise it would be an impact in the sub-step that follows, which knows nothing of this one. False if an array is
+    too small; called again, it starts anew.
+    """
+    if not detect(bodies, pairs, rows, options):
+        return False
+    if not keep_loaded(bodies, pairs, rows):
+        sub.clock[UNSETTLED] = 0.0
+        return True
+    if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
+        return False
+    if options.solver == BLOCK:
+        prepare_blocks(bodies, rows)
+    approaches = False
+    for c in range(rows.counts[CONTACTS]):
+        measure_speed(bodies, rows, c, options.dt)
+        approaches = approaches or rows.real[c, APPROACH] < -NOISE * rows.real[c, SPEED]
+        rows.real[c, TARGET] = rows.real[c, PN] = rows.real[c, PT] = 0.0
+        rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
+    if approaches:
+        open_solve(bodies, 0.0, tally)
+        solve_velocities(bodies, rows, problem, options, tally)
+        certify(bodies, rows, options, tally)
+        enter_contacts(bodies, rows, ledger)
+    sub.clock[UNSETTLED] = 0.0
     return True
 
 
@@ -161,9 +228,8 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         if k > 0:
             go_back(tally, sub.tally[0])
         found = collide_now(bodies, rows, problem, sub, options, tally)
-        struck = found >= LANDED
-        length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
-        if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
+        length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
+        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
             break
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)

@@ -99,7 +99,12 @@ def separating_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float) -> tup
     Returns the separation [m], the body whose edge is the axis and its number, 0; or `CORNERS` and a corner of a and
     of b.
     """
-    advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+    return best_axis(bodies, a, b, dx, dy, AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
+
+
+@inner_kernel
+def best_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, advantage: float) -> tuple[float, int, int, int]:
+    """`separating_axis` where a later axis has to be better by ``advantage`` [m]."""
     best, k = best_edge(bodies, a, b, dx, dy, advantage)
     reference = a
     other, edge = best_edge(bodies, b, a, -dx, -dy, advantage)

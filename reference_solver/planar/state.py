@@ -6,12 +6,23 @@ points of one pair of bodies are neighbours and form a manifold ``m``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, smallest_extent
+from reference_solver.model import (
+    Array,
+    Body,
+    Box,
+    Capsule,
+    Disc,
+    HalfSpace,
+    Model,
+    Polygon,
+    pair_table,
+    smallest_extent,
+)
 from reference_solver.needs import Needs
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
@@ -35,6 +46,8 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -51,9 +64,10 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 FEATURES = 5 * MOST_VERTICES**2
 
 #: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, and 1 where what is left of it goes by the fixed-step law (E28).
-LEFT, EVENTS, SOFT, PATIENCE, HELD = 0, 1, 2, 3, 4
-CLOCK_SIZE = 5
+#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the
+#: last phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
+LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
+CLOCK_SIZE = 7
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
@@ -75,8 +89,8 @@ class Bodies(NamedTuple):
 class Pairs(NamedTuple):
     """Laws of the pairs and room for candidates of the broadphase."""
 
-    restitution: Array  # (n, n)
-    friction: Array  # (n, n)
+    restitution: Array  # (n, n), strided: one number where all pairs have the same
+    friction: Array  # (n, n), likewise
     bounds: Array  # (n, 4): lower and upper corner of the bounding box
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
@@ -96,17 +110,22 @@ class Rows(NamedTuple):
 
 
 class SubStep(NamedTuple):
-    """One sub-step of the located scheme, in which accelerations are constant (E19)."""
+    """One sub-step of the located scheme: frozen, with constant accelerations (E19), or a phase of turning rows."""
 
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD
     before: Array  # (n, 3): velocities at its start
     start: Array  # (n, 3): after its impacts
-    gain: Array  # (n, 3): accelerations in it
+    after: Array  # (n, 3): velocities at its end
+    gain: Array  # (n, 3): accelerations in it where it is frozen
+    path: Array  # (n, 3, 6): displacement as a polynomial of the time in it
     pose: Array  # (n, 3): poses at its start
     turn: Array  # (n, 2): cosine and sine of the angle there
-    tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
+    final: Array  # (n, 3): poses at its end where rows turn
+    tally: Array  # (3, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    lasting: Lasting
+    meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
 
 
 class Ledger(NamedTuple):
@@ -208,9 +227,11 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    n = len(model.bodies)
+    # Sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves.
+    order = np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64)
     room = np.zeros(capacity, np.int64)
-    return Pairs(model.restitution.copy(), model.friction.copy(), np.zeros((n, 4)), np.arange(n), room)
+    bounds = np.zeros((len(order), 4))
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), bounds, order, room)
 
 
 def allocate_rows(capacity: int) -> Rows:
@@ -227,12 +248,24 @@ def allocate_rows(capacity: int) -> Rows:
     )
 
 
-def allocate_sub_step(n: int) -> SubStep:
-    """Return room for the sub-steps of ``n`` bodies."""
-    before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
-    turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
-    tally = np.zeros((2, TALLY_SIZE))
-    return SubStep(np.zeros(CLOCK_SIZE), before, start, gain, pose, turn, tally, closing, allocate_rows(4))
+def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies with ``contacts`` contacts."""
+    return SubStep(
+        clock=np.zeros(CLOCK_SIZE),
+        before=np.zeros((n, 3)),
+        start=np.zeros((n, 3)),
+        after=np.zeros((n, 3)),
+        gain=np.zeros((n, 3)),
+        path=np.zeros((n, 3, COEFFICIENTS)),
+        pose=np.zeros((n, 3)),
+        turn=np.zeros((n, 2)),
+        final=np.zeros((n, 3)),
+        tally=np.zeros((3, TALLY_SIZE)),
+        closing=np.zeros(n, np.int64),
+        probe=allocate_rows(4),
+        lasting=allocate_lasting(2, n, contacts),
+        meeting=meeting,
+    )
 
 
 def allocate_ledger(capacity: int) -> Ledger:

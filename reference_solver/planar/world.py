@@ -10,6 +10,7 @@ from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.planar.located import copy_ledger, run_located
+from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
 from reference_solver.planar.state import (
     CANDIDATES,
@@ -30,6 +31,7 @@ from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.lasting import allocate_lasting
 from reference_solver.tally import new_tally
 
 
@@ -43,7 +45,7 @@ class World:
         # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
         self._pairs = allocate_pairs(model, 8 * n + 64)
         self._rows = allocate_rows(8 * n + 64)
-        self._sub = allocate_sub_step(n)
+        self._sub = allocate_sub_step(n, len(self._rows.real), allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(8 * n + 64)
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
@@ -90,7 +92,8 @@ class World:
 
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
-        trial = deepcopy(self)
+        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
+        trial = deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
         trial._options = self._options._replace(scheme=FIXED_STEP)
         while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
             trial._grow()
@@ -130,6 +133,7 @@ class World:
             self._ledger = bigger
         else:
             self._rows = grown(self._rows)
+            self._sub = self._sub._replace(lasting=allocate_lasting(2, len(self.pose), len(self._rows.real)))
             self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))
 
 

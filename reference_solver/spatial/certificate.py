@@ -12,7 +12,7 @@ import math
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.cone import cone_defect
 from reference_solver.model import Array
-from reference_solver.planar.certificate import enter_creation, enter_share
+from reference_solver.planar.certificate import LAST_PLACE, enter_creation, enter_share
 from reference_solver.planar.residual import IMPULSE_SHARE
 from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import add_pressure, apply_wrench, point_velocity, relative_twist, velocity_at
@@ -39,9 +39,12 @@ from reference_solver.tally import (
     MOMENTUM,
     NATURAL,
     NOT_FINITE,
+    OPENED,
     PENETRATION,
     PULL,
+    RESOLUTION,
     SOLVES,
+    START_OVERLAP,
     SURFACE_WORK,
     UNIQUE,
 )
@@ -53,7 +56,10 @@ COUPLED = 1e-12
 @kernel
 def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
     """Keep v* before impulses act, and enter the work of the loads that brought it about within ``dt``."""
+    tally[OPENED] += 1.0
     for i in range(len(bodies)):
+        place = max(abs(bodies.pose[i, 0]), abs(bodies.pose[i, 1]), abs(bodies.pose[i, 2]))
+        tally[RESOLUTION] = max(tally[RESOLUTION], LAST_PLACE * place / bodies.extent[i])
         for k in range(6):
             bodies.start[i, k] = bodies.twist[i, k]
         if bodies.motion[i] != FREE:
@@ -83,6 +89,8 @@ def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array
             done, moved, size = point_work(bodies, manifolds, m, p, both)
             work, surface, effort = work + done, surface + moved, effort + size
             restored = restored or manifolds.target[m, p] > 0.0
+    if tally[OPENED] <= 1.0:
+        tally[START_OVERLAP] = tally[PENETRATION]
     tally[CONTACT_WORK] += work
     tally[SURFACE_WORK] += surface
     enter_creation(work, effort, restored, tally)

@@ -15,7 +15,17 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Sphere, smallest_extent
+from reference_solver.model import (
+    Array,
+    Body,
+    Box,
+    Capsule,
+    HalfSpace,
+    Model,
+    Sphere,
+    pair_table,
+    smallest_extent,
+)
 from reference_solver.needs import Needs
 from reference_solver.planar.state import CLOCK_SIZE
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
@@ -148,8 +158,8 @@ class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
     found: Indices  # (3,): see CANDIDATES .. MANIFOLDS
-    restitution: Array  # (n, n)
-    friction: Array  # (n, n)
+    restitution: Array  # (n, n), strided: one number where all pairs have the same
+    friction: Array  # (n, n), likewise
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
     polygon: Array  # (2, 16, 3): two polygons, each made from the other by one clip
@@ -202,9 +212,10 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
     """Return the pair tables, and room for ``capacity`` candidates."""
     return Detection(
         found=np.zeros(3, np.int64),
-        restitution=model.restitution.copy(),
-        friction=model.friction.copy(),
-        order=np.arange(len(model.bodies)),
+        restitution=pair_table(model.restitution),
+        friction=pair_table(model.friction),
+        # sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves
+        order=np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64),
         candidate=np.zeros(capacity, np.int64),
         polygon=np.zeros((2, 16, 3)),
         polygon_edge=np.zeros((2, 16), np.int64),

@@ -94,7 +94,9 @@ class World:
 
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step; the world stays what it is."""
-        trial, found = deepcopy(self), -1
+        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
+        tables = (self._detection.restitution, self._detection.friction)
+        trial, found = deepcopy(self, {id(table): table for table in tables}), -1
         while found < 0:
             found = pose_problem(trial._bodies, trial._detection, trial._manifolds, trial._memory, trial._options)
             if found < 0:

@@ -1,15 +1,19 @@
-"""Paths of all bodies: polynomials of degree five at most, each valid from a time of its own."""
+"""Paths of all bodies: polynomials of degree five at most, each valid from a time of its own; values and bounds."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 
 #: Coefficients of a polynomial of degree five.
 COEFFICIENTS = 6
+#: By how much bounds are widened: they are sums of at most a dozen rounded terms.
+ROUNDED_UP = 1.0 + 1e-14
 
 
 class Paths(NamedTuple):
@@ -31,3 +35,54 @@ def allocate_paths(dimension: int, bodies: int) -> Paths:
     numbers, velocities = (3, 3) if dimension == 2 else (7, 6)
     coefficient = np.zeros((bodies, velocities, COEFFICIENTS))
     return Paths(np.zeros(bodies), np.zeros(bodies), np.zeros((bodies, numbers)), coefficient)
+
+
+@inner_kernel
+def derivative(paths: Paths, i: int, k: int, order: int, t: float) -> float:
+    """Derivative of displacement k of body i with respect to time, at time t; order 0 is the displacement (Horner)."""
+    s = t - paths.begin[i]
+    value = 0.0
+    for j in range(COEFFICIENTS - 1, order - 1, -1):
+        factor = 1.0
+        for m in range(order):
+            factor *= j - m
+        value = value * s + factor * paths.coefficient[i, k, j]
+    return value
+
+
+@inner_kernel
+def derivative_bound(paths: Paths, i: int, turning: bool, order: int, t: float, later: float) -> float:
+    """Bound of the length of a derivative of the displacement, or of the turn, of body i over [t, later].
+
+    Taylor's series about t ends with the fifth derivative: ``|p^(m)(t + s)| <= sum_j |p^(m+j)(t)| s^j / j!``.
+    """
+    axes = paths.coefficient.shape[1] // 2 + (0 if turning else paths.coefficient.shape[1] % 2)
+    first = paths.coefficient.shape[1] - axes if turning else 0
+    bound, factor = 0.0, 1.0
+    for j in range(COEFFICIENTS - order):
+        square = 0.0
+        for k in range(first, first + axes):
+            square += derivative(paths, i, k, order + j, t) ** 2
+        bound += factor * math.sqrt(square)
+        factor *= (later - t) / (j + 1)
+    return bound * ROUNDED_UP
+
+
+@inner_kernel
+def path_range(paths: Paths, i: int, k: int, t: float, later: float) -> tuple[float, float]:
+    """Bounds of displacement k of body i over [t, later]: the least and the largest of its Bernstein coefficients.
+
+    A polynomial on an interval is a mean of them (G. Farin, Curves and Surfaces for CAGD, 2002, chapter 5).
+    """
+    degree = COEFFICIENTS - 1
+    low, high = math.inf, -math.inf
+    for b in range(COEFFICIENTS):
+        value, factor, size = 0.0, 1.0, 0.0
+        for j in range(b + 1):
+            # binomial(b, j) / binomial(degree, j) times the coefficient of (s / (later - t))^j
+            term = factor * derivative(paths, i, k, j, t)
+            value += term
+            size += abs(term)
+            factor *= (later - t) / (j + 1) * ((b - j) / (degree - j) if j < degree else 0.0)
+        low, high = min(low, value - 1e-15 * size), max(high, value + 1e-15 * size)
+    return low, high

@@ -159,6 +159,7 @@ class Planted:
             self.run = lambda: certify_spatial(self.bodies, manifolds, options, self.tally)
             self.normal, self.tangent = manifolds.impulse[0, :, 2], manifolds.impulse[0, :, 0]
             self.gap = manifolds.gap[0]
+        self.tally[entries.OPENED] = 2.0  # not the solve at the start of a run
         self.bodies.twist[:] = 0.0
 
     def exceeded(self):
@@ -220,6 +221,38 @@ class TestPlantedFaults:
         planted.bodies.twist[1, 0] = math.nan
         assert planted.exceeded() == set()
         assert "no numbers" in reasons(planted.tally)[0]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("profile", ["classical", "fixed_step", "reference"])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_start_inside_the_floor_is_said_and_not_certified(dimension, profile, speed):
+    """0.2 m deep: certified until it was looked at, as bodies are pushed out by position alone."""
+    simulation = simulate(dimension, [floor(dimension), box(dimension, 0.0, 0.3, speed)], profile, 5)
+    certificate = simulation.certificate
+    assert certificate["start_overlap"] == pytest.approx(0.4, rel=1e-12)  # of the half width
+    assert not certificate["holds"] and any("overlap at the start" in reason for reason in certificate["reasons"])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_bodies_that_land_later_or_touch_do_not_overlap_at_the_start(dimension):
+    """One rests, one lands in a fixed step, which finds it inside; samples certify anew, not the start."""
+    bodies = [floor(dimension), box(dimension, 0.0, 0.5), box(dimension, 3.0, 0.6)]
+    model = Model(dimension, bodies, gravity(dimension), 0.5, 0.5)
+    simulation = Simulation(model, Settings.fixed_step(DT))
+    record = simulation.record(60, stride=1, certificates=True)
+    assert simulation.certificate["penetration"] > 1e-6
+    assert simulation.certificate["start_overlap"] <= 1e-15 and (record.certificates["start_overlap"] <= 1e-15).all()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_coordinates_that_cannot_resolve_a_body_are_not_certified(dimension):
+    """At 1e15 m the last place is an eighth of a metre; at 1e6 m it is 1e-10 m."""
+    for x, holds in ((1e15, False), (1e6, True)):
+        simulation = simulate(dimension, [floor(dimension), box(dimension, x, 0.5)], "reference", 2)
+        assert simulation.certificate["resolution"] == pytest.approx(2.0**-52 * x / 0.5, rel=1e-9)
+        assert simulation.certificate["holds"] == holds
+        assert holds or any("coordinates" in reason for reason in simulation.certificate["reasons"])
 
 
 def test_kanes_paradox_is_flagged_and_no_failure():

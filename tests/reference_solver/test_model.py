@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.model import pair_table
 
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
 BALL = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0))
+STANDING = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -36,6 +38,9 @@ BALL = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0))
         (lambda: Body(HalfSpace((0.0, 1.0)), 1.0, 1.0), "motion"),
         (lambda: Body(Disc(1.0), motion="fixed", twist=(1.0, 0.0, 0.0)), "twist"),
         (lambda: Body(Sphere(1.0), 1.0, (1.0, 1.0, 1.0), (0.0,) * 3 + (0.5, 0.0, 0.0, 0.0)), "pose"),
+        (lambda: Body(Sphere(1.0), 1.0, (1.0, 1.0, 5.0), STANDING), "inertia"),
+        (lambda: Body(Box((1.0,) * 3), 1.0, (2.1, 1.0, 1.0), STANDING), "inertia"),
+        (lambda: Body(Sphere(1.0), 1.0, (1.0, 2.0 + 1e-4, 1.0), STANDING), "inertia"),
         (lambda: Model(4, [BALL], (0.0, 0.0), 0.0, 0.0), "dimension"),
         (lambda: Model(2, [], (0.0, 0.0), 0.0, 0.0), "bodies"),
         (lambda: Model(3, [BALL], (0.0, 0.0, 0.0), 0.0, 0.0), r"bodies\[0\]"),
@@ -102,3 +107,37 @@ def test_step_counts_are_checked(steps):
     simulation = Simulation(Model(2, [FLOOR, BALL], (0.0, 0.0), 0.0, 0.0), Settings.classical(0.01))
     with pytest.raises(ValueError, match=r"^steps: "):
         simulation.advance(steps)
+
+
+@pytest.mark.parametrize("moments", [(1.0, 1.0, 2.0), (0.083333, 0.083333, 0.166667), (1.0, 1.0, 1e-12)])
+def test_a_plate_and_a_rod_have_moments(moments):
+    """Flat: the largest is the sum of the others; thin: one is nearly nothing."""
+    assert Body(Sphere(1.0), 1.0, moments, STANDING).inertia == moments
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pair_values_that_are_one_number_take_no_room_per_pair(dimension):
+    """1e5 bodies have 1e10 pairs: 80 GB a table. 2-D: a model of that many is made and stepped."""
+    count = 100_000
+    if dimension == 2:
+        bodies = [FLOOR, *(Body(Disc(0.4), 1.0, 0.08, (float(i), 0.5, 0.0)) for i in range(count))]
+        model = Model(2, bodies, (0.0, -9.81), 0.5, 0.3)
+        simulation = Simulation(model, Settings.classical(1.0 / 240.0))
+        simulation.advance(1)
+        assert (simulation.twist[1:, 1] == -9.81 / 240.0).all()
+    else:
+        model = Model(3, [Body(Sphere(1.0), 1.0, (1.0,) * 3, STANDING)] * count, (0.0,) * 3, 0.5, 0.3)
+    for table, value in ((model.restitution, 0.5), (model.friction, 0.3)):
+        assert table.shape == (len(model.bodies),) * 2 and table[0, -1] == value
+        kept = pair_table(table)
+        assert kept[0, -1] == value and kept.base.nbytes == 8
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_pair_tables_of_kernels_have_one_layout(n):
+    """Another layout would be another type, and all kernels compiled anew for it."""
+    values = np.arange(float(n * n)).reshape(n, n)
+    for table in (values, np.broadcast_to(0.5, (n, n))):
+        kept = pair_table(table)
+        assert not kept.flags.c_contiguous and not kept.flags.f_contiguous and kept.flags.writeable
+        assert (kept[:n, :n] == table).all()
