@@ -11,8 +11,8 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
 from reference_solver.planar.impact import NOISE
 from reference_solver.planar.state import HELD, Options
-from reference_solver.spatial.impact import carries, copy_twists
 from reference_solver.spatial.features import follow, name_features
+from reference_solver.spatial.impact import carries, copy_twists
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate, momentum_of, put_orientation
 from reference_solver.spatial.operations import Spatial, displace

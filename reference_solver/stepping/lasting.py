@@ -55,6 +55,7 @@ class Lasting(NamedTuple):
     gamma: Array  # (k, 1 + T): (dJ/dt) v [m/s^2]
     force: Array  # (k, 1 + T): lambda [N]
     direction: Array  # (k, T): unit vector of the slip, where it slips
+    begun: Array  # (k, T): the same at the start of the phase
     impulse: Array  # (k, D): integral of the force on B over the phase, world axes [N s]
     work: Array  # (k, 2): work on the relative motion and of moving surfaces [J]
     base: Array  # (n, P): poses at the start of the phase
@@ -76,6 +77,7 @@ class Lasting(NamedTuple):
     order: Indices  # (R,)
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
     monitor: Array  # (PLACES_WATCHED, k, MONITORS): what must not fall below zero while modes are held
+    length: Array  # (1,): of the step being made [s]
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
     spin: Array  # (V,)
     trial: Array  # (k, 2, 1 + T, V): rows at the start of a path
@@ -106,6 +108,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         gamma=np.zeros((k, 1 + t)),
         force=np.zeros((k, 1 + t)),
         direction=np.zeros((k, t)),
+        begun=np.zeros((k, t)),
         impulse=np.zeros((k, dimension)),
         work=np.zeros((k, 2)),
         base=np.zeros((n, p)),
@@ -127,6 +130,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         order=np.zeros(r, np.int64),
         unknown=np.zeros((r, 2), np.int64),
         monitor=np.zeros((PLACES_WATCHED, k, MONITORS)),
+        length=np.zeros(1),
         early=np.ones(1),
         spin=np.zeros(v),
         trial=np.zeros((k, 2, 1 + t, v)),

@@ -12,6 +12,7 @@ from reference_solver.stepping.equalities import (
     force_contacts,
     list_rows,
     push,
+    row_value,
     solve_rows,
 )
 from reference_solver.stepping.lasting import (
@@ -76,6 +77,10 @@ SEARCHES = 40
 LOCATED = 1e-13
 #: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
 SURELY = 1e-6
+#: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
+TURNED = 0.5
+#: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
+BEARABLE = 0.4
 #: Relative accuracy of that instant.
 SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
@@ -93,19 +98,68 @@ def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
     for k in range(lasting.size[CONTACTS]):
         if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
             follow_slip(lasting, k)
-    return force_contacts(lasting) != CONTRADICTORY
+    if force_contacts(lasting) == CONTRADICTORY:
+        return False
+    steadied = False
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
+            steadied = steady_slip(lasting, k) or steadied
+    return not steadied or force_contacts(lasting) != CONTRADICTORY
 
 
 @inner_kernel
 def follow_slip(lasting: Lasting, k: int) -> None:
-    """Direction of a slip that may turn; of one that has all but ended the last known."""
-    speed = 0.0
+    """Direction of a slip that may turn; the last known of one that has all but ended, or turns round.
+
+    A slip that comes to its end does not pass zero, but under friction along its last direction it does: what is along
+    that changes sign at the end, as in the plane.
+    """
+    speed, onward = 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
         speed += lasting.speed[k, 1 + t] ** 2
+        onward += lasting.speed[k, 1 + t] * lasting.direction[k, t]
     speed = math.sqrt(speed)
-    if speed > NOISE * lasting.speeds[k]:
+    if speed > NOISE * lasting.speeds[k] and onward > TURNED * speed:
         for t in range(lasting.size[TANGENTS]):
             lasting.direction[k, t] = lasting.speed[k, 1 + t] / speed
+
+
+@inner_kernel
+def steady_slip(lasting: Lasting, k: int) -> bool:
+    """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
+
+    With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
+    f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
+    which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
+    slip does not turn, and off by no more than it turns in that moment.
+    """
+    speed, push, force, along = 0.0, 0.0, 0.0, 0.0
+    for t in range(lasting.size[TANGENTS]):
+        friction = 0.0
+        for other in range(lasting.size[TANGENTS]):
+            for side in range(2):
+                for d in range(lasting.size[VELOCITIES]):
+                    share = lasting.jacobian[k, side, 1 + t, d] * lasting.response[k, side, 1 + other, d]
+                    friction -= share * lasting.force[k, 1 + other]
+        gain = row_value(lasting, k, 1 + t, lasting.acceleration) + lasting.gamma[k, 1 + t]
+        lasting.wanted[t] = gain + friction
+        speed += lasting.speed[k, 1 + t] ** 2
+        push += lasting.wanted[t] ** 2
+        force += friction**2
+        along += lasting.wanted[t] * lasting.speed[k, 1 + t]
+    speed, push, force = math.sqrt(speed), math.sqrt(push), math.sqrt(force)
+    if force == 0.0 or speed >= BEARABLE * lasting.length[0] * force or push < TURNED * force:
+        return False
+    if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
+        return False
+    size = 0.0
+    for t in range(lasting.size[TANGENTS]):
+        moment = BEARABLE * lasting.length[0] - speed / force
+        lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
+        size += lasting.wanted[t] ** 2
+    for t in range(lasting.size[TANGENTS]):
+        lasting.direction[k, t] = lasting.wanted[t] / math.sqrt(size)
+    return True
 
 
 @inner_kernel
@@ -129,6 +183,9 @@ def go_back(bodies: Bodies, lasting: Lasting) -> None:
         for d in range(lasting.base.shape[1]):
             bodies.pose[i, d] = lasting.base[i, d]
         displace(bodies, lasting, i)
+    for k in range(lasting.size[CONTACTS]):
+        for t in range(lasting.size[TANGENTS]):
+            lasting.direction[k, t] = lasting.begun[k, t]
 
 
 @inner_kernel
@@ -150,6 +207,9 @@ def bend_paths(bodies: Bodies, lasting: Lasting, end: int) -> None:
 @inner_kernel
 def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     """Stage 0: forces and monitors at the start of the phase under the modes held."""
+    for k in range(lasting.size[CONTACTS]):
+        for t in range(lasting.size[TANGENTS]):
+            lasting.begun[k, t] = lasting.direction[k, t]
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
@@ -187,7 +247,9 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
         for d in range(lasting.impulse.shape[1]):
             lasting.impulse[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
+    lasting.length[0] = length
     weigh_stage(bodies, lasting, 0, length)
+    keep_slopes(bodies, lasting, 0)
     lasting.early[0] = 1.0
     for stage in range(1, STAGES):
         go_to_stage(bodies, lasting, stage, length)
