@@ -25,7 +25,17 @@ from reports.wording import number
 
 #: Modules of `reference_solver.certification` that answer for gates, in the order in which they are measured and shown.
 #: The oracle, the longest, comes first: it needs few kernels; the process beside it compiles the others meanwhile.
-PARTS = ("event_driven", "impact", "friction", "columns", "conservation", "rotation", "metamorphic", "hard_cases")
+PARTS = (
+    "event_driven",
+    "impact",
+    "friction",
+    "columns",
+    "conservation",
+    "rotation",
+    "turning",
+    "metamorphic",
+    "hard_cases",
+)
 #: Processes side by side; the parts are of such lengths that more would wait for the longest.
 WORKERS = 2
 #: Columns of a table that goes to a file; a terminal has its own width.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_solver.certification import Gate, columns, conservation, friction, impact, rotation
+from reference_solver.certification import Gate, columns, conservation, friction, impact, rotation, turning
 from reference_solver.certification.space import SPACES
 
 IN_BOTH = [
@@ -39,6 +39,8 @@ ALONE = [
     (rotation.order, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
+    *[(turning.errors, name) for name in turning.CASES],
+    *[(turning.order, name) for name in turning.CASES],
 ]
 
 
