@@ -33,6 +33,7 @@ PARTS = (
     "conservation",
     "rotation",
     "turning",
+    "turning_in_space",
     "metamorphic",
     "hard_cases",
 )
