@@ -242,7 +242,7 @@ def top() -> Case:
         state = state + TRUE_STEP / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
     end = state[:4] / np.linalg.norm(state[:4])
     w = start @ spin
-    box = _box(tuple(half), mass, (*(start @ half), *q), (*np.cross(w, start @ half), *w))  # type: ignore[arg-type]
+    box = _box(tuple(half), mass, (*(start @ half), *q), (*np.cross(w, start @ half), *w))
     return Case((_floor(), box), 5.0, time, np.array([*(rotation_matrix(end) @ half), *end]))
 
 
