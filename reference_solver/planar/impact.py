@@ -35,19 +35,10 @@ from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import (
-    CONTACTS,
-    HELD,
-    LEFT,
-    MANIFOLDS,
-    REMEMBERED,
-    Bodies,
-    Options,
-    Pairs,
-    Rows,
-    SubStep,
-)
-from reference_solver.tally import RELEASED_SPEED
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.noise import UNSOLVED
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 #: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
 #: residual is 1e-13 of it: neither an approach, nor a parting, nor a slip.
@@ -183,10 +174,24 @@ def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, opti
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+        doubt(bodies, rows, tally)
         for c in range(rows.counts[CONTACTS]):
             rows.real[c, IMPACT_N], rows.real[c, IMPACT_T] = rows.real[c, PN], rows.real[c, PT]
     copy_vectors(bodies.twist, sub.start)
     return found
+
+
+@inner_kernel
+def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
+    """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
+
+    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    """
+    for c in range(rows.counts[CONTACTS]):
+        missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
+        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * rows.real[c, SPEED]:
+            tally[CONTRADICTED_A] = 1.0 + rows.integer[c, A]
+            tally[CONTRADICTED_B] = 1.0 + rows.integer[c, B]
 
 
 @inner_kernel

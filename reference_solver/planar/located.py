@@ -7,12 +7,13 @@ What is left of the step after a cut is the next sub-step. A step without events
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import certify, open_solve, row_work
-from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
+from reference_solver.planar.certificate import certify, is_finite, open_solve, row_work
 from reference_solver.planar.columns import (
     APPROACH,
     FORCE_N,
@@ -52,13 +53,8 @@ from reference_solver.planar.slide import go_back, keep, press_until_stick
 from reference_solver.planar.state import (
     BLOCK,
     CONTACTS,
-    EVENTS,
     FREE,
-    HELD,
-    LEFT,
-    OUTCOME,
     REMEMBERED,
-    UNSETTLED,
     Bodies,
     Buffer,
     Ledger,
@@ -69,8 +65,9 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
+from reference_solver.stepping.clock import HELD, LEFT, OUTCOME, REBOUND, UNSETTLED, count_event, open_step, weigh_event
 from reference_solver.stepping.phase import SHORTENED
-from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
+from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
 
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
@@ -91,7 +88,12 @@ def located_step(
     options: Options,
     tally: Array,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
+    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped.
+
+    A run that has ended stays where it is: its state is no number.
+    """
+    if not is_finite(bodies):
+        return True
     if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
         open_step(sub.clock, len(bodies.kind), options.dt)
         ledger.used[0] = 0
@@ -101,7 +103,19 @@ def located_step(
                 return False
         elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
+        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
+            end_run(bodies)
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
+
+
+@inner_kernel
+def end_run(bodies: Bodies) -> None:
+    """Leave no state that could be taken for an answer."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            for k in range(3):
+                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
 
 
 @inner_kernel
@@ -126,6 +140,8 @@ def sub_step(
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
+    if tally[CONTRADICTED_A] > 0.0:
+        return True
     begin_flight(bodies, rows, sub, length)
     curved, frozen = 0.0, sub.clock[HELD] > 0.0
     if not frozen and turns(bodies, rows, sub, length):
@@ -133,12 +149,10 @@ def sub_step(
         frozen = curved == 0.0
     sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
     length = curved if curved > 0.0 else length
-    end = length
-    if sub.clock[EVENTS] < most_events(len(bodies.kind)):
-        end = next_impact(bodies, pairs, rows, sub, options, length)
-        if end < 0.0:
-            copy_vectors(sub.before, bodies.twist)
-            return False
+    end = next_impact(bodies, pairs, rows, sub, options, length)
+    if end < 0.0:
+        copy_vectors(sub.before, bodies.twist)
+        return False
     if curved > 0.0:
         end = follow_curve(bodies, pairs, rows, sub, options, length, end)
         enter_curve(bodies, rows, sub, tally)
@@ -155,7 +169,7 @@ def sub_step(
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
     if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
-        count_event(sub.clock, len(bodies.kind), tally)
+        count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

@@ -46,6 +46,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
@@ -62,12 +63,6 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 #: Features per pair: bound of the feature numbers in core_core.py (edge on edge, then vertex on vertex), to pack
 #: (a, b, feature) into one key.
 FEATURES = 5 * MOST_VERTICES**2
-
-#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the
-#: last phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
-LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
-CLOCK_SIZE = 7
 
 #: Entries of `Rows.counts`.
 CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
