@@ -19,6 +19,7 @@ from reference_solver.planar.columns import (
     IMPACT_N,
     IMPACT_T,
     MEETS,
+    NUMBER,
     PN,
     POINT,
     PT,
@@ -66,6 +67,18 @@ def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
 
 
 @inner_kernel
+def restitution(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """E of row c; tables go by numbers in the world."""
+    return pairs.restitution[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
+
+
+@inner_kernel
+def friction(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """Coefficient mu of row c."""
+    return pairs.friction[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
+
+
+@inner_kernel
 def describe(bodies: Bodies, rows: Rows, c: int) -> None:
     """Levers, masses, place and approach of row c at the start of a sub-step."""
     prepare_masses(bodies, rows, c)
@@ -87,12 +100,12 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
         first = kept
         for c in range(rows.manifold[m], rows.manifold[m + 1]):
             describe(bodies, rows, c)
-            rows.real[c, RESTITUTION] = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
+            rows.real[c, RESTITUTION] = restitution(bodies, pairs, rows, c)
             reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
             may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
             if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
-                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.integer[kept, MEETS] = 1 if rows.real[kept, GAP] <= reach else 0
                 rows.integer[kept, ENDING] = OPEN_ENDED
                 rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.real[kept, PN], rows.real[kept, PT]
@@ -117,7 +130,7 @@ def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
             if old < rows.counts[REMEMBERED] and rows.old_key[old] == key and rows.old_impulse[old, 0] > 0.0:
                 describe(bodies, rows, c)
                 copy_row(rows, c, kept)
-                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.real[kept, RESTITUTION] = 0.0
                 kept += 1
         if kept > first:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
@@ -56,7 +56,6 @@ from reference_solver.planar.state import (
     FREE,
     REMEMBERED,
     Bodies,
-    Buffer,
     Ledger,
     Options,
     Pairs,
@@ -65,7 +64,18 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
-from reference_solver.stepping.clock import HELD, LEFT, OUTCOME, REBOUND, UNSETTLED, count_event, open_step, weigh_event
+from reference_solver.stepping.clock import (
+    CONFINED,
+    ESCAPED,
+    HELD,
+    LEFT,
+    OUTCOME,
+    REBOUND,
+    UNSETTLED,
+    count_event,
+    open_step,
+    weigh_event,
+)
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
 
@@ -96,17 +106,33 @@ def located_step(
         return True
     if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
         open_step(sub.clock, len(bodies.kind), options.dt)
-        ledger.used[0] = 0
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
                 return False
         elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
+        if sub.clock[ESCAPED] > 0.0:
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
+            return True
         if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
             end_run(bodies)
             sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
+
+
+@inner_kernel
+def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
+    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] != FREE:
+            continue
+        for k in range(2):
+            c = sub.path[i, k]
+            way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
+            if not (sub.limit[i, k] <= sub.pose[i, k] - way and sub.pose[i, k] + way <= sub.limit[i, 2 + k]):
+                return True
+    return False
 
 
 @inner_kernel
@@ -153,6 +179,9 @@ def sub_step(
     if end < 0.0:
         copy_vectors(sub.before, bodies.twist)
         return False
+    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
+        sub.clock[ESCAPED] = 1.0
+        return True
     if curved > 0.0:
         end = follow_curve(bodies, pairs, rows, sub, options, length, end)
         enter_curve(bodies, rows, sub, tally)
@@ -267,52 +296,3 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
             rows.old_impulse[c, 0] = lasts * rows.real[c, PN] / max(length, SHORT * dt)
             rows.old_impulse[c, 1] = lasts * rows.real[c, PT] / max(length, SHORT * dt)
     rows.counts[REMEMBERED] = rows.counts[CONTACTS]
-
-
-@kernel
-def run_located(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Like `run_steps` in step.py, for located steps."""
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(ledger.real) > len(buffer.real):
-            return k
-        if not located_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
-            return k
-        if sampled:
-            sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    copy_vectors(bodies.pose, buffer.pose[s])
-    copy_vectors(bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + ledger.used[0]
-        copy_ledger(ledger, buffer, start)
-
-
-@kernel
-def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> None:
-    """Contacts of the last step, from index ``start`` on."""
-    for c in range(ledger.used[0]):
-        for d in range(3):
-            buffer.integer[start + c, d] = ledger.integer[c, d]
-        for d in range(7):
-            buffer.real[start + c, d] = ledger.real[c, d]

@@ -11,7 +11,9 @@ from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD
 #: soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the last
 #: phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
 LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
-CLOCK_SIZE = 7
+#: 1 where bodies may not leave their bounds in the step, and 1 where one has.
+CONFINED, ESCAPED = 7, 8
+CLOCK_SIZE = 9
 
 #: Soft events located in a step, and one more per body.
 MOST_SOFT = 16
