@@ -12,7 +12,9 @@ SHAPE = 0
 MOTION = 1
 #: First vertex of the body's core in `Bodies.vertex`, and how many (0: half-space, 1: disc, 2: capsule).
 FIRST_VERTEX, VERTICES = 2, 3
-BODY_INTEGERS = 4
+#: Number of the body in the world: bodies of an island are gathered.
+NUMBER = 4
+BODY_INTEGERS = 5
 
 # Bodies.real.
 #: Cosine and sine of the angle.

@@ -19,6 +19,7 @@ from reference_solver.planar.columns import (
     IMPACT_N,
     IMPACT_T,
     MEETS,
+    NUMBER,
     PN,
     POINT,
     PT,
@@ -35,19 +36,10 @@ from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import (
-    CONTACTS,
-    HELD,
-    LEFT,
-    MANIFOLDS,
-    REMEMBERED,
-    Bodies,
-    Options,
-    Pairs,
-    Rows,
-    SubStep,
-)
-from reference_solver.tally import RELEASED_SPEED
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.noise import UNSOLVED
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 #: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
 #: residual is 1e-13 of it: neither an approach, nor a parting, nor a slip.
@@ -75,6 +67,18 @@ def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
 
 
 @inner_kernel
+def restitution(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """E of row c; tables go by numbers in the world."""
+    return pairs.restitution[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
+
+
+@inner_kernel
+def friction(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """Coefficient mu of row c."""
+    return pairs.friction[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
+
+
+@inner_kernel
 def describe(bodies: Bodies, rows: Rows, c: int) -> None:
     """Levers, masses, place and approach of row c at the start of a sub-step."""
     prepare_masses(bodies, rows, c)
@@ -96,12 +100,12 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
         first = kept
         for c in range(rows.manifold[m], rows.manifold[m + 1]):
             describe(bodies, rows, c)
-            rows.real[c, RESTITUTION] = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
+            rows.real[c, RESTITUTION] = restitution(bodies, pairs, rows, c)
             reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
             may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
             if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
-                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.integer[kept, MEETS] = 1 if rows.real[kept, GAP] <= reach else 0
                 rows.integer[kept, ENDING] = OPEN_ENDED
                 rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.real[kept, PN], rows.real[kept, PT]
@@ -126,7 +130,7 @@ def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
             if old < rows.counts[REMEMBERED] and rows.old_key[old] == key and rows.old_impulse[old, 0] > 0.0:
                 describe(bodies, rows, c)
                 copy_row(rows, c, kept)
-                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.real[kept, RESTITUTION] = 0.0
                 kept += 1
         if kept > first:
@@ -183,10 +187,24 @@ def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, opti
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+        doubt(bodies, rows, tally)
         for c in range(rows.counts[CONTACTS]):
             rows.real[c, IMPACT_N], rows.real[c, IMPACT_T] = rows.real[c, PN], rows.real[c, PT]
     copy_vectors(bodies.twist, sub.start)
     return found
+
+
+@inner_kernel
+def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
+    """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
+
+    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    """
+    for c in range(rows.counts[CONTACTS]):
+        missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
+        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * rows.real[c, SPEED]:
+            tally[CONTRADICTED_A] = 1.0 + rows.integer[c, A]
+            tally[CONTRADICTED_B] = 1.0 + rows.integer[c, B]
 
 
 @inner_kernel

@@ -7,12 +7,13 @@ What is left of the step after a cut is the next sub-step. A step without events
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel, kernel
+import math
+
+from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import certify, open_solve, row_work
-from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
+from reference_solver.planar.certificate import certify, is_finite, open_solve, row_work
 from reference_solver.planar.columns import (
     APPROACH,
     FORCE_N,
@@ -52,15 +53,9 @@ from reference_solver.planar.slide import go_back, keep, press_until_stick
 from reference_solver.planar.state import (
     BLOCK,
     CONTACTS,
-    EVENTS,
     FREE,
-    HELD,
-    LEFT,
-    OUTCOME,
     REMEMBERED,
-    UNSETTLED,
     Bodies,
-    Buffer,
     Ledger,
     Options,
     Pairs,
@@ -69,8 +64,20 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
+from reference_solver.stepping.clock import (
+    CONFINED,
+    ESCAPED,
+    HELD,
+    LEFT,
+    OUTCOME,
+    REBOUND,
+    UNSETTLED,
+    count_event,
+    open_step,
+    weigh_event,
+)
 from reference_solver.stepping.phase import SHORTENED
-from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
+from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
 
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
@@ -91,17 +98,50 @@ def located_step(
     options: Options,
     tally: Array,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
+    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped.
+
+    A run that has ended stays where it is: its state is no number.
+    """
+    if not is_finite(bodies):
+        return True
     if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
         open_step(sub.clock, len(bodies.kind), options.dt)
-        ledger.used[0] = 0
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
                 return False
         elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
+        if sub.clock[ESCAPED] > 0.0:
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
+            return True
+        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
+            end_run(bodies)
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
+
+
+@inner_kernel
+def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
+    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] != FREE:
+            continue
+        for k in range(2):
+            c = sub.path[i, k]
+            way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
+            if not (sub.limit[i, k] <= sub.pose[i, k] - way and sub.pose[i, k] + way <= sub.limit[i, 2 + k]):
+                return True
+    return False
+
+
+@inner_kernel
+def end_run(bodies: Bodies) -> None:
+    """Leave no state that could be taken for an answer."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            for k in range(3):
+                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
 
 
 @inner_kernel
@@ -126,6 +166,8 @@ def sub_step(
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
+    if tally[CONTRADICTED_A] > 0.0:
+        return True
     begin_flight(bodies, rows, sub, length)
     curved, frozen = 0.0, sub.clock[HELD] > 0.0
     if not frozen and turns(bodies, rows, sub, length):
@@ -133,12 +175,13 @@ def sub_step(
         frozen = curved == 0.0
     sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
     length = curved if curved > 0.0 else length
-    end = length
-    if sub.clock[EVENTS] < most_events(len(bodies.kind)):
-        end = next_impact(bodies, pairs, rows, sub, options, length)
-        if end < 0.0:
-            copy_vectors(sub.before, bodies.twist)
-            return False
+    end = next_impact(bodies, pairs, rows, sub, options, length)
+    if end < 0.0:
+        copy_vectors(sub.before, bodies.twist)
+        return False
+    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
+        sub.clock[ESCAPED] = 1.0
+        return True
     if curved > 0.0:
         end = follow_curve(bodies, pairs, rows, sub, options, length, end)
         enter_curve(bodies, rows, sub, tally)
@@ -155,7 +198,7 @@ def sub_step(
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
     if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
-        count_event(sub.clock, len(bodies.kind), tally)
+        count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -253,52 +296,3 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
             rows.old_impulse[c, 0] = lasts * rows.real[c, PN] / max(length, SHORT * dt)
             rows.old_impulse[c, 1] = lasts * rows.real[c, PT] / max(length, SHORT * dt)
     rows.counts[REMEMBERED] = rows.counts[CONTACTS]
-
-
-@kernel
-def run_located(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Like `run_steps` in step.py, for located steps."""
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(ledger.real) > len(buffer.real):
-            return k
-        if not located_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
-            return k
-        if sampled:
-            sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    copy_vectors(bodies.pose, buffer.pose[s])
-    copy_vectors(bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + ledger.used[0]
-        copy_ledger(ledger, buffer, start)
-
-
-@kernel
-def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> None:
-    """Contacts of the last step, from index ``start`` on."""
-    for c in range(ledger.used[0]):
-        for d in range(3):
-            buffer.integer[start + c, d] = ledger.integer[c, d]
-        for d in range(7):
-            buffer.real[start + c, d] = ledger.real[c, d]

@@ -25,11 +25,12 @@ from reference_solver.planar.columns import (
     TANGENT_MASS,
     TARGET,
 )
-from reference_solver.planar.impact import NOISE, gap_noise
+from reference_solver.planar.impact import NOISE, doubt, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.rows import measure_speed, warm_start
-from reference_solver.planar.state import CONTACTS, FREE, HELD, Bodies, Options, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows, SubStep
+from reference_solver.stepping.clock import HELD
 from reference_solver.tally import SWEEPS
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
@@ -85,6 +86,7 @@ def press(
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+        doubt(bodies, rows, tally)
 
 
 @inner_kernel

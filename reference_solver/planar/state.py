@@ -34,6 +34,7 @@ from reference_solver.planar.columns import (
     INVERSE_MASS,
     LOAD,
     MOTION,
+    NUMBER,
     REACH,
     ROUNDING,
     ROW_INTEGERS,
@@ -46,6 +47,8 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.clock import CLOCK_SIZE
+from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
@@ -63,14 +66,11 @@ NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 #: (a, b, feature) into one key.
 FEATURES = 5 * MOST_VERTICES**2
 
-#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the
-#: last phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
-LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
-CLOCK_SIZE = 7
-
-#: Entries of `Rows.counts`.
-CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
+#: Entries of `Rows.counts`: PAST and KEPT count what is known of the step before, and what is kept for the next.
+CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES, PAST, KEPT = 0, 1, 2, 3, 4, 5
+COUNTS = 6
+#: More than any number of bodies, so that (a, b, feature) is one key of 63 bits.
+MOST_BODIES = 1 << 24
 
 
 class Bodies(NamedTuple):
@@ -99,14 +99,18 @@ class Pairs(NamedTuple):
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
-    counts: Indices  # (4,): see CONTACTS .. CANDIDATES
+    counts: Indices  # (COUNTS,): see CONTACTS .. KEPT
     integer: Indices  # (c, ROW_INTEGERS)
     real: Array  # (c, ROW_REALS)
     manifold: Indices  # (m + 1,): first row of each manifold
     block: Array  # (m, 4, 4): W of a two-point manifold, rows n1, t1, n2, t2 (E12)
     local: Array  # (LOCAL_ROWS, LOCAL_COLUMNS): scratch of the block being solved, see pair_modes.py
-    old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
+    old_key: Indices  # (c,): (a, b, feature) of the step or sub-step before, ascending
     old_impulse: Array  # (c, 2)
+    past_key: Indices  # (c,): the same of the whole step before, for located steps
+    past_impulse: Array  # (c, 2)
+    kept_key: Indices  # (c,): and for the next one
+    kept_impulse: Array  # (c, 2)
 
 
 class SubStep(NamedTuple):
@@ -126,6 +130,17 @@ class SubStep(NamedTuple):
     probe: Rows  # room for the contacts of one pair at another time
     lasting: Lasting
     meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
+    limit: Array  # (n, 4): lower and upper bounds of the centres, where they are confined [m]
+
+
+class World(NamedTuple):
+    """Islands of the whole world, and room for the bodies of one of them."""
+
+    islands: Islands
+    bodies: Bodies  # (n,)
+    limit: Array  # (n, 4): see `SubStep`
+    order: Indices  # (n,): see `Pairs`
+    tally: Array  # (SIZE,): to go back to where a step is made again
 
 
 class Ledger(NamedTuple):
@@ -193,6 +208,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     real[:, REACH] = np.array(far) + real[:, ROUNDING]
     kind = np.zeros((n, BODY_INTEGERS), np.int64)
     kind[:, FIRST_VERTEX], kind[:, VERTICES] = np.cumsum(count) - count, count
+    kind[:, NUMBER] = np.arange(n)
     kind[:, SHAPE] = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
     kind[:, MOTION] = [_MOTION_CODE[body.motion] for body in model.bodies]
     twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
@@ -237,7 +253,7 @@ def allocate_pairs(model: Model, capacity: int) -> Pairs:
 def allocate_rows(capacity: int) -> Rows:
     """Return room for ``capacity`` contact points."""
     return Rows(
-        counts=np.zeros(4, np.int64),
+        counts=np.zeros(COUNTS, np.int64),
         integer=np.zeros((capacity, ROW_INTEGERS), np.int64),
         real=np.zeros((capacity, ROW_REALS)),
         manifold=np.zeros(capacity + 1, np.int64),
@@ -245,6 +261,10 @@ def allocate_rows(capacity: int) -> Rows:
         local=np.zeros((LOCAL_ROWS, LOCAL_COLUMNS)),
         old_key=np.zeros(capacity, np.int64),
         old_impulse=np.zeros((capacity, 2)),
+        past_key=np.zeros(capacity, np.int64),
+        past_impulse=np.zeros((capacity, 2)),
+        kept_key=np.zeros(capacity, np.int64),
+        kept_impulse=np.zeros((capacity, 2)),
     )
 
 
@@ -265,7 +285,16 @@ def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
         probe=allocate_rows(4),
         lasting=allocate_lasting(2, n, contacts),
         meeting=meeting,
+        limit=np.zeros((n, 4)),
     )
+
+
+def allocate_world(bodies: Bodies, candidates: int) -> World:
+    """Return room for the islands of ``bodies``."""
+    n = len(bodies.pose)
+    local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
+    islands = allocate_islands(2, n, candidates)
+    return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE))
 
 
 def allocate_ledger(capacity: int) -> Ledger:
@@ -279,6 +308,8 @@ def grown(rows: Rows) -> Rows:
     bigger.counts[:] = rows.counts
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse
+    bigger.past_key[: len(rows.past_key)] = rows.past_key
+    bigger.past_impulse[: len(rows.past_impulse)] = rows.past_impulse
     return bigger
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Any
 
 import numpy as np
 
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
-from reference_solver.planar.located import copy_ledger, run_located
+from reference_solver.planar.ledger import copy_ledger
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
+from reference_solver.planar.run import run_located
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
@@ -23,6 +25,7 @@ from reference_solver.planar.state import (
     allocate_pairs,
     allocate_rows,
     allocate_sub_step,
+    allocate_world,
     grown,
     options,
     uses_direct,
@@ -47,6 +50,7 @@ class World:
         self._rows = allocate_rows(8 * n + 64)
         self._sub = allocate_sub_step(n, len(self._rows.real), allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(8 * n + 64)
+        self._world = allocate_world(self._bodies, len(self._pairs.candidate))
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
@@ -100,11 +104,10 @@ class World:
         return assemble(trial._bodies, trial._rows, trial._options)
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
-        state = (self._bodies, self._pairs, self._rows, self._problem)
+        state: Any = (self._bodies, self._pairs, self._rows, self._problem)
         if self._options.scheme == LOCATED:
-            return int(
-                run_located(*state, self._sub, self._ledger, self._options, self.tally, buffer, done, steps, stride)
-            )
+            own = (self._sub, self._ledger, self._options, self.tally, self._world)
+            return int(run_located(*state, *own, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def _most_contacts(self) -> int:
@@ -126,6 +129,7 @@ class World:
         """Double whatever was found too small; the step that stopped goes on from where it was."""
         if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
+            self._world = allocate_world(self._bodies, len(self._pairs.candidate))
         elif self._ledger.used[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
             bigger = allocate_ledger(2 * len(self._ledger.real))
             for old, new in zip(self._ledger, bigger, strict=True):

@@ -10,10 +10,9 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
 from reference_solver.planar.impact import LANDED, NO_IMPACT, REBOUNDED
 from reference_solver.planar.located import NOTHING_LEFT, SERIES_PASSES, SHORT
-from reference_solver.planar.state import EVENTS, HELD, LEFT, Options
+from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import open_solve, point_work
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
@@ -38,6 +37,8 @@ from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
+from reference_solver.stepping.clock import EVENTS, HELD, LEFT, REBOUND, count_event, open_step, weigh_event
+from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import (
     CONTACT_WORK,
     LOAD_WORK,
@@ -98,7 +99,7 @@ def sub_step(
         pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
     begin_flight(bodies, manifolds, options, length)
     end = length
-    if sub.clock[EVENTS] < most_events(len(bodies)):
+    if sub.clock[EVENTS] < EVENT_BUDGET:
         end = next_impact(bodies, detection, manifolds, sub, options, length)
         if end < 0.0:
             undo(bodies)
@@ -118,7 +119,7 @@ def sub_step(
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
     if end < left:
-        count_event(sub.clock, len(bodies), tally)
+        count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

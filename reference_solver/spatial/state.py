@@ -27,7 +27,7 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
-from reference_solver.planar.state import CLOCK_SIZE
+from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
 from reference_solver.tally import SIZE as TALLY_SIZE
 

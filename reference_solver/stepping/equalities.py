@@ -11,7 +11,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.lasting import CONTACTS, OPEN, SLIP, STICK, TANGENTS, VELOCITIES, Lasting
+from reference_solver.stepping.lasting import BODIES, CONTACTS, OPEN, SLIP, STICK, TANGENTS, VELOCITIES, Lasting
 
 #: What the rows of a phase are: independent; redundant, with forces that are not unique; contradictory.
 INDEPENDENT, REDUNDANT, CONTRADICTORY = 0, 1, 2
@@ -272,7 +272,7 @@ def force_contacts(lasting: Lasting) -> int:
 @inner_kernel
 def accelerate(lasting: Lasting) -> None:
     """Accelerations of all bodies by loads and contact forces."""
-    for i in range(len(lasting.free)):
+    for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             lasting.acceleration[i, d] = lasting.free[i, d]
     for k in range(lasting.size[CONTACTS]):

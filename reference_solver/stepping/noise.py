@@ -1,6 +1,13 @@
-"""What is round-off and not physics, for all of the step; each number with its reason."""
+"""What is round-off and not physics, and what ends a run, for all of the step; each number with its reason."""
 
 from __future__ import annotations
+
+#: Events located in one step before the run ends: a ball at 100 m/s with .1 mm of play has 4e3 at 1/240 s. None is ever
+#: left out.
+EVENT_BUDGET = 100_000
+#: A contact that still approaches with this share of its reference speed after its solve is not solved, whatever its
+#: impulse: solves end at 1e-13, and stalled ones of mass ratio 1e6 near 1e-6.
+UNSOLVED = 1e-3
 
 #: Gaps and overlaps below this fraction of the smaller half width are round-off, not geometry.
 ROUND_OFF = 1e-12

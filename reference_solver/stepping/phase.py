@@ -17,6 +17,7 @@ from reference_solver.stepping.equalities import (
 )
 from reference_solver.stepping.lasting import (
     BETWEEN,
+    BODIES,
     CONTACTS,
     FAR,
     FEATURE,
@@ -165,7 +166,7 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
 @inner_kernel
 def begin_phase(bodies: Bodies, lasting: Lasting) -> None:
     """Keep the state that the phase begins with."""
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         for d in range(lasting.base.shape[1]):
             lasting.base[i, d] = bodies.pose[i, d]
         for d in range(lasting.size[VELOCITIES]):
@@ -176,7 +177,7 @@ def begin_phase(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def go_back(bodies: Bodies, lasting: Lasting) -> None:
     """Return to the start of the phase."""
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             bodies.twist[i, d] = lasting.before[i, d]
             lasting.displacement[i, d] = 0.0
@@ -191,7 +192,7 @@ def go_back(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def keep_slopes(bodies: Bodies, lasting: Lasting, stage: int) -> None:
     """Rates of a stage."""
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         displacement_rate(bodies, lasting, i, stage)
         for d in range(lasting.size[VELOCITIES]):
             lasting.slope[stage, i, d] = lasting.acceleration[i, d]
@@ -200,7 +201,7 @@ def keep_slopes(bodies: Bodies, lasting: Lasting, stage: int) -> None:
 @inner_kernel
 def bend_paths(bodies: Bodies, lasting: Lasting, end: int) -> None:
     """Second derivatives of the displacements at one end of the phase."""
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         displacement_curvature(bodies, lasting, i, end)
 
 
@@ -222,7 +223,7 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
 @inner_kernel
 def go_to_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> None:
     """Put all bodies where a stage of the step has them."""
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         moves = False
         for d in range(lasting.size[VELOCITIES]):
             way, gain = 0.0, 0.0
@@ -307,7 +308,7 @@ def relative_error(lasting: Lasting, length: float) -> float:
         split = lasting.impulse.shape[1]
         first, last = (0, split) if part == 0 else (split, lasting.size[VELOCITIES])
         moved, missed = 0.0, 0.0
-        for i in range(len(lasting.base)):
+        for i in range(lasting.size[BODIES]):
             for d in range(first, last):
                 way, gain = 0.0, 0.0
                 for s in range(STAGES):
@@ -347,7 +348,7 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
         return True
     assemble(lasting, count, False)
     solve_rows(lasting, count, 0.0)
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             lasting.acceleration[i, d] = 0.0
     for i in range(count):
@@ -355,7 +356,7 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
         push(lasting, lasting.acceleration, k, row, lasting.answer[i])
         if not poses:
             give(bodies, lasting, k, row, lasting.answer[i])
-    for i in range(len(lasting.base)):
+    for i in range(lasting.size[BODIES]):
         if not is_free(bodies, i):
             continue
         for d in range(lasting.size[VELOCITIES]):
