@@ -27,6 +27,7 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
+from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.tally import SIZE as TALLY_SIZE
 
@@ -149,6 +150,7 @@ class Buffer(NamedTuple):
     offset: Indices  # (s + 1,)
     names: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
+    journal: Journal
 
 
 class Detection(NamedTuple):
@@ -225,6 +227,7 @@ class SubStep(NamedTuple):
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD of planar.state
     trial: Bodies  # (2,): a pair of bodies at another time
     saved: Array  # (SIZE,): the tally before an attempt
+    journal: Journal
 
 
 class Ledger(NamedTuple):
@@ -237,7 +240,8 @@ class Ledger(NamedTuple):
 
 def allocate_sub_step() -> SubStep:
     """Return the room for a sub-step."""
-    return SubStep(np.zeros(CLOCK_SIZE), np.zeros(2, BODY).view(np.recarray), np.zeros(TALLY_SIZE))
+    trial = np.zeros(2, BODY).view(np.recarray)
+    return SubStep(np.zeros(CLOCK_SIZE), trial, np.zeros(TALLY_SIZE), allocate_journal(3, 0, 0))
 
 
 def allocate_ledger(capacity: int) -> Ledger:
