@@ -17,13 +17,17 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" -c constraints.txt
 	@touch $@
 
-# The verdicts decide the exit status; time and report are made whatever they are.
+# The verdicts decide the exit status; time and report are made whatever they are. Matrix and report's path come last,
+# where they are seen; the verdicts stand on the terminal before the bench as well.
 run: $(STAMP)
-	@status=0; \
+	@status=0; begun=$$(date +%s); \
 	$(BIN)/crosscheck run --quick --out $(OUT) || status=$$?; \
 	test $$status -le 1 || exit $$status; \
-	$(BIN)/crosscheck bench --quick --out $(OUT) || exit 2; \
-	echo "report:"; $(BIN)/crosscheck report --out $(OUT) || exit 2; \
+	echo "matrix after $$(( $$(date +%s) - begun )) s; now time and report"; \
+	$(BIN)/crosscheck bench --quick --brief --out $(OUT) || exit 2; \
+	$(BIN)/crosscheck report --out $(OUT) >/dev/null || exit 2; \
+	$(BIN)/crosscheck show --out $(OUT) || exit 2; \
+	echo "all of it took $$(( $$(date +%s) - begun )) s"; \
 	exit $$status
 
 # `setup` has installed Pinocchio: if it is not there, the comparison with it fails instead of being skipped.

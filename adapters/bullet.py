@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib.metadata import version
 from types import MappingProxyType, ModuleType
@@ -558,6 +558,20 @@ class BulletEngine(Engine):
         if refusal := self.refuses(scene, ""):
             raise EngineError(refusal)
         return BulletSimulation(scene, dt, settings)
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: parameters of the world, of how bodies are made, and of each body."""
+        lines = [f"# p: pybullet; fixedTimeStep={dt:.9g}; body: each of your bodies"]
+        world = [f"numSolverIterations={settings[n]}" if n == "iterations" else f"{n}={settings[n]!r}"
+                 for n in names if n in _WORLD | {"iterations"}]  # fmt: skip
+        if world:
+            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})")
+        if "useMaximalCoordinates" in names:
+            lines.append(f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})")
+        body = [f"{n}={settings[n]!r}" for n in names if n in _BODY]
+        if body:
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})")
+        return "\n".join(lines)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains from Baumgarte."""

@@ -10,7 +10,7 @@ same instant, and free fall lags the parabola by g t dt / 2. Line numbers below 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -187,6 +187,14 @@ class ChipmunkEngine(Engine):
         if reason:
             raise EngineError(reason)
         return ChipmunkSimulation(scene, dt, checked)
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: attributes of the space."""
+        lines = [f"# space: your pymunk.Space, stepped with space.step({dt:.9g})"]
+        lines += [f"space.{name} = {settings[name]!r}" for name in names if name != "start_overlap"]
+        if "start_overlap" in names and settings["start_overlap"]:
+            lines.append(f"# and let touching bodies start {settings['start_overlap']:.4g} m deep in each other")
+        return "\n".join(lines)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Nothing: single contacts and constant forces are exact here, in both profiles."""

@@ -8,8 +8,9 @@ never sees a scene's truth, and contains no loop over steps: the only one is `ad
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -190,6 +191,27 @@ class Engine(ABC):
 
         Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
         """
+
+    def certify(
+        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+    ) -> dict[str, Any] | None:
+        """Certify the run of ``steps`` steps that ended in ``final_pose`` independently; None where nothing can.
+
+        The dictionary has ``holds``, ``reasons`` and whatever numbers stand behind them.
+        """
+        return None
+
+    def kernels(self) -> Path | None:
+        """Folder that keeps machine code which this engine compiles at its first steps; None if it compiles nothing."""
+        return None
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
+
+        Written out for the material of the scene's first pair and step ``dt`` [s]; empty where an adapter knows no
+        such words.
+        """
+        return ""
 
     def settings(self, profile: str, needs: Needs, dt: float, iterations: int | None = None) -> list[Setting]:
         """Settings of ``profile``; ``iterations`` replaces the profile's own count.

@@ -13,7 +13,7 @@ with: it lags the pose by one step.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
@@ -307,6 +307,44 @@ class MujocoEngine(Engine):
             steepest = max(abs(x - y) for x, y in pairwise(ratios))
             declared["restitution"] = Declared(middle, half + steepest + 1e-12, because)
         return declared
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """MJCF: ``<option>``, and the contact parameters on every geom (on a pair where only a pair has them)."""
+        material = next(material for _, _, material in scene.contact_pairs())
+        option = {name: settings[name] for name in _OPTIONS if name in names}
+        contact: dict[str, Any] = {}
+        if {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
+            contact["solref"] = pair_solref(settings, material.restitution, dt)
+        if "solimp" in names:
+            contact["solimp"] = settings["solimp"]
+        if "smooth_condim" in names and material.friction == 0.0:
+            contact["condim"] = settings["smooth_condim"]
+        paired = "solreffriction" in names
+        if "margin" in names:
+            contact["margin"] = settings["margin"] * (1.0 if paired else 0.5)  # a pair's is the sum of its geoms'
+        if paired:
+            contact["solreffriction"] = pair_solreffriction(settings, dt)
+        lines = [_element("option", {"timestep": dt, **option})]
+        if contact and paired:
+            lines.append(f"<contact>{_element('pair', {'geom1': 'A', 'geom2': 'B', **contact})}</contact>")
+        elif contact:
+            lines.append(f"<default>{_element('geom', contact)}</default>")
+        return "\n".join(lines)
+
+
+#: Settings that are attributes of MJCF's ``<option>``, by the same name.
+_OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
+
+
+def _element(name: str, attributes: Mapping[str, Any]) -> str:
+    """One empty MJCF element; numbers keep all digits that matter to a step."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, tuple | list):
+            return " ".join(text(item) for item in value)
+        return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+    return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, value in attributes.items()) + "/>"
 
 
 def _second_order_fall() -> dict[str, Declared]:

@@ -59,9 +59,9 @@ def needs(scene: Scene) -> Needs:
     """Derive what ``scene`` needs."""
     d = scene.dimension
     free = [body for body in scene.bodies if body.motion == "free"]
-    materials = [material for _, _, material in scene.contact_pairs()]
-    friction = max((m.friction for m in materials), default=0.0)
-    restitution = max((m.restitution for m in materials), default=0.0)
+    materials = scene.materials()
+    friction = max((friction for _, friction in materials), default=0.0)
+    restitution = max((restitution for restitution, _ in materials), default=0.0)
     gravity = math.hypot(*scene.gravity)
     loaded = gravity > 0.0 or any(any(body.force) for body in free)
     spin = any(any(body.twist[d:]) or any(body.torque) for body in scene.bodies)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -152,9 +152,44 @@ class ReferenceEngine(Engine):
         except (ValueError, TypeError) as error:
             raise EngineError(str(error).splitlines()[0]) from error
 
+    def certify(
+        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+    ) -> dict[str, Any] | None:
+        """Full certificate (`reference_solver.certification.truth`) of a profile that promises a solution."""
+        from reference_solver import Settings
+        from reference_solver.certification.truth import certify
+
+        chosen = Settings(dt=dt, **settings)
+        if chosen.residual is None:
+            return None
+        found = certify(_model(scene), chosen, steps)
+        reasons = list(found.reasons)
+        same = np.array_equal(found.pose[-1], final_pose)
+        if not same:
+            reasons.append("the run that was certified does not end where the run that is judged does")
+        return {
+            "holds": found.holds and same,
+            "reasons": reasons,
+            "error": _plain(found.error[-1]),
+            "growth": _plain(found.growth[-1]),
+            "horizon": _plain(found.horizon),
+            "findings": {finding.name: _plain(finding.value) for finding in found.findings},
+        }
+
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Nothing: single contacts and constant forces are exact in both profiles."""
         return {}
+
+    def kernels(self) -> Path | None:
+        """Folder of the solver's kernels; None where nothing is compiled, or where no folder can keep it."""
+        from reference_solver import compilation
+
+        return None if compilation.config.DISABLE_JIT else compilation.cache_folder()
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: the solver's settings."""
+        changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
+        return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
 
 
 def _package_version() -> str:

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from adapters.engine import Engine, EngineError, EngineFacts
+from adapters.foreign import Found, checked_facts, probe, said_by
+from adapters.plain import NAME, is_visible, one_line
 
 GROUP = "contact_crosscheck.engines"
 #: Order in which our own engines are shown; others follow by name.
 SHOWN_FIRST = ("reference", "chipmunk", "bullet", "mujoco")
 
 
-@dataclass(frozen=True)
-class Found:
-    """An engine that was looked for: loaded, or the reason why not."""
+_here = False
 
-    name: str
-    engine: Engine | None
-    version: str
-    reason: str = ""
+
+def load_engines_here() -> None:
+    """Load the engines of others in this process as well, from now on: it is one that may die."""
+    global _here
+    _here = True
+    find.cache_clear()
+
+
+def is_ours(entry: EntryPoint) -> bool:
+    """Whether an engine belongs to this project, so that it may be loaded anywhere."""
+    return entry.value.startswith("adapters.")
 
 
 def _entries() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+    # Ours come last: nobody else's engine takes their place by taking their name.
+    return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=is_ours)}
 
 
 def names() -> list[str]:
@@ -37,7 +44,10 @@ def names() -> list[str]:
 
 @cache
 def find(name: str) -> Found:
-    """Load the engine called ``name``; never raises for an engine that is missing or broken.
+    """Look for the engine called ``name``; never raises for an engine that is missing or broken.
+
+    An engine of somebody else's plugin is asked in a process of its own (`adapters.foreign`), except where
+    `load_engines_here` was called.
 
     Raises
     ------
@@ -49,31 +59,41 @@ def find(name: str) -> Found:
         close = difflib.get_close_matches(name, registered, n=1)
         hint = f", did you mean {close[0]!r}?" if close else f"; known: {', '.join(names())}"
         raise EngineError(f"engine: there is no engine called {name!r}{hint}")
+    entry = registered[name]
+    return loaded(entry) if _here or is_ours(entry) else probe(entry)
+
+
+def loaded(entry: EntryPoint) -> Found:
+    """Load an engine in this process; a broken one is a reason."""
     engine: Engine | None = None
+    facts: EngineFacts | None = None
+    name = entry.name
     try:
-        engine = registered[name].load()()
+        made = entry.load()
+        told = getattr(made, "facts", None)  # known even if the engine itself is not installed
+        facts = told if is_ours(entry) else checked_facts(told) if isinstance(told, EngineFacts) else None
+        engine = made()
         if not isinstance(engine, Engine):
-            raise TypeError(f"{registered[name].value} is not an adapters.Engine")
-        return Found(name, engine, engine.version())
+            raise TypeError(f"{entry.value} is not an adapters.Engine")
+        facts = facts if is_ours(entry) else checked_facts(engine.facts)
+        for profile in dict(engine.profiles):
+            if not isinstance(profile, str) or not is_visible(profile) or not 0 < len(profile) <= NAME:
+                raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
+        return Found(name, engine, one_line(engine.version(), NAME), "", facts)
     except ImportError as error:
-        package = engine.facts.package if engine else name
-        missing = str(error).partition("\n")[0]
-        return Found(name, None, "", f"{missing}; pip install 'contact-crosscheck[{name}]' ({package})")
-    except (Exception, SystemExit) as error:  # a third-party plugin may raise anything; only its rows may suffer
-        return Found(name, None, "", f"{type(error).__name__}: {error}".splitlines()[0])
+        package = facts.package if facts else name
+        return Found(name, None, "", f"{one_line(error)}; pip install 'contact-crosscheck[{name}]' ({package})", facts)
+    except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
+        return Found(name, None, "", said_by(error), facts)
 
 
 def facts(name: str) -> EngineFacts | None:
-    """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
-    entry = _entries().get(name)
-    try:
-        return entry.load().facts if entry else None
-    except (Exception, SystemExit):  # as in `find`: a broken plugin costs its own part only
-        return None
+    """Constant facts of an engine, even of one that is not installed; None if its adapter cannot be loaded."""
+    return find(name).facts if name in _entries() else None
 
 
 def load(name: str) -> Engine:
-    """Return the engine called ``name``.
+    """Return the engine called ``name``, loaded in this process.
 
     Raises
     ------
@@ -81,6 +101,8 @@ def load(name: str) -> Engine:
         If it is unknown, not installed or broken.
     """
     found = find(name)
+    if found.engine is not None and not is_ours(_entries()[name]) and not _here:
+        found = loaded(_entries()[name])
     if found.engine is None:
         raise EngineError(f"engine: {name} is not installed: {found.reason}")
     return found.engine

@@ -22,10 +22,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from itertools import combinations
+from functools import cached_property
+from itertools import combinations, combinations_with_replacement, product
 from typing import Any, Literal
+
+from adapters.plain import NAME, is_visible, one_line
 
 Motion = Literal["free", "fixed", "prescribed"]
 ImpactLaw = Literal["N-SIM", "N-SEQ"]
@@ -167,6 +171,68 @@ class Pair:
     friction: float = 0.0
 
 
+#: Restitution and friction that one or several entries give.
+_Said = frozenset[tuple[float, float]]
+
+
+class _Materials:
+    """The pairs of a scene, sorted by what they name: both bodies, one, or none."""
+
+    def __init__(self, pairs: tuple[Pair, ...]) -> None:
+        self.both: dict[frozenset[str], _Said] = {}
+        self.one: dict[str, _Said] = {}
+        self.none: _Said = frozenset()
+        for pair in pairs:
+            value = frozenset(((pair.restitution, pair.friction),))
+            named = frozenset((pair.a, pair.b)) - {"*"}
+            if "*" not in (pair.a, pair.b):
+                self.both[named] = self.both.get(named, frozenset()) | value
+            elif named:
+                (name,) = named
+                self.one[name] = self.one.get(name, frozenset()) | value
+            else:
+                self.none |= value
+
+    def said(self, a: str, b: str) -> _Said:
+        """What the most specific entries for two bodies say; empty: smooth and plastic."""
+        return (
+            self.both.get(frozenset((a, b))) or self.one.get(a, frozenset()) | self.one.get(b, frozenset()) or self.none
+        )
+
+    def materials(self, bodies: tuple[Body, ...]) -> set[tuple[float, float]]:
+        """Values of all pairs of which one body is free; bodies that no entry tells apart are looked at together."""
+        kind = {body.name: (self.one.get(body.name, frozenset()), body.motion == "free") for body in bodies}
+        members: dict[tuple[_Said, bool], list[str]] = {}
+        for name, its in kind.items():
+            members.setdefault(its, []).append(name)
+        named: Counter[frozenset[tuple[_Said, bool]]] = Counter()
+        found: set[tuple[float, float]] = set()
+        for key, said in self.both.items():
+            kinds = frozenset(kind[name] for name in key if name in kind)
+            if len(key) == 2 and any(is_free for _, is_free in kinds):
+                named[kinds] += 1
+                a, b = sorted(key)
+                found.add(_single(a, b, said))
+        for first, second in combinations_with_replacement(members, 2):
+            n, m = len(members[first]), len(members[second])
+            count = n * m if first != second else n * (n - 1) // 2
+            if (first[1] or second[1]) and count > named[frozenset((first, second))]:
+                said = first[0] | second[0] or self.none
+                if len(said) > 1:
+                    pairs = product(members[first], members[second])
+                    a, b = next((a, b) for a, b in pairs if a != b and frozenset((a, b)) not in self.both)
+                    _single(a, b, said)
+                found.add(next(iter(said), (0.0, 0.0)))
+        return found
+
+
+def _single(a: str, b: str, said: _Said) -> tuple[float, float]:
+    """The one value that entries say for a pair; smooth and plastic if none says anything."""
+    if len(said) > 1:
+        raise SceneError(f"pair {a}-{b}: {len(said)} entries say different things; name both bodies in one")
+    return next(iter(said), (0.0, 0.0))
+
+
 @dataclass(frozen=True)
 class Scene:
     """A frozen, validated scene; see the module's docstring for conventions.
@@ -222,18 +288,21 @@ class Scene:
         SceneError
             If two entries are equally specific and say different things.
         """
-        found: dict[int, set[tuple[float, float]]] = {}
-        for pair in self.pairs:
-            for first, second in ((pair.a, pair.b), (pair.b, pair.a)):
-                if first in (a, "*") and second in (b, "*"):
-                    rank = (first != "*") + (second != "*")
-                    found.setdefault(rank, set()).add((pair.restitution, pair.friction))
-        if not found:
-            return Pair(a, b)
-        said = found[max(found)]
-        if len(said) > 1:
-            raise SceneError(f"pair {a}-{b}: {len(said)} entries say different things; name both bodies in one")
-        return Pair(a, b, *said.pop())
+        return Pair(a, b, *_single(a, b, self._table.said(a, b)))
+
+    def materials(self) -> set[tuple[float, float]]:
+        """Restitution and friction of all pairs that can meet, without looking at every pair.
+
+        Raises
+        ------
+        SceneError
+            As `material`, for the first pair of which two entries say different things.
+        """
+        return self._table.materials(self.bodies)
+
+    @cached_property
+    def _table(self) -> _Materials:
+        return _Materials(self.pairs)
 
     def contact_pairs(self) -> Iterator[tuple[int, int, Pair]]:
         """Yield ``(i, j, material)`` for every pair of bodies of which at least one is free."""
@@ -307,18 +376,17 @@ def _validate_scene(scene: Scene) -> None:
     _length("gravity", scene.gravity, scene.dimension)
     if not scene.bodies:
         raise SceneError("bodies: a scene needs at least one body")
-    names = [body.name for body in scene.bodies]
-    for name in names:
-        if not name or name == "*":
-            raise SceneError(f"bodies: {name!r} cannot be the name of a body")
-        if names.count(name) > 1:
-            raise SceneError(f"bodies: the name {name!r} is used {names.count(name)} times")
+    names = Counter(body.name for body in scene.bodies)
+    for name, count in names.items():
+        if not isinstance(name, str) or not 0 < len(name) <= NAME or name == "*" or not is_visible(name):
+            raise SceneError(f"bodies: {one_line(name, NAME)!r} cannot be the name of a body")
+        if count > 1:
+            raise SceneError(f"bodies: the name {name!r} is used {count} times")
     for body in scene.bodies:
         _validate_body(body, scene.dimension)
     for pair in scene.pairs:
         _validate_pair(pair, names)
-    for _ in scene.contact_pairs():
-        pass  # an ambiguous material raises
+    scene.materials()  # an ambiguous one raises
 
 
 def _validate_body(body: Body, dimension: int) -> None:
@@ -358,7 +426,7 @@ def _validate_body(body: Body, dimension: int) -> None:
         raise SceneError(f"{body.name}.twist: a fixed body cannot move")
 
 
-def _validate_pair(pair: Pair, names: list[str]) -> None:
+def _validate_pair(pair: Pair, names: Mapping[str, int]) -> None:
     label = f"pair {pair.a}-{pair.b}"
     for side in (pair.a, pair.b):
         if side != "*" and side not in names:

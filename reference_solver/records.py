@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.model import Array
-
-Indices = NDArray[np.int64]
+from reference_solver.pieces import Indices, Pieces
 
 
 @dataclass(frozen=True)
@@ -92,6 +91,7 @@ class Record:
 
     The start state carries no contacts (``offset[1] == 0``). ``certificates``, where asked for, holds for each name of
     ``Simulation.certificate`` the values (s,) of the steps since the sample before; zeros, and True, at the start.
+    ``pieces``, where asked for, is what happened between the samples.
     """
 
     t: Array
@@ -100,3 +100,4 @@ class Record:
     offset: Indices
     contacts: Contacts
     certificates: dict[str, NDArray[Any]] = field(default_factory=dict)
+    pieces: Pieces | None = None

@@ -12,10 +12,12 @@ The two dimensions are two packages behind one interface, chosen from one table.
     world.contacts() -> Contacts     of the last step made
     world.step_problem() -> StepProblem     of the next step, which is not made
     world.tally                      float64 array over the whole run, indexed by the constants in tally.py
+    world.journal                    room for the pieces of the run (pieces.py), none unless they are recorded
 """
 
 from __future__ import annotations
 
+from copy import deepcopy
 from importlib import import_module
 from typing import Any, Protocol
 
@@ -24,6 +26,7 @@ import numpy as np
 from reference_solver.certificate import columns, summary
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
+from reference_solver.pieces import Journal, allocate_journal, is_full, pieces_of
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
@@ -36,6 +39,7 @@ class World(Protocol):
     pose: Array
     twist: Array
     tally: Array
+    journal: Journal
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Make ``steps`` steps."""
@@ -46,6 +50,9 @@ class World(Protocol):
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step."""
 
+
+#: Steps that share a journal: enough that compiled code is entered seldom, few enough that making them again is cheap.
+STEPS_PER_JOURNAL = 64
 
 #: Package of each dimension, imported when first used: loading kernels costs time.
 WORLDS = {2: "reference_solver.planar", 3: "reference_solver.spatial"}
@@ -82,11 +89,19 @@ class Simulation:
         self._world.run(steps, 0, False)
         self._steps += steps
 
-    def record(self, steps: int, stride: int = 1, contacts: bool = False, certificates: bool = False) -> Record:
+    def record(
+        self,
+        steps: int,
+        stride: int = 1,
+        contacts: bool = False,
+        certificates: bool = False,
+        pieces: bool = False,
+    ) -> Record:
         """Make ``steps`` steps and return the samples at the start and after every ``stride`` steps.
 
         With ``certificates`` every sample tells how good the steps since the one before were; compiled code is then
-        entered once a sample instead of once a run.
+        entered once a sample instead of once a run. With ``pieces`` every force phase and every impact is recorded as
+        well, for an audit; the answer has the same bits either way.
 
         Raises
         ------
@@ -97,8 +112,9 @@ class Simulation:
         _require_count("stride", stride, 1)
         first, start_pose, start_twist = self._steps, self.pose, self.twist
         tallies: list[Array] = []
-        if certificates:
-            frames, tallies = self._certified(steps, stride, contacts)
+        journals: list[Journal] = []
+        if certificates or pieces:
+            frames, tallies, journals = self._in_parts(steps, stride, contacts, certificates, pieces)
         else:
             frames = self._world.run(steps, stride, contacts)
         self._steps += steps
@@ -110,20 +126,44 @@ class Simulation:
             offset=np.concatenate([[0], frames.offset]),
             contacts=frames.contacts,
             certificates=columns([new_tally(), *tallies]) if certificates else {},
+            pieces=pieces_of(journals, self.model.dimension, self.settings.dt, first) if pieces else None,
         )
 
-    def _certified(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, list[Array]]:
-        """Run with a tally of its own for each sample; all of them are then entered in that of the run."""
-        whole, parts, tallies = self._world.tally.copy(), [], []
-        for chunk in [stride] * (steps // stride) + [steps % stride] * (steps % stride > 0):
+    def _in_parts(
+        self, steps: int, stride: int, contacts: bool, certificates: bool, pieces: bool
+    ) -> tuple[Frames, list[Array], list[Journal]]:
+        """Run part by part: each has a journal, and a tally that is then entered in that of the run."""
+        whole, parts, tallies, journals = self._world.tally.copy(), [], [], []
+        part = stride if certificates else stride * max(1, STEPS_PER_JOURNAL // stride)
+        for chunk in [part] * (steps // part) + [steps % part] * (steps % part > 0):
             self._world.tally[:] = 0.0
             self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
-            parts.append(self._world.run(chunk, stride, contacts))
+            if pieces:
+                frames, journal = self._journalled(chunk, stride, contacts)
+                journals.append(journal)
+            else:
+                frames = self._world.run(chunk, stride, contacts)
+            parts.append(frames)
             tallies.append(self._world.tally.copy())
             merge(whole, tallies[-1])
         self._world.tally[:] = whole
         parts = parts or [self._world.run(0, stride, contacts)]
-        return joined(parts), tallies[: steps // stride]
+        journals = journals or [allocate_journal(self.model.dimension, len(self.model.bodies), 0)]
+        return joined(parts), tallies[: steps // stride], journals
+
+    def _journalled(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, Journal]:
+        """Run once with pieces recorded; again from the start, with twice the room, while there was too little."""
+        n, room = len(self.model.bodies), 2 * steps + 16
+        while True:
+            trial = deepcopy(self._world)
+            trial.journal = allocate_journal(self.model.dimension, n, room)
+            frames = trial.run(steps, stride, contacts)
+            if not is_full(trial.journal):
+                break
+            room *= 2
+        self._world, journal = trial, trial.journal
+        trial.journal = allocate_journal(self.model.dimension, n, 0)
+        return frames, journal
 
     @property
     def pose(self) -> Array:

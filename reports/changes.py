@@ -12,17 +12,31 @@ from typing import Any
 from reports.wording import number, reproduce
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
-from validation.comparison import Change, Kind
+from validation.comparison import Change, Kind, families
 from validation.rows import rows_of
-from validation.store import Store, StoreError
+from validation.store import MissingError, Store
 
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a comparison: judged rows, and ratios of times where a bench run has them."""
+    """One side of a comparison: where it is from, judged rows, and ratios of times where a bench run has them."""
 
     rows: Sequence[Mapping[str, Any]]
     ratios: Sequence[Mapping[str, Any]]
+    run: str = ""
+    date: str = ""
+    commit: str = ""
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Engine -> version that ran."""
+        return {row["engine"]: row["engine_version"] for row in self.rows if row["engine_version"]}
+
+    @property
+    def text(self) -> str:
+        """``20261121-101500 (commit 1a2b3c4, 7300 rows)``."""
+        commit = f"commit {self.commit[:12]}, " if self.commit else ""
+        return f"{self.run or 'rows'} ({commit}{len(self.rows)} rows)"
 
 
 def load_side(argument: str, out: Path) -> Side:
@@ -30,7 +44,7 @@ def load_side(argument: str, out: Path) -> Side:
 
     Raises
     ------
-    StoreError
+    MissingError
         If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
     """
     path = Path(argument)
@@ -52,7 +66,8 @@ def _load_run(folder: Path, run_id: str) -> Side:
         source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
         tables = [ratios(store, bench) for bench in source]
         table = [{str(k): v for k, v in row.items()} for t in tables for row in t.to_dict("records")]
-        return Side([row.as_dict() for row in rows_of(run.id, store.observations(run))], table)
+        rows = [row.as_dict() for row in rows_of(run.id, store.observations(run))]
+        return Side(rows, table, run.id, run.date, run.commit)
     finally:
         store.close()
 
@@ -61,19 +76,39 @@ def _load_lines(path: Path) -> Side:
     try:
         lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise StoreError(f"run: cannot read {path}: {error}") from None
+        raise MissingError(f"run: cannot read {path}: {error}") from None
     rows = [line for line in lines if isinstance(line, dict) and {"slot", "metric", "value"} <= set(line)]
     times = [line for line in lines if isinstance(line, dict) and {"slot", "purpose", "ratio"} <= set(line)]
     if len(rows) + len(times) != len(lines):
-        raise StoreError(f"run: {path} does not hold rows of this project")
-    return Side(rows, times)
+        raise MissingError(f"run: {path} does not hold rows of this project")
+    return Side(rows, times, ", ".join(dict.fromkeys(str(row["run"]) for row in rows if row.get("run"))) or path.name)
+
+
+def header(a: Side, b: Side) -> list[str]:
+    """Runs, commits, and the versions of engines that are not the same."""
+    lines = [f"A: {a.text}", f"B: {b.text}"]
+    names = list(dict.fromkeys([*a.versions, *b.versions]))
+    same = [f"{name} {a.versions[name]}" for name in names if a.versions.get(name) == b.versions.get(name)]
+    moved = [
+        f"{name} {a.versions.get(name, 'not run')} -> {b.versions.get(name, 'not run')}"
+        for name in names if a.versions.get(name) != b.versions.get(name)
+    ]  # fmt: skip
+    if moved:
+        lines.append(f"versions that differ: {', '.join(moved)}")
+    if same:
+        lines.append(f"same versions: {', '.join(same)}")
+    return lines
 
 
 def headline(changes: Sequence[Change]) -> str:
-    """``2 verdicts flipped (1 regressed), 3 values changed``; or that nothing changed."""
+    """``2 verdict flipped (1 regressed), 3 value changed``; or that nothing changed."""
     counts = Counter(change.kind for change in changes)
     worse = Counter(change.kind for change in changes if change.regressed)
-    parts = [f"{counts[kind]} {kind.value} ({worse[kind]} regressed)" for kind in Kind if counts[kind]]
+    parts = []
+    for kind in Kind:
+        if counts[kind]:
+            judged = "" if kind in (Kind.ADDED, Kind.REMOVED) else f" ({worse[kind]} regressed)"
+            parts.append(f"{counts[kind]} {kind.value}{judged}")
     return "; ".join(parts) or "nothing changed"
 
 
@@ -87,28 +122,38 @@ def _size(change: Change) -> str:
     return f"{'+' if change.size > 0 else ''}{number(change.size, 3)} tol" if change.size else ""
 
 
-def as_text(changes: Sequence[Change]) -> str:
-    """One line per change, and the headline."""
-    lines = [headline(changes)]
-    for change in changes:
+def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
+    """Who is compared, the headline, and one line per family of changes: its largest."""
+    lines = [*header(a, b), headline(changes)]
+    for family in families(changes):
+        change, more = family.first, len(family.changes) - 1
+        if change.kind in (Kind.ADDED, Kind.REMOVED):
+            who = f"{change.engine}/{change.profile} {change.scene}"
+            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {more + 1} rows")
+            continue
         trend = "regressed" if change.regressed else "improved or neutral"
+        rest = f" and {more} more like it" if more else ""
         lines.append(
             f"{change.kind.value} ({trend}): {_where(change)} {change.metric}: {change.before} -> {change.after} "
-            f"{_size(change)} [{change.note}] | {reproduce(change.slot)}"
+            f"{_size(change)} [{change.note}]{rest} | {reproduce(change.slot)}"
         )
     return "\n".join(lines) + "\n"
 
 
-def as_markdown(changes: Sequence[Change], most: int = 50) -> str:
-    """Headline and a table of at most ``most`` changes."""
-    out = [f"**contact-crosscheck compare**: {headline(changes)}", ""]
-    if changes:
-        out += ["| change | | where | metric | before | after | size |", "|---|---|---|---|---|---|---|"]
-    for change in changes[:most]:
+def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> str:
+    """Who is compared, the headline, and a table of at most ``most`` families of changes."""
+    out = ["**contact-crosscheck compare**: " + headline(changes), ""]
+    out += [f"* {line}" for line in header(a, b)]
+    found = families(changes)
+    if found:
+        out += ["", "| change | | rows | where | metric | before | after | size |", "|---|---|---|---|---|---|---|---|"]
+    for family in found[:most]:
+        change = family.first
         mark = "worse" if change.regressed else ""
         cells = [
             change.kind.value,
             mark,
+            str(len(family.changes)),
             _where(change),
             f"`{change.metric}`",
             change.before,
@@ -116,11 +161,15 @@ def as_markdown(changes: Sequence[Change], most: int = 50) -> str:
             _size(change),
         ]
         out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    if len(changes) > most:
-        out.append(f"\n... and {len(changes) - most} more; `crosscheck compare --json` lists all")
+    if len(found) > most:
+        out.append(f"\n... and {len(found) - most} more families; `crosscheck compare --json` lists every change")
     return "\n".join(out) + "\n"
 
 
-def as_json(changes: Sequence[Change]) -> str:
-    """All changes."""
-    return json.dumps({"headline": headline(changes), "changes": [c.as_dict() for c in changes]}, indent=1)
+def as_json(changes: Sequence[Change], a: Side, b: Side) -> str:
+    """Both sides and all changes."""
+    sides = {
+        name: {"run": s.run, "date": s.date, "commit": s.commit, "rows": len(s.rows), "versions": s.versions}
+        for name, s in (("a", a), ("b", b))
+    }
+    return json.dumps({**sides, "headline": headline(changes), "changes": [c.as_dict() for c in changes]}, indent=1)

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from reports.findings import finding_line, grouped
+from reports.findings import ALARMING, finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
 from reports.wording import LABELS, mark_of
 from validation.rows import Row, frame, rows_of
@@ -82,7 +82,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
     out += ["", legend().replace("|", "\\|"), ""]
     for mark, group in grouped(rows):
         out.append(f"**{LABELS[mark]}**: {len(group)} rows")
-        if mark in ("crashed", "timed_out", "invalid", "new", "drifted"):
+        if mark in ALARMING:
             out += [f"* {finding_line(row)}" for row in group]
     return "\n".join(out) + "\n"
 
@@ -112,7 +112,7 @@ def _mark_case(case: TestCase, row: Plain) -> None:
         failed = Error(finding_line(row))
         failed.text = row["log"]
         case.result = [failed]
-    elif mark in ("invalid", "new", "drifted"):
+    elif mark in ALARMING:
         case.result = [Failure(finding_line(row))]
     elif mark in ("unsupported", "not_installed", "none"):
         case.result = [Skipped(row["reason"])]

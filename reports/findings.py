@@ -1,40 +1,49 @@
-"""Findings: rows that do not pass, one line each: measured, truth, tolerance and why, and how to reproduce it."""
+"""Findings: rows that do not pass, by family or one line each, with the command that reproduces them.
+
+A starved stack fails twenty interfaces at once. A family is therefore one engine, profile, scene and kind of metric
+with one standing; it is shown by its worst row.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from reports.wording import LABELS, mark_of, number, params_text, reproduce
+from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from validation.posed import is_file
 
+Plain = Mapping[str, Any]
 #: Marks that make the command exit with 1.
-ALARMING = ("crashed", "timed_out", "invalid", "new", "drifted")
-#: Marks in the order in which findings are printed.
-ORDER = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained")
+ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
+#: Marks in the order in which findings are shown.
+ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
 
-def finding_line(row: Mapping[str, Any]) -> str:
+def finding_line(row: Plain) -> str:
     """One line for one row."""
     label = LABELS[mark_of(row)]
     where = f"{row['engine']}/{row['profile']} {row['scene']} {row['dimension']}-D {params_text(row['slot']['params'])}"
     if row["iterations"] is not None:
         where = f"{where.strip()} at {row['iterations']} iterations"
-    if row["value"] is None:
-        what = row["reason"]
-    else:
-        what = (
-            f"{row['metric']} {number(row['value'], 6)} {row['unit']}, truth {number(row['truth'], 6)}, "
-            f"tolerance {number(row['tolerance'], 3)} ({row['because']})"
-        )
-        if row["reason"]:
-            what += f"; {row['reason']}"
+    what = said(row, 6)
+    if row["value"] is not None:
+        what += f" ({row['because']})" + (f"; {row['reason']}" if row["reason"] else "")
     return f"{label}: {where.strip()}: {what} | {reproduce(row['slot'])}"
 
 
-def grouped(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Mapping[str, Any]]]]:
+def said(row: Plain, digits: int = 4) -> str:
+    """What was measured, the truth and the tolerance; or why there is no value."""
+    if row["value"] is None:
+        return str(row["reason"])
+    truth, tolerance = quantity(row["truth"], row["unit"], digits), number(row["tolerance"], 3)
+    return f"{row['metric']} {measured(row, digits)}, truth {truth}, tolerance {tolerance}"
+
+
+def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
     """Rows that do not pass, by mark, most serious first."""
-    groups: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    groups: dict[str, list[Plain]] = defaultdict(list)
     for row in rows:
         groups[mark_of(row)].append(row)
     for mark in ORDER:
@@ -42,25 +51,71 @@ def grouped(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Mappi
             yield mark, groups[mark]
 
 
-def lines(rows: Sequence[Mapping[str, Any]], most: int | None) -> Iterator[str]:
-    """Lines of all findings; at most ``most`` per family, the worst first, with a count of the rest.
+@dataclass(frozen=True)
+class Family:
+    """Rows of one engine, profile, scene, kind of metric and standing, the worst first."""
 
-    A starved stack fails twenty interfaces at once: a family is one engine, profile, scene and kind of metric; of
-    what makes the command fail, also one cell.
-    """
+    mark: str
+    engine: str
+    profile: str
+    scene: str
+    metric: str
+    rows: tuple[Plain, ...]
+
+    @property
+    def worst(self) -> Plain:
+        """The row farthest outside its tolerance."""
+        return self.rows[0]
+
+    @property
+    def where(self) -> str:
+        """Where its worst row stands: ``3-D n=20 at 4 iterations``."""
+        row = self.worst
+        count = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
+        return " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), count) if text)
+
+    @property
+    def line(self) -> str:
+        """One line: standing, who, what and how wrong its worst row is."""
+        more = f", the worst of {len(self.rows)} rows" if len(self.rows) > 1 else ""
+        return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {said(self.worst)}{more}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready): the family, its worst row, and the ids of all its rows."""
+        names = ("mark", "engine", "profile", "scene", "metric")
+        head = {name: getattr(self, name) for name in names}
+        ids = [row_id(row) for row in self.rows]
+        return {**head, "count": len(self.rows), "worst": dict(self.worst), "reason": self.worst["reason"], "rows": ids}
+
+
+def families(rows: Iterable[Plain]) -> list[Family]:
+    """All findings by family: most serious standing first, then in the order of the rows."""
+    found: list[Family] = []
     for mark, group in grouped(rows):
-        families: dict[tuple[Any, ...], list[Mapping[str, Any]]] = defaultdict(list)
+        members: dict[tuple[str, str, str, str], list[Plain]] = defaultdict(list)
         for row in group:
-            cell = repr(row["slot"]) if mark in ALARMING else ""
-            families[row["engine"], row["profile"], row["scene"], row["metric"].partition("[")[0], cell].append(row)
-        for family in families.values():
-            worst = sorted(family, key=_severity, reverse=True)
-            for row in worst[:most]:
-                rest = 0 if most is None else len(family) - most
-                yield finding_line(row) + (f" (and {rest} more like it)" if rest > 0 else "")
+            members[row["engine"], row["profile"], row["scene"], row["metric"].partition("[")[0]].append(row)
+        for key, own in members.items():
+            found.append(Family(mark, *key, tuple(sorted(own, key=severity, reverse=True))))
+    return found
 
 
-def _severity(row: Mapping[str, Any]) -> float:
+def refusals(rows: Iterable[Plain]) -> Iterator[str]:
+    """One line per engine and scene file that it cannot run, with its reason: no fault of either."""
+    found: dict[tuple[Any, ...], None] = {}
+    for row in rows:
+        if row["outcome"] == "unsupported" and is_file(row["scene"]):
+            found[row["engine"], row["scene"], row["reason"]] = None
+    return (f"UNSUPPORTED: {engine} {scene}: {reason}" for engine, scene, reason in found)
+
+
+def severity(row: Plain) -> float:
+    """|error| in units of the tolerance; 0 where there is no error or no tolerance to compare with."""
     if row["error"] is None or not row["tolerance"]:
         return 0.0
-    return abs(row["error"]) / row["tolerance"]
+    return float(abs(row["error"]) / row["tolerance"])
+
+
+def alarms(rows: Sequence[Plain]) -> list[Family]:
+    """Families of what makes the command exit with 1."""
+    return [family for family in families(rows) if family.mark in ALARMING]

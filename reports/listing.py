@@ -80,6 +80,7 @@ def _describe_scene(name: str) -> dict[str, Any]:
         "title": canonical.title,
         "figure": canonical.figure,
         "law": canonical.law,
+        "notes": list(canonical.notes),
         "dimensions": list(canonical.dimensions),
         "parameters": [asdict(parameter) for parameter in canonical.parameters],
         "needs": asdict(needs(scene)),

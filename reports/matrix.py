@@ -1,20 +1,30 @@
-"""The verdict matrix: scenes x engines x profiles, one mark and a count per field."""
+"""The verdict matrix: scenes x engines x profiles, one mark and a count per field.
+
+Rows at the profile's own iteration count are what a profile is judged by; a sweep over other counts shows what more
+or fewer would do and is counted apart from them.
+"""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from reports.wording import LABELS, MARKS, mark_of
+from reports.findings import ALARMING
+from reports.wording import LABELS, MARKS, SHORT, mark_of
 
 #: Colours support the words, they never replace them.
 STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
 ALARM = "bold white on red"
+#: From this width on a field says FAIL in full [columns].
+ROOMY = 100
+#: Marks of rows that have no verdict.
+UNJUDGED = ("unsupported", "none", "not_installed")
 
 
 @dataclass(frozen=True)
@@ -29,69 +39,186 @@ class Field:
         return next((mark for mark in MARKS if self.marks[mark]), next(iter(self.marks), "none"))
 
     @property
-    def text(self) -> str:
-        """``pass 24`` or ``FAIL known 3/24`` (rows with that mark or a worse one, of the judged)."""
-        judged = sum(n for mark, n in self.marks.items() if mark not in ("unsupported", "none"))
+    def judged(self) -> int:
+        """How many rows there is a verdict on."""
+        return sum(n for mark, n in self.marks.items() if mark not in UNJUDGED)
+
+    @property
+    def missed(self) -> int:
+        """How many of them do not pass."""
+        return self.judged - self.marks["pass"]
+
+    def said(self, words: Mapping[str, str]) -> str:
+        """``FAIL known 3/24``: the worst mark in ``words``, rows that do not pass, rows judged."""
         if self.mark not in MARKS:
-            return LABELS[self.mark]
-        if self.mark == "pass":
-            return f"pass {self.marks['pass']}"
-        return f"{LABELS[self.mark]} {judged - self.marks['pass']}/{judged}"
+            return words[self.mark]
+        return f"{words[self.mark]} {f'{self.missed}/{self.judged}' if self.missed else self.judged}"
+
+    @property
+    def text(self) -> str:
+        """In full, for whoever has the room."""
+        return self.said(LABELS)
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """Fields by (scene, dimension) and (engine, profile), both in the order of the rows."""
+    """Fields by (scene, dimension) and (engine, profile), both in the order of the rows.
+
+    Parameters
+    ----------
+    fields
+        Rows at the profile's own iteration count.
+    swept
+        Rows at iteration counts that were asked for.
+    counts
+        Those iteration counts by scene.
+    """
 
     lines: tuple[tuple[str, int], ...]
     columns: tuple[tuple[str, str], ...]
     fields: Mapping[tuple[tuple[str, int], tuple[str, str]], Field]
+    swept: Mapping[tuple[tuple[str, int], tuple[str, str]], Field] = field(default_factory=dict)
+    counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 def matrix_of(rows: Iterable[Mapping[str, Any]]) -> Matrix:
     """Count marks per field."""
-    marks: dict[Any, Counter[str]] = defaultdict(Counter)
+    own: dict[Any, Counter[str]] = defaultdict(Counter)
+    swept: dict[Any, Counter[str]] = defaultdict(Counter)
+    counts: dict[str, set[int]] = defaultdict(set)
     lines: dict[tuple[str, int], None] = {}
     columns: dict[tuple[str, str], None] = {}
     for row in rows:
         line, column = (row["scene"], row["dimension"]), (row["engine"], row["profile"])
         lines[line] = columns[column] = None
-        marks[line, column][mark_of(row)] += 1
-    fields = {key: Field(counter) for key, counter in marks.items()}
-    return Matrix(tuple(lines), tuple(columns), fields)
+        if row["iterations"] is None:
+            own[line, column][mark_of(row)] += 1
+        else:
+            swept[line, column][mark_of(row)] += 1
+            counts[row["scene"]].add(row["iterations"])
+    fields, sweeps = ({key: Field(counter) for key, counter in marks.items()} for marks in (own, swept))
+    return Matrix(tuple(lines), tuple(columns), fields, sweeps, {k: tuple(sorted(v)) for k, v in counts.items()})
 
 
-def table_of(matrix: Matrix, versions: Mapping[str, str]) -> Table:
-    """Terminal table of a matrix: a line per engine, profile and dimension, a column per scene (fits 80 columns)."""
+def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:
+    """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
+
+    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table.
+    """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
-    dimensions = sorted({dimension for _, dimension in matrix.lines})
-    table = Table(title="Verdicts: worst mark, rows that do not pass / rows judged", title_justify="left")
-    table.add_column("engine, profile", no_wrap=True)
-    for scene in scenes:
-        table.add_column(scene)
-    last = ""
-    for engine, profile in matrix.columns:
-        if last not in ("", engine):
-            table.add_section()
-        if engine != last:
-            table.add_row(Text(f"{engine} {versions.get(engine, '')}", style="bold"))
-        last = engine
-        for dimension in dimensions:
-            fields = [matrix.fields.get(((scene, dimension), (engine, profile))) for scene in scenes]
-            if any(fields):
-                table.add_row(f"  {profile} {dimension}-D", *(_styled(field) for field in fields))
+    body = list(_body(matrix, scenes, versions))
+    words = LABELS if width >= ROOMY else SHORT
+    texts = [[_styled(field, words) for field in fields] for _, fields in body]
+    first = max((len(label) for label, _ in body), default=0)
+    wide = [max(len(scene), *(len(row[k]) for row in texts if row)) for k, scene in enumerate(scenes)]
+    return [_table(scenes, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
+
+
+def _chunks(widths: Sequence[int], room: int) -> Iterator[list[int]]:
+    """Indices of scenes that fit beside each other; two columns of space before each."""
+    chosen: list[int] = []
+    for k, wide in enumerate(widths):
+        if chosen and sum(widths[j] + 2 for j in chosen) + wide + 2 > room:
+            yield chosen
+            chosen = []
+        chosen.append(k)
+    if chosen:
+        yield chosen
+
+
+def _table(
+    scenes: Sequence[str], chosen: Sequence[int], body: Sequence[tuple[str, Any]], texts: Sequence[Any], first: int
+) -> Table:
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("engine, profile", no_wrap=True, min_width=first)
+    for k in chosen:
+        table.add_column(scenes[k], no_wrap=True)
+    for (label, fields), row in zip(body, texts, strict=True):
+        head = Text(label, style="" if label.startswith(" ") else "bold")
+        table.add_row(head, *(row[k] for k in chosen if fields))
     return table
 
 
-def _styled(field: Field | None) -> Text:
+#: Label of a line and its fields, one per scene; none for the line that names an engine.
+Line = tuple[str, tuple[Field | None, ...]]
+
+
+def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) -> Iterator[Line]:
+    for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
+        yield f"{engine} {_version(versions.get(engine, ''))}".strip(), ()
+        profiles = [profile for name, profile in matrix.columns if name == engine]
+        refused = _never_asked(matrix, engine, profiles)
+        for profile in profiles:
+            dimensions = [d for d in sorted({d for _, d in matrix.lines}) if d not in refused]
+            yield from _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}")
+        for dimension in refused:
+            yield from _lines(matrix.fields, scenes, (engine, profiles[0]), [dimension], "  every profile")
+
+
+def _never_asked(matrix: Matrix, engine: str, profiles: Sequence[str]) -> list[int]:
+    """Dimensions in which an engine cannot be asked for anything."""
+    found = []
+    for dimension in sorted({d for _, d in matrix.lines}):
+        own = [f for (line, column), f in matrix.fields.items() if line[1] == dimension and column[0] == engine]
+        if own and all(set(field.marks) == {"unsupported"} for field in own):
+            found.append(dimension)
+    return found
+
+
+def _lines(
+    fields: Mapping[Any, Field], scenes: Sequence[str], column: tuple[str, str], dimensions: Sequence[int], label: str
+) -> Iterator[Line]:
+    """One line per group of dimensions that say the same."""
+    groups: dict[tuple[Any, ...], list[int]] = defaultdict(list)
+    found: dict[tuple[Any, ...], tuple[Field | None, ...]] = {}
+    for dimension in dimensions:
+        row = tuple(fields.get(((scene, dimension), column)) for scene in scenes)
+        if any(row):
+            key = tuple(field and tuple(sorted(field.marks.items())) for field in row)
+            groups[key].append(dimension)
+            found[key] = row
+    for key, same in groups.items():
+        yield f"{label} {' '.join(f'{d}-D' for d in same)}", found[key]
+
+
+def _version(version: str) -> str:
+    """Without the digits of a local build, which say nothing to a reader."""
+    return version.partition("+")[0]
+
+
+def _styled(field: Field | None, words: Mapping[str, str]) -> Text:
     if field is None:
         return Text("")
-    alarming = field.mark in ("crashed", "timed_out", "invalid", "new", "drifted")
-    return Text(field.text, style=ALARM if alarming else STYLES.get(field.mark, ""))
+    alarming = field.mark in ALARMING
+    return Text(field.said(words), style=ALARM if alarming else STYLES.get(field.mark, ""))
 
 
-def legend() -> str:
-    """What the marks mean, in one line each."""
+def sweeps_of(matrix: Matrix) -> list[str]:
+    """One line per scene whose iterations were swept: rows that do not pass, of those judged, by profile."""
+    found = []
+    for scene, counts in matrix.counts.items():
+        said = []
+        for engine, profile in matrix.columns:
+            shares: dict[str, list[int]] = defaultdict(list)
+            for (line, column), own in matrix.swept.items():
+                if line[0] == scene and column == (engine, profile) and own.judged:
+                    shares[f"{own.missed}/{own.judged}"].append(line[1])
+            alone = len(shares) == 1
+            parts = [share if alone else f"{share} {' '.join(f'{d}-D' for d in ds)}" for share, ds in shares.items()]
+            if parts:
+                said.append(f"{engine}/{profile} {' and '.join(parts)}")
+        asked = ", ".join(map(str, counts))
+        found.append(f"{scene} at {asked} iterations instead of the profile's own, FAIL: {'; '.join(said)}.")
+    return found
+
+
+def legend(short: bool = False) -> str:
+    """What the marks mean: in one line, or as short as a terminal of 80 columns wants it."""
+    if short:
+        return (
+            "pass 9: all 9 rows within tolerance. 3/9: 3 of 9 rows FAIL; expl.: as a law of\n"
+            "the engine predicts; known: listed with a reason; NEW, drifted: neither."
+        )
     return (
         "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
         "FAIL known: listed with a reason | FAIL new, drifted: not listed so | -: cannot be asked of this engine"

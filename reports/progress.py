@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from adapters.trajectory import load_trajectory
-from validation.cells import Slot, prepare
+from reports.stages import stage, warm_up
+from validation.cells import Slot
 from validation.store import Run, Store
-from validation.tracks import record, representatives
+from validation.tracks import representatives
 from validation.workers import TIMEOUT, run_cells
 
 
@@ -30,47 +30,49 @@ def run_plan(
 ) -> Run:
     """Run what the store does not have yet of this plan; the observations are in the store afterwards.
 
-    ``finish`` marks the run as complete; a bench does so itself, after its timings.
+    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run of which cells were left
+    after time-outs is not complete: it says so, and the same command resumes it.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
         console.print(f"resuming run {run.id}: {len(done)} of {len(slots)} cells are done")
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    jobs = jobs or min(len(todo) or 1, os.cpu_count() or 1)
+    left: dict[str, int] = {}
+
+    def leave(slot: Slot, reason: str) -> None:
+        left[reason] = left.get(reason, 0) + 1
+
+    warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
+    paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
-        TemporaryDirectory(prefix="crosscheck-") as scratch,
+        stage(console, f"{len(todo)} cells"),
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):
         task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
         try:
-            folder = Path(scratch)
-            paths = {slot: (keep or folder) / f"{slot.key()}.npz" for slot in todo if keep or slot in shown}
-            for observation in run_cells(todo, jobs, timeout, keep=paths.get):
-                if observation.slot in shown:
-                    _keep_recording(store, run, observation.slot, paths[observation.slot])
+            record = partial(store.add_recording, run)
+            cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave)
+            for observation in cells:
                 store.add(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
         except KeyboardInterrupt:
             console.print("interrupted: what finished is kept, the same command resumes")
             raise
-    if finish:
+    for reason, count in left.items():
+        console.print(f"left: {count} cells, {reason}", markup=False, highlight=False, soft_wrap=True)
+    if left:
+        console.print("this run is not complete; the same command resumes it", markup=False)
+    elif finish:
         store.finish(run)
-    return run
-
-
-def _keep_recording(store: Store, run: Run, slot: Slot, path: Path) -> None:
-    """Keep what a replay shows; a cell that was refused or crashed left no trajectory."""
-    if path.exists():
-        prepared = prepare(slot)
-        store.add_recording(run, slot, record(prepared.canonical, prepared.scene, load_trajectory(path)))
+    return store.run(run.id)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
@@ -16,8 +18,10 @@ from adapters import registry
 from reports.wording import number
 from validation.bench import agreement, reading, work
 from validation.bench.primary import PRIMARY
-from validation.cells import format_dt
+from validation.cells import Observation, Outcome, format_dt
+from validation.posed import resolve
 from validation.store import Run, Store
+from validation.verdicts import judge_physics
 
 Tables = dict[str, pd.DataFrame]
 #: Levels that fit a terminal.
@@ -72,15 +76,61 @@ def raw_of(store: Store, run: Run) -> pd.DataFrame:
     return pd.json_normalize([timing.as_dict() for timing in store.timings(run)])
 
 
-def level_tables(points: pd.DataFrame) -> list[Table]:
-    """One table per scene and dimension: cost at equal error, the cheapest of each level marked."""
+def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], float]:
+    """Cost [s/s] of the largest step from which on a profile passes every check of its bench cells.
+
+    Keys are (scene, dimension, engine, profile). A step counts only if every smaller one passes as well: what passes
+    once by luck is no recommendation.
+    """
+    passes: dict[tuple[Any, ...], dict[float, bool]] = defaultdict(lambda: defaultdict(lambda: True))
+    for observation in store.observations(run):
+        slot = observation.slot
+        if slot.iterations is None:
+            good = all(row["physics"] == "pass" or row["value"] is None for row in physics(observation))
+            passes[slot.scene, slot.dimension, slot.engine, slot.profile][slot.dt] &= (
+                good and observation.outcome is Outcome.OK
+            )
+    points = work.work_points(store, run)
+    own = points[points["iterations"].isna()].to_dict("records") if len(points) else []
+    cost = {(p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): p["cost"] for p in own}
+    found = {}
+    for key, steps in passes.items():
+        order = sorted(steps, reverse=True)
+        safe = [dt for k, dt in enumerate(order) if all(steps[finer] for finer in order[k:])]
+        if safe and math.isfinite(cost.get((*key, safe[0]), math.nan)):
+            found[key] = cost[*key, safe[0]]
+    return found
+
+
+def physics(observation: Observation) -> list[dict[str, Any]]:
+    """Rows of a bench's cell that say PASS or FAIL and nothing else: standings belong to the run, and cost time."""
+    slot = observation.slot
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
+    rows: list[dict[str, Any]] = []
+    for check in canonical.checks(scene, slot.dt):
+        value = observation.metrics.get(check.metric, (None, ""))[0]
+        said = judge_physics(value, check) if observation.outcome is Outcome.OK else None
+        error = None if value is None or check.truth is None else value - check.truth
+        row = {"metric": check.metric, "value": value, "error": error, "tolerance": check.bound, "standing": None}
+        rows.append({**same, **row, "physics": said and said.value, "outcome": observation.outcome.value})
+    return rows
+
+
+#: What the marks in a table of costs mean.
+KEY = "*: cheapest; =: a tie, its interval overlaps the cheapest; -: not reached; 1/240 x30: step, iterations"
+
+
+def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
+    """One table per scene and dimension: cost at equal error; of each level the cheapest and its ties are marked."""
     levels = work.time_at_equal_error(points, SHOWN_LEVELS)
     out = []
     for (scene, dimension), group in reading.grouped(levels, ["scene", "dimension"]):
         primary = PRIMARY[scene]
         unit = "" if primary.unit == "1" else f" / {primary.unit}"
         title = f"{scene} {dimension}-D: CPU time per simulated second at {primary.name}{unit} of at most"
-        table = Table(title=title, title_justify="left")
+        table = _table(title)
         table.add_column("engine", no_wrap=True)
         for level in SHOWN_LEVELS:
             table.add_column(f"{level:.0e}".replace("e-0", "e-"), justify="right")
@@ -88,18 +138,24 @@ def level_tables(points: pd.DataFrame) -> list[Table]:
         for (engine, profile), rows in reading.grouped(group, ["engine", "profile"]):
             own = points[(points["scene"] == scene) & (points["dimension"] == dimension)]
             own = own[(own["engine"] == engine) & (own["profile"] == profile)]
-            cells = [_level_cell(row) for row in rows.to_dict("records")]
+            cells = [_level_cell(row, ranked) for row in rows.to_dict("records")]
             table.add_row(f"{engine}/{profile}", *cells, _smallest(own))
         out.append(table)
     return out
 
 
-def _level_cell(row: Mapping[Any, Any]) -> Text:
+def _table(title: str) -> Table:
+    return Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+
+
+def _level_cell(row: Mapping[Any, Any], ranked: bool) -> Text:
     if not math.isfinite(row["cost"]):
         return Text("-")
     iterations = "" if row["iterations"] is None or pd.isna(row["iterations"]) else f" x{row['iterations']:.0f}"
     text = f"{duration(row['cost'])} {format_dt(row['dt'])}{iterations}"
-    return Text(f"* {text}", style="bold") if row["rank"] == 1 else Text(text)
+    if not (ranked and row["tied"]):
+        return Text(text)
+    return Text(f"{'*' if row['rank'] == 1 else '='} {text}", style="bold")
 
 
 def _smallest(points: pd.DataFrame) -> str:
@@ -119,7 +175,13 @@ def duration(seconds: float) -> str:
 
 def overhead_table(overhead: pd.DataFrame) -> Table:
     """Cost of a step of an empty scene and of one free body, plain and with the state read after each step."""
-    table = Table(title="Binding: cost per step before there is any contact", title_justify="left")
+    table = Table(
+        title="Binding: cost per step before there is any contact",
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
     columns = [("empty", False), ("empty", True), ("flight", False), ("flight", True)]
     table.add_column("engine", no_wrap=True)
     for scene, sampled in columns:
@@ -143,7 +205,13 @@ def in_order(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
 
 def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
     """Cost per step at the largest size that ran, and the fitted exponent."""
-    table = Table(title="Cost of a step ~ x^p (x: bodies, or iterations)", title_justify="left")
+    table = Table(
+        title="Cost of a step ~ x^p (x: bodies, or iterations)",
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
     for column in ("what", "engine", "x", "per step", "p"):
         table.add_column(column, no_wrap=True)
     lost_any = scaling["void"].ne("").any() if len(scaling) else False
@@ -163,6 +231,24 @@ def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
             *([f"x >= {lost['x'].iloc[0]:g}: {lost['void'].iloc[0]}" if len(lost) else ""] if lost_any else []),
         )
     return table
+
+
+#: Wall over CPU time of a unit above which something else had its core, and the share of such units that spoils ranks.
+TAKEN, SPOILT = 1.2, 0.1
+
+
+def busy(timings: pd.DataFrame) -> str:
+    """Warning if the machine was busy while it timed, else empty: a core of one's own has equal wall and CPU time."""
+    used = timings[timings["void"] == ""] if len(timings) else timings
+    if len(used) == 0:
+        return ""
+    taken = float((used["load"] > TAKEN).mean())
+    if taken <= SPOILT:
+        return ""
+    return (
+        f"This machine was busy: for {taken:.0%} of the units wall time is more than {TAKEN:g} times CPU time. Caches "
+        "and clocks were shared, so no engine is ranked; time again on an idle machine."
+    )
 
 
 def quality_line(timings: pd.DataFrame) -> str:

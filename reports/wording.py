@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shlex
 from collections.abc import Mapping
 from typing import Any
 
 from validation.cells import format_dt, parse_dt
+from validation.metrics import NEVER
 from validation.posed import resolve
 
 #: Order in which a group of rows is summed up: the first that occurs is its mark.
-MARKS = ("crashed", "timed_out", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
+MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
     "crashed": "CRASHED",
     "timed_out": "TIMED OUT",
+    "missing": "MISSING",
     "invalid": "INVALID",
     "diverged": "DIVERGED",
     "new": "FAIL new",
@@ -26,16 +30,18 @@ LABELS = {
     "not_installed": "NOT INSTALLED",
     "none": "no value",
 }
+#: The same for 80 columns, where a count of failing rows says FAIL.
+SHORT = LABELS | {"new": "NEW", "known": "known", "explained": "expl.", "not_installed": "not inst."}
 
 
 def mark_of(row: Mapping[str, Any]) -> str:
     """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
-    if row["outcome"] in ("crashed", "timed_out", "invalid", "not_installed"):
+    if row["outcome"] in ("crashed", "timed_out", "missing", "invalid", "not_installed"):
         return str(row["outcome"])
     if row["outcome"] == "unsupported":
         return "new" if row["standing"] == "new" else "unsupported"
-    if row["standing"] == "drifted":
-        return "drifted"
+    if row["standing"] in ("drifted", "new"):  # also where there is no value, or a PASS left its band
+        return str(row["standing"])
     if row["physics"] == "pass":
         return "pass"
     if row["physics"] == "fail":
@@ -55,6 +61,24 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     if slot["iterations"] is not None:
         words += ["--iterations", str(slot["iterations"])]
     return shlex.join(words)
+
+
+def row_id(row: Mapping[str, Any]) -> str:
+    """Eight hex digits by which ``crosscheck explain`` finds a row: the same in every run that asks the same."""
+    asked = json.dumps([row["slot"], row["metric"]], sort_keys=True)
+    return hashlib.sha256(asked.encode()).hexdigest()[:8]
+
+
+def quantity(value: float | None, unit: str, digits: int = 4) -> str:
+    """A number with its unit; a ratio has none."""
+    return number(value, digits) if unit == "1" or value is None else f"{number(value, digits)} {unit}"
+
+
+def measured(row: Mapping[str, Any], digits: int = 4) -> str:
+    """What was measured, with its unit; a time that the end of the run cut off is none."""
+    if row["reason"].startswith(NEVER):
+        return NEVER
+    return quantity(row["value"], row["unit"], digits)
 
 
 def number(value: float | None, digits: int = 4) -> str:

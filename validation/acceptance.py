@@ -1,65 +1,207 @@
-"""Turns the FAIL rows of a run into an engine's list of known findings; never without a written reason."""
+"""Lists rows that do not pass as findings: what may be listed, what never is, and how wide a finding's band is.
+
+    rows of a run  ->  propose  ->  families with what is new, drifted or gone, and refusals  ->  accepted
+
+A proposal changes nothing. A family is written only once somebody has said, or said again, why its rows are as they
+are; the entries of all others, and of every cell that did not run to its end, stay as they stand.
+"""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 
 from validation.canonical import Check
 from validation.cells import Slot, slot_from_dict
-from validation.findings import Key, listed, reason_for, row_key, write_list
+from validation.findings import NEVER_LISTED, Family, Finding, Findings, Key, row_key
 from validation.plan import in_quick_suite
-from validation.rows import Row
+from validation.rows import Row, predictions_of
+from validation.studies import STUDIES
 from validation.verdicts import is_marginal
 
+#: Starts moved by so many units in the last place show how far a value scatters.
+MOVES = (1, -1, 2, -2)
+#: The band of a scattering value, in units of the largest change that the four moves made: for a normal scatter that
+#: change is 1.7 standard deviations in the mean, so that a new value leaves the band once in a million times.
+SCATTER_FACTOR = 4.0
+#: Least band: a hundredth of the check's tolerance, below which nobody cares, and a millionth of the value, which is
+#: what a residual at which an iteration stops one sweep sooner or later on another machine makes of it.
+TOLERANCE_SHARE, VALUE_SHARE = 0.01, 1e-6
 
-def accept(rows: Iterable[Row], engines: Iterable[str], folder: Path | None = None) -> tuple[dict[str, int], list[Row]]:
-    """List what fails in ``rows`` of the quick suite, keeping listed rows of slots that did not run.
 
-    Returns
-    -------
-    Number of listed rows per engine, and the rows for which no reason is written (they stay *new*).
+@dataclass
+class Change:
+    """One family of a proposal.
+
+    Parameters
+    ----------
+    family
+        As it stands; for rows that no family covers yet a draft without reason and source.
+    same, new
+        Members as listed, and those that are not listed yet.
+    drifted
+        Members that left their band: what is listed, and what is found now.
+    gone
+        Listed rows that pass now, or whose check is no longer stated.
     """
-    chosen = set(engines)
-    entries: dict[str, dict[Key, tuple[str, str]]] = {name: {} for name in chosen}
-    seen: dict[str, set[Key]] = defaultdict(set)
-    unexplained = []
+
+    family: Family
+    same: dict[Key, Finding] = field(default_factory=dict)
+    new: dict[Key, Finding] = field(default_factory=dict)
+    drifted: dict[Key, tuple[Finding, Finding]] = field(default_factory=dict)
+    gone: dict[Key, Finding] = field(default_factory=dict)
+
+    @property
+    def is_draft(self) -> bool:
+        """Whether nobody has said yet why these rows fail."""
+        return not self.family.reason
+
+    @property
+    def asks(self) -> bool:
+        """Whether accepting it would change what is listed."""
+        return bool(self.new or self.drifted or self.gone)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What listing a run would change for one engine, and the rows that are refused, each with why."""
+
+    engine: str
+    changes: tuple[Change, ...]
+    kept: Mapping[Key, Finding]
+    refused: tuple[tuple[Row, str], ...]
+
+
+def slots_to_move(rows: Iterable[Row], engine: str) -> list[Slot]:
+    """Slots whose scatter must be known: each cell of the quick suite that fails, or nearly, once per move."""
+    cells: dict[Slot, None] = {}
     for row in rows:
-        if row.engine not in chosen:
-            continue
+        if row.engine == engine and row.floor is None and _may_be_listed(row) and not _is_study(row):
+            cells[slot_from_dict(row.slot)] = None
+    return [Slot(**{**vars(slot), "ulp": ulp}) for slot in cells for ulp in MOVES]
+
+
+def _may_be_listed(row: Row) -> bool:
+    if row.outcome != "ok" or row.value is None or row.standing == "explained" or _never(row):
+        return False
+    slot = slot_from_dict(row.slot)
+    return (row.physics == "fail" or is_marginal(row.value, _check(row))) and in_quick_suite(slot)
+
+
+def propose(rows: Iterable[Row], engine: str, findings: Findings | None) -> Proposal:
+    """Compare ``rows`` of a run with what is listed for ``engine``; see `Change` and `Proposal`.
+
+    ``rows`` carry their scatter (`Row.floor`), so the run's cells have been run from moved starts as well.
+    """
+    findings = findings or Findings(engine, {}, (), {})
+    changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
+    kept, refused, judged = dict(findings.members), [], set()
+    for row in rows:
         slot = slot_from_dict(row.slot)
+        if row.engine != engine or not in_quick_suite(slot):
+            continue
         key = row_key(slot, row.metric)
-        seen[row.engine].add(key)
-        if not in_quick_suite(slot):
+        if row.outcome not in ("ok", "diverged"):
+            # What gave no answer says nothing about a finding: its entries stay.
+            if row.outcome == "invalid":
+                refused.append((row, "its receipts or its certificate do not hold"))
             continue
-        status = _status(row)
-        if status is None:
-            continue
-        reason = reason_for(row.engine, key)
-        if reason is not None:
-            entries[row.engine][key] = (status, reason.id)
-        elif row.physics == "fail":
-            unexplained.append(row)
-    for engine in chosen:
-        kept = {k: (f.status, f.reason.id) for k, f in (listed(engine) or {}).items() if k not in seen[engine]}
-        write_list(engine, [(k, *entry) for k, entry in {**kept, **entries[engine]}.items()], folder)
-    return {engine: len(found) for engine, found in entries.items()}, unexplained
+        judged.add(key)
+        why, found = _entry(row)
+        family = findings.members[key].family if key in findings.members else findings.family_of(key)
+        if why:
+            refused.append((row, why))
+        elif found is None:
+            if key in kept:
+                finding = kept.pop(key)
+                changes[finding.family.id].gone[key] = finding
+        elif family is not None and not family.holds_for(row.engine_version):
+            refused.append((row, f"family {family.id} holds for {family.releases}, not for {row.engine_version}"))
+        else:
+            family = family or _draft(row)
+            change = changes.setdefault(family.id, Change(family))
+            _place(change, key, Finding(family, *found), kept)
+    for key in _no_longer_stated(kept, judged):
+        finding = kept.pop(key)
+        changes[finding.family.id].gone[key] = finding
+    return Proposal(engine, tuple(changes.values()), kept, tuple(refused))
 
 
-def _status(row: Row) -> str | None:
-    """``known``, ``marginal`` or None (nothing to list)."""
+def _place(change: Change, key: Key, found: Finding, kept: dict[Key, Finding]) -> None:
+    old = kept.pop(key, None)
+    if old is None:
+        change.new[key] = found
+    elif old.diverged != found.diverged or (old.value is None) != (found.value is None):
+        change.drifted[key] = (old, found)
+    elif old.value is None or (found.value is not None and abs(found.value - old.value) <= old.band):
+        change.same[key] = old
+    else:
+        change.drifted[key] = (old, found)
+
+
+def _no_longer_stated(kept: Mapping[Key, Finding], judged: set[Key]) -> list[Key]:
+    """Entries of cells that ran to their end, of checks that those cells did not have."""
+    cells = {key[:6] for key in judged}
+    return [key for key in kept if key[:6] in cells and key not in judged]
+
+
+def _entry(row: Row) -> tuple[str, tuple[float | None, float, bool] | None]:
+    """Why a row is refused, or its (value, band, diverged); neither where there is nothing to list."""
+    if _never(row) and row.physics == "fail":
+        return "its profile promises a solution: what fails there is mended, not listed", None
     if row.outcome == "diverged":
-        return "known"
-    if row.value is None or row.physics is None or row.standing == "explained":
-        return None
-    check = Check(row.metric, row.unit, row.truth, row.tolerance, row.because, row.source)
-    # A margin is listed only where the answer may depend on the last bits: cells with many coupled contacts.
-    if is_marginal(row.value, check) and _chaotic(slot_from_dict(row.slot), row):
-        return "marginal"
-    return "known" if row.physics == "fail" else None
+        return "", (None, 0.0, True)
+    if row.truth is None or row.tolerance is None or row.standing == "explained":
+        return "", None
+    if row.value is None:
+        return "", (None, 0.0, False)
+    if row.physics == "fail" and predictions_of(row):
+        return "a deviation law speaks about it and misses: the law or the engine has changed", None
+    if row.physics == "pass" and not is_marginal(row.value, _check(row)):
+        return "", None
+    if row.floor is None and not _is_study(row):
+        return "its scatter is not known: the cell has not been run from moved starts", None
+    width = band(row.value, row.tolerance, row.floor or 0.0)
+    if row.physics == "pass" and abs(row.value - row.truth) + width <= row.tolerance:
+        return "", None
+    return "", (row.value, width, False)
 
 
-def _chaotic(slot: Slot, row: Row) -> bool:
-    """Several coupled contacts that are not solved to the end: last bits may decide on another CPU."""
-    return float(row.params.get("n", 1.0)) > 1.0
+def band(value: float, tolerance: float, scatter: float) -> float:
+    """Half width within which a value is the same finding, from its largest change under moved starts."""
+    return max(SCATTER_FACTOR * scatter, TOLERANCE_SHARE * tolerance, VALUE_SHARE * abs(value))
+
+
+def _never(row: Row) -> bool:
+    return (row.engine, row.profile) in NEVER_LISTED
+
+
+def _is_study(row: Row) -> bool:
+    """What several cells say together is one of few values; it does not scatter with the last bits of a start."""
+    return any(row.scene == study.scene and row.metric == study.name for study in STUDIES)
+
+
+def _check(row: Row) -> Check:
+    return Check(row.metric, row.unit, row.truth, row.tolerance, row.because, row.source)
+
+
+def _draft(row: Row) -> Family:
+    """Family of rows that nobody has given a reason for: one profile, scene and kind of metric."""
+    metric = row.metric.partition("[")[0]
+    release = ".".join(row.engine_version.partition("+")[0].split(".")[:2])
+    name = f"{row.profile}-{row.scene}-{metric}".replace("_", "-")
+    return Family(name, (row.profile,), row.scene, (metric,), "", "", f"=={release}.*")
+
+
+def accepted(proposal: Proposal, families: Collection[str]) -> dict[Key, Finding]:
+    """Members that are listed once the ``families`` (ids) are accepted; all others stand as before."""
+    members = dict(proposal.kept)
+    for change in proposal.changes:
+        members |= change.same
+        if change.family.id in families and not change.is_draft:
+            members |= change.new
+            members |= {key: now for key, (_, now) in change.drifted.items()}
+        else:
+            members |= change.gone
+            members |= {key: before for key, (before, _) in change.drifted.items()}
+    return members

@@ -117,6 +117,8 @@ class CanonicalScene:
         Exact motion for the replay's ghost, or None.
     rule
         The stated tolerances, from `validation.tolerances`.
+    notes
+        What was filled in or put right in a scene from a file, one line each; said wherever it is run or described.
     """
 
     name: str
@@ -132,6 +134,7 @@ class CanonicalScene:
     sampling: Callable[[Scene], Sampling]
     track: Callable[[Scene], Track | None]
     rule: Callable[[Scene, float, dict[str, float]], list[Check]]
+    notes: tuple[str, ...] = ()
 
     def checks(self, scene: Scene, dt: float) -> list[Check]:
         """State all checks of ``scene`` at step ``dt`` [s]: truth, bound and reason."""

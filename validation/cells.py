@@ -19,6 +19,12 @@ from validation.canonical import CanonicalScene, Measured
 from validation.identity import adapter_hash
 from validation.posed import resolve
 
+#: Most iterations and units in the last place that can be asked for: C integers hold the first, and the second are
+#: made one by one.
+MOST_ITERATIONS, MOST_ULPS = 10**6, 10**4
+#: Most steps of a cell, and most samples (steps times bodies): a state of a body takes up to 104 bytes.
+MOST_STEPS, MOST_SAMPLES = 10**7, 5 * 10**7
+
 
 class Outcome(Enum):
     """What became of a cell."""
@@ -30,11 +36,15 @@ class Outcome(Enum):
     DIVERGED = "diverged"
     CRASHED = "crashed"
     TIMED_OUT = "timed_out"
+    #: Planned, but there is no observation: shown with the run, never stored.
+    MISSING = "missing"
 
 
 def format_dt(dt: float) -> str:
     """``1/240`` where the step is one over a whole number, else the shortest decimal."""
     per_second = 1.0 / dt
+    if not 1.0 <= per_second < math.inf:  # steps of more than a second, and those whose inverse overflows
+        return repr(dt)
     return f"1/{round(per_second)}" if 1.0 / round(per_second) == dt else repr(dt)
 
 
@@ -49,12 +59,16 @@ def parse_dt(text: str) -> float:
     try:
         # Divided in floating point: 1/240 must be the double that 1 / 240 gives, not a rounded decimal.
         numerator, _, denominator = text.partition("/")
-        dt = float(numerator) / float(denominator) if denominator else float(Fraction(text))
-    except (ValueError, ZeroDivisionError):
-        raise SceneError(f"dt: {text!r} is not a number of seconds such as 1/240 or 0.004") from None
+        dt = float(numerator) / float(denominator) if denominator else float(Fraction(text[:64]))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        raise SceneError(f"dt: {text[:64]!r} is not a number of seconds such as 1/240 or 0.004") from None
     if not (math.isfinite(dt) and dt > 0.0):
         raise SceneError(f"dt: {text} must be a positive, finite number of seconds")
     return dt
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -114,15 +128,22 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
     for name in ("scene", "engine", "profile", "dt"):
         if name not in data:
             raise SceneError(f"slot.{name}: is missing")
+    for name in ("scene", "engine", "profile"):
+        if not isinstance(data[name], str):
+            raise SceneError(f"slot.{name}: {data[name]!r} is not a text")
     dt = parse_dt(str(data["dt"]))
     iterations = data.get("iterations")
-    if iterations is not None and (not isinstance(iterations, int) or iterations < 1):
-        raise SceneError(f"slot.iterations: {iterations!r} must be a whole number of at least 1")
+    if iterations is not None and (not _is_whole(iterations) or not 1 <= iterations <= MOST_ITERATIONS):
+        raise SceneError(f"slot.iterations: {iterations!r} must be a whole number in [1, {MOST_ITERATIONS}]")
     try:
         params = tuple(sorted((str(k), float(v)) for k, v in dict(data.get("params", {})).items()))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SceneError(f"slot.params: {data.get('params')!r} is not a table of numbers") from None
-    dimension, ulp = int(data.get("dimension", 2)), int(data.get("ulp", 0))
+    dimension, ulp = data.get("dimension", 2), data.get("ulp", 0)
+    if not _is_whole(dimension):
+        raise SceneError(f"slot.dimension: {dimension!r} must be 2 or 3")
+    if not _is_whole(ulp) or abs(ulp) > MOST_ULPS:
+        raise SceneError(f"slot.ulp: {ulp!r} must be a whole number in [-{MOST_ULPS}, {MOST_ULPS}]")
     return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp)
 
 
@@ -173,7 +194,13 @@ class Observation:
 
 
 def observation_from_dict(data: Mapping[str, Any]) -> Observation:
-    """Inverse of `Observation.as_dict`."""
+    """Inverse of `Observation.as_dict`.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If the data is not that of an observation, for example of a later version.
+    """
     values = dict(data)
     values |= {"slot": slot_from_dict(data["slot"]), "outcome": Outcome(data["outcome"])}
     values["metrics"] = {name: (value, reason) for name, (value, reason) in data["metrics"].items()}
@@ -201,6 +228,7 @@ def prepare(slot: Slot) -> Prepared:
     """
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
+    check_size(scene, slot.dt)
     if slot.ulp:
         scene = _nudged(scene, slot.ulp)
     found = find(slot.engine)
@@ -212,6 +240,24 @@ def prepare(slot: Slot) -> Prepared:
     version = ".".join(platform.python_version_tuple()[:2])
     cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)
     return Prepared(canonical, scene, cell)
+
+
+def check_size(scene: Scene, dt: float) -> None:
+    """Refuse what no machine finishes or holds, before anything runs.
+
+    Raises
+    ------
+    SceneError
+        Naming the step, if it needs too many steps or samples.
+    """
+    steps = scene.duration / dt
+    if not steps <= MOST_STEPS:
+        raise SceneError(f"dt: {format_dt(dt)} makes {steps:.3g} steps of {scene.duration:g} s, at most {MOST_STEPS:g}")
+    if steps * len(scene.bodies) > MOST_SAMPLES:
+        raise SceneError(
+            f"dt: {format_dt(dt)} makes {steps:.3g} steps of {len(scene.bodies)} bodies; "
+            f"steps times bodies are at most {MOST_SAMPLES:g}"
+        )
 
 
 def _nudged(scene: Scene, ulp: int) -> Scene:

@@ -1,8 +1,9 @@
 """What changed between two runs.
 
 Deterministic values are equal to the last bit or they changed; a change counts only if it is larger than the noise
-floor of its cell, measured by moving the start by one and two units in the last place. Verdict flips come first, then
-errors, then speed.
+floor of its cell, measured by moving the start by one and two units in the last place, and larger than a hundredth of
+its tolerance: what is smaller decides nothing. Verdict flips come first, then errors, then speed. Rows that one side
+has and the other has not were not asked the same: they are told, and are neither better nor worse.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from typing import Any
 from validation.cells import slot_from_dict
 
 Plain = Mapping[str, Any]
+#: Share of a tolerance by which an error must change to count.
+COUNTS = 0.01
 
 
 class Kind(Enum):
@@ -27,7 +30,7 @@ class Kind(Enum):
     ERROR = "value changed"
     SPEED = "speed changed"
     ADDED = "only in B"
-    REMOVED = "only in A"
+    REMOVED = "not run in B"
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class Change:
     Parameters
     ----------
     regressed
-        True if B is worse: it fails where A passed, its error or time grew, or it has no answer any more.
+        True if B is worse: it fails where A passed, its error or time grew, or it has no answer any more. What was
+        not run is neither.
     size
         Of a value: change of the error in units of the tolerance. Of a time: ratio B / A.
     """
@@ -71,10 +75,8 @@ def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change
     a = {_identity(row): row for row in before}
     b = {_identity(row): row for row in after}
     changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
-    changes += [_make(Kind.REMOVED, True, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
-    changes += [
-        _make(Kind.ADDED, b[key]["physics"] == "fail", b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()
-    ]
+    changes += [_make(Kind.REMOVED, False, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
+    changes += [_make(Kind.ADDED, False, b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()]
     return sorted(changes, key=by_seriousness)
 
 
@@ -96,10 +98,14 @@ def _row_change(a: Plain, b: Plain) -> Change | None:
     if a["value"] is None or b["value"] is None:
         return _make(Kind.ERROR, b["value"] is None, b, _state(a), _state(b), 0.0, b["reason"])
     floor = max((row["floor"] for row in (a, b) if row.get("floor") is not None), default=0.0)
-    if abs(b["value"] - a["value"]) <= floor:
+    least = max(floor, COUNTS * (b["tolerance"] or 0.0))
+    if abs(b["value"] - a["value"]) <= least:
         return None
     growth = _growth(a, b)
-    note = f"floor {floor:.1g}" if floor else "no floor was measured: any changed bit counts"
+    if b["tolerance"]:
+        note = f"more than its floor {floor:.1g}" if least == floor else "more than a hundredth of its tolerance"
+    else:
+        note = "has no tolerance: any changed bit counts"
     return _make(Kind.ERROR, growth > 0.0, b, _state(a), _state(b), growth, f"{note}; {_versions(a, b)}")
 
 
@@ -140,6 +146,27 @@ def _make(kind: Kind, regressed: bool, row: Plain, before: str, after: str, size
         row["slot"],
         note,
     )
+
+
+@dataclass(frozen=True)
+class Family:
+    """Changes of one kind and direction of one engine, profile, scene and kind of metric, the largest first."""
+
+    changes: tuple[Change, ...]
+
+    @property
+    def first(self) -> Change:
+        """The largest one."""
+        return self.changes[0]
+
+
+def families(changes: Iterable[Change]) -> list[Family]:
+    """Changes that belong together, in the order of their most serious ones."""
+    found: dict[tuple[Any, ...], list[Change]] = {}
+    for change in sorted(changes, key=by_seriousness):
+        where = change.engine, change.profile, change.scene, change.metric.partition("[")[0]
+        found.setdefault((change.kind, change.regressed, *where), []).append(change)
+    return [Family(tuple(own)) for own in found.values()]
 
 
 #: A change of speed counts if its whole interval lies beyond this factor: ten per cent is what a user might notice, and

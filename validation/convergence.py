@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 
@@ -113,17 +114,19 @@ def limit_of(
 ) -> tuple[Order | None, Limit, str]:
     """Order, verdict and reason from errors at descending steps.
 
-    Errors at or below ``floor`` are round-off and carry no order.
+    Errors at or below ``floor`` are round-off and carry no order. Falling to round-off is convergence only if the
+    errors fell on the way (a rise by more than `LEVEL` is noise). If the finest step alone is there, the fall to it
+    must be one that an order of at most `HIGHEST_ORDER` makes: else it may be a lucky phase.
     """
     if not errors:
         return None, Limit.NOISY, "no step has a measured error"
     if max(errors) <= floor:
         return None, Limit.TRUTH, "exact to round-off at every step"
-    if errors[-1] <= floor:
-        return None, Limit.TRUTH, f"falls to round-off at dt = {dts[-1]:.3g} s"
     if len(errors) < 3:
         return None, Limit.NOISY, f"{len(errors)} steps are too few: an order needs three"
     above = [(dt, error) for dt, error in zip(dts, errors, strict=True) if error > floor]
+    if errors[-1] <= floor:
+        return None, *_round_off_limit(dts, errors, floor)
     fit = observed_order([dt for dt, _ in above], [error for _, error in above])
     if max(errors[-3:]) <= LEVEL * min(errors[-3:]) and dts[-3] >= 4.0 * dts[-1] * (1.0 - 1e-9):
         return fit, Limit.ELSEWHERE, f"levels off at an error of {errors[-1]:.2g}"
@@ -135,6 +138,18 @@ def limit_of(
     if fit.order + 2.0 * fit.standard_error < 0.0:
         return fit, Limit.NOT, f"the error grows as the step shrinks, {said}"
     return fit, Limit.NOISY, f"{said}: neither falling nor level"
+
+
+def _round_off_limit(dts: Sequence[float], errors: Sequence[float], floor: float) -> tuple[Limit, str]:
+    """Verdict and reason where the finest error is round-off and a coarser one is not."""
+    rises = [after > max(LEVEL * before, floor) for before, after in pairwise(errors)]
+    if any(rises):
+        return Limit.NOISY, f"round-off at dt = {dts[-1]:.3g} s, but errors rise on the way"
+    last = next(k for k in reversed(range(len(errors))) if errors[k] > floor)
+    needed = math.log(errors[last] / floor) / math.log(dts[last] / dts[last + 1])
+    if last == len(errors) - 2 and needed > HIGHEST_ORDER:
+        return Limit.NOISY, f"round-off at dt = {dts[-1]:.3g} s only, from {errors[-2]:.2g} one step coarser"
+    return Limit.TRUTH, f"falls to round-off at dt = {dts[-1]:.3g} s "
 
 
 def richardson(dts: Sequence[float], values: Sequence[float]) -> tuple[float, float, float] | None:

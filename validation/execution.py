@@ -1,19 +1,29 @@
-"""Runs one cell in this process: scene -> receipts -> trajectory -> metrics -> observation."""
+"""Runs one cell in this process: scene -> receipts -> trajectory -> metrics -> observation.
+
+Everything an engine says is checked and made plain here (`adapters.plain`, `adapters.foreign`) before it goes on.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, EngineError
+from adapters.foreign import checked_refusal, checked_settings, said_by
 from adapters.needs import needs
-from adapters.receipts import receipts
+from adapters.plain import one_line, plain
+from adapters.receipts import Receipt, receipts
 from adapters.registry import find
-from adapters.stepping import posed_for, run
-from adapters.trajectory import Trajectory
+from adapters.scene import SceneError
+from adapters.stepping import posed_for, run, step_count
+from adapters.trajectory import Sampling, Trajectory
+from validation.canonical import Measured
 from validation.cells import Observation, Outcome, Prepared, Slot, prepare
+from validation.posed import resolve
+from validation.tracks import Recording, record
 
 
 def execute(slot: Slot, keep: Path | None = None) -> Observation:
@@ -29,45 +39,82 @@ def execute(slot: Slot, keep: Path | None = None) -> Observation:
     SceneError
         If the slot itself is wrong; what an engine does becomes an outcome, not an exception.
     """
-    prepared = prepare(slot)
-    version = prepared.cell.engine_version
-    blank = Observation(slot, prepared.cell.key(), prepared.scene.version, version, Outcome.OK)
+    return perform(slot, keep)[0]
+
+
+def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[Observation, Recording | None]:
+    """Run ``slot`` and measure it; see `execute`. If its motion is shown, also record it.
+
+    Raises
+    ------
+    OSError
+        If the trajectory cannot be written.
+    """
+    canonical = resolve(slot.scene)
+    canonical.scene(slot.dimension, dict(slot.params))  # a wrong slot is the caller's error
     found = find(slot.engine)
-    if found.engine is None:
-        return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason)
+    blank = Observation(slot, "", 0, found.version, Outcome.CRASHED)
     try:
-        refusal = found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile)
-    except EngineError as error:
-        refusal = str(error)
-    if refusal:
-        return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal)
-    return _observe(found.engine, prepared, blank, keep)
+        prepared = prepare(slot)
+        blank = replace(blank, cell=prepared.cell.key(), scene_version=prepared.scene.version)
+        if found.engine is None:
+            return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
+        try:
+            refusal = checked_refusal(found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile))
+        except EngineError as error:
+            refusal = one_line(error)
+        if refusal:
+            return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal), None
+        observation, trajectory = _observe(found.engine, prepared, blank, keep is not None or shown)
+        recording = record(prepared.canonical, prepared.scene, trajectory) if shown and trajectory else None
+    except SceneError:
+        raise
+    except BaseException as error:  # whatever an engine raises costs this cell only
+        return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
+    if keep is not None and trajectory is not None:
+        trajectory.save(keep)
+    return observation, recording
 
 
-def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path | None) -> Observation:
+def _observe(
+    engine: Engine, prepared: Prepared, blank: Observation, looked_at: bool
+) -> tuple[Observation, Trajectory | None]:
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
-    settings = engine.settings(slot.profile, wanted, slot.dt, slot.iterations)
-    shown = tuple(asdict(setting) for setting in settings)
+    settings = checked_settings(engine.settings(slot.profile, wanted, slot.dt, slot.iterations))
+    blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
         slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
-        if keep is not None and sampling.stride == 1:  # what is kept is looked at: with its contacts, from the start
+        if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
             sampling = replace(sampling, contacts_from=0.0)
         trajectory = run(engine, scene, slot.dt, values, sampling)
-    except Exception as error:  # whatever an engine raises costs this cell only
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        return replace(blank, outcome=Outcome.CRASHED, reason=reason, settings=shown)
-    if keep is not None:
-        trajectory.save(keep)
-    measured = replace(blank, settings=shown, receipts=tuple(_plain(slip) for slip in slips))
+        return _measured(engine, blank, prepared, slips, trajectory, sampling), trajectory
+    except BaseException as error:
+        return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
+
+
+def _measured(
+    engine: Engine,
+    blank: Observation,
+    prepared: Prepared,
+    slips: Sequence[Receipt],
+    trajectory: Trajectory,
+    sampling: Sampling,
+) -> Observation:
+    measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
     if trajectory.finish == "diverged":
-        return replace(measured, outcome=Outcome.DIVERGED, reason=trajectory.reason)
-    measured = replace(measured, metrics=prepared.canonical.measure(scene, trajectory))
-    if trajectory.certificate.get("certified") is False:
-        reasons = "; ".join(trajectory.certificate.get("reasons", ()))
+        return replace(measured, outcome=Outcome.DIVERGED, reason=one_line(trajectory.reason))
+    metrics = prepared.canonical.measure(prepared.scene, trajectory)
+    measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
+    try:
+        measured = _certified(engine, prepared, measured, trajectory, sampling)
+    except Exception as error:
+        return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {said_by(error)}")
+    if measured.certificate.get("certified") is False:
+        reasons = one_line("; ".join(map(str, measured.certificate.get("reasons", ()))))
         return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
     broken = [slip for slip in slips if not slip.holds]
     if broken:
@@ -77,9 +124,56 @@ def _observe(engine: Engine, prepared: Prepared, blank: Observation, keep: Path 
     return measured
 
 
-def _plain(slip: Any) -> dict[str, Any]:
+def _certified(
+    engine: Engine, prepared: Prepared, measured: Observation, trajectory: Trajectory, sampling: Sampling
+) -> Observation:
+    """Enter the full certificate of an engine that has one, and how far its finite step puts each metric off.
+
+    The error of a metric is twice its difference to that of a run at half the step, at the same times: at least the
+    error for the step, whatever the order. Runs moved by units in the last place are not judged and not certified.
+    """
+    slot, scene = measured.slot, prepared.scene
+    if slot.ulp or "certified" not in trajectory.certificate:
+        return measured
+    values = {setting["name"]: setting["value"] for setting in measured.settings}
+    steps = step_count(scene.duration, slot.dt)
+    full = engine.certify(scene, slot.dt, values, steps, trajectory.pose[-1])
+    if full is None:
+        return measured
+    whole = replace(scene, duration=steps * slot.dt)
+    if sampling.contacts_from is None:  # the same samples: what a metric owes to their spacing is no error of the run
+        finer = run(engine, whole, 0.5 * slot.dt, values, replace(sampling, stride=2 * sampling.stride))
+        finer = replace(finer, dt=slot.dt)
+    else:  # impulses are those of a step, and metrics know of which
+        finer = run(engine, whole, 0.5 * slot.dt, values, sampling)
+    found = {name: _finite(*seen) for name, seen in prepared.canonical.measure(scene, finer).items()}
+    errors = {name: _error(value, found[name][0]) for name, (value, _) in measured.metrics.items()}
+    light = trajectory.certificate
+    reasons = [*light.get("reasons", ()), *(reason for reason in full["reasons"] if reason not in light["reasons"])]
+    certified = bool(light["certified"] and full["holds"])
+    entries = {"certified": certified, "reasons": reasons, "full": full, "metric_errors": errors}
+    return replace(measured, certificate={**light, **entries})
+
+
+def _error(value: float | None, finer: float | None) -> float | None:
+    """Error of a metric for the step; none where neither run has it, infinite (null) where only one has."""
+    if value is None or finer is None:
+        return 0.0 if value is finer else None
+    return 2.0 * abs(value - finer)
+
+
+def _finite(value: float | None, reason: str) -> Measured:
+    """What is not finite is a value that is missing, with its reason: it can be neither judged nor stored."""
+    if value is None or math.isfinite(value):
+        return (None if value is None else float(value)), reason
+    said = f"the value is {float(value)}, not a finite number"
+    return None, f"{reason}; {said}" if reason else said
+
+
+def _plain(slip: Receipt) -> dict[str, Any]:
     """A receipt as JSON-ready data; what could not be measured is null, JSON has no NaN."""
-    return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in asdict(slip).items()}
+    found = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(slip).items()}
+    return dict(plain(found))
 
 
 def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observation:
@@ -88,8 +182,8 @@ def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observ
         state_hash=trajectory.state_hash(),
         steps=len(trajectory.t) - 1,
         wall_time_s=trajectory.wall_time,
-        readback=trajectory.readback,
-        certificate=trajectory.certificate,
-        initial_change=trajectory.initial_change,
-        out_of_plane=trajectory.out_of_plane,
+        readback=dict(plain(trajectory.readback)),
+        certificate=dict(plain(trajectory.certificate)),
+        initial_change=tuple(one_line(change) for change in trajectory.initial_change),
+        out_of_plane=trajectory.out_of_plane if math.isfinite(trajectory.out_of_plane) else 0.0,
     )

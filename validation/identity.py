@@ -7,6 +7,7 @@ import os
 import platform
 import subprocess
 from functools import cache
+from importlib.machinery import PathFinder
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +21,17 @@ def _hash_files(paths: list[Path]) -> str:
     for path in sorted(paths):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def located(module: str) -> Path | None:
+    """File of a module, found without importing the packages it is in: a plugin's import may do anything."""
+    first, *rest = module.split(".")
+    spec = find_spec(first)
+    for name in rest:
+        if spec is None or spec.submodule_search_locations is None:
+            return None
+        spec = PathFinder.find_spec(f"{spec.name}.{name}", spec.submodule_search_locations)
+    return Path(spec.origin) if spec and spec.origin and spec.has_location else None
 
 
 def _sources(package: str) -> list[Path]:
@@ -36,8 +48,8 @@ def adapter_hash(engine: str) -> str:
     The shared vocabulary and step loop, the engine's own adapter file, and for the reference engine its solver.
     """
     entry = {e.name: e for e in entry_points(group=GROUP)}[engine]
-    spec = find_spec(entry.module)
-    own = [Path(spec.origin)] if spec and spec.origin else []
+    path = located(entry.module)
+    own = [path] if path else []
     modules = {e.module.rsplit(".", 1)[-1] for e in entry_points(group=GROUP)}
     mine = entry.module.rsplit(".", 1)[-1]
     # An adapter and the law file beside it belong to one engine; what belongs to none is shared.

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.engine import Array
-from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Box, Disc, Scene, Sphere
 from adapters.trajectory import Trajectory
+from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
-from validation.geometry import rotation, separation
+from validation.geometry import deepest, overlap
 
 UNAVAILABLE = "the engine does not report contact impulses"
+#: Begins the reason of a time that is only the end of the run: what has not come to rest has no time of rest.
+NEVER = "never settled"
 
 
 def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None, str]:
@@ -59,7 +62,7 @@ def last_motion(t: Array, speed: Array, threshold: float) -> Measured:
     if len(moving) == 0:
         return 0.0, ""
     if moving[-1] == len(t) - 1:
-        return float(t[-1]), "still moving at the end of the run"
+        return float(t[-1]), f"{NEVER}: still moving at the end of the run"
     return float(t[moving[-1] + 1]), ""
 
 
@@ -69,7 +72,7 @@ def mean_rate(t: Array, value: Array) -> Measured:
     return float((value[-1] - value[middle]) / (t[-1] - t[middle])), ""
 
 
-def _reach(shape: object) -> float:
+def reach(shape: object) -> float:
     """Distance of a shape's outermost point from its centre [m]: turns spin into a speed."""
     if isinstance(shape, Disc | Sphere):
         return shape.radius
@@ -87,7 +90,7 @@ def body_speeds(scene: Scene, trajectory: Trajectory) -> Array:
     free = free_bodies(scene)
     linear = np.linalg.norm(trajectory.twist[:, free, :d], axis=2)
     angular = np.linalg.norm(trajectory.twist[:, free, d:], axis=2)
-    return linear + angular * np.array([_reach(scene.bodies[i].shape) for i in free])
+    return linear + angular * np.array([reach(scene.bodies[i].shape) for i in free])
 
 
 def kinetic_energy(scene: Scene, trajectory: Trajectory) -> Array:
@@ -115,12 +118,11 @@ def lateral_drift(trajectory: Trajectory) -> float:
 
 def deepest_overlap(scene: Scene, trajectory: Trajectory) -> float:
     """Deepest overlap of neighbouring bodies at any sample, >= 0 [m]."""
-    worst = 0.0
-    for i in range(len(scene.bodies) - 1):
-        a, b = scene.bodies[i].shape, scene.bodies[i + 1].shape
-        gap = separation(a, trajectory.pose[:, i], b, trajectory.pose[:, i + 1])
-        worst = max(worst, -float(gap.min()))
-    return worst
+    bodies, pose = scene.bodies, trajectory.pose
+    return max(
+        (deepest(bodies[i].shape, pose[:, i], bodies[i + 1].shape, pose[:, i + 1]) for i in range(len(bodies) - 1)),
+        default=0.0,
+    )
 
 
 def interface_load(
@@ -140,10 +142,12 @@ def interface_load(
     return (float(vertical.mean()), ""), float(vertical.std())
 
 
-def separations(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
-    """Separation of every pair that can meet, by body indices; each (s,) [m]."""
-    return {
-        (i, j): separation(scene.bodies[i].shape, trajectory.pose[:, i], scene.bodies[j].shape, trajectory.pose[:, j])
-        for i, j, _ in scene.contact_pairs()
-        if not (isinstance(scene.bodies[i].shape, HalfSpace) and isinstance(scene.bodies[j].shape, HalfSpace))
-    }
+def overlaps(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
+    """Depth of the overlap of every pair that can meet and does, by body indices; each (s,) [m]."""
+    found = {}
+    for i, j, _ in scene.contact_pairs():
+        a, b = scene.bodies[i].shape, scene.bodies[j].shape
+        depth = overlap(a, trajectory.pose[:, i], b, trajectory.pose[:, j])
+        if depth.any():
+            found[i, j] = depth
+    return found

@@ -18,8 +18,8 @@ from adapters.engine import Engine, EngineError
 from adapters.needs import needs
 from adapters.registry import find
 from validation.canonical import CanonicalScene
-from validation.cells import Slot
-from validation.posed import resolve
+from validation.cells import Slot, check_size
+from validation.posed import pinned, resolve
 from validation.scenes import CATALOGUE
 
 Suite = Literal["quick", "full"]
@@ -98,7 +98,7 @@ def slots(request: Request) -> list[Slot]:
         if known and profile not in known:
             raise EngineError(f"profile: no chosen engine has a profile {profile!r}; known: {', '.join(sorted(known))}")
     found: dict[Slot, None] = {}
-    for argument in request.scenes:
+    for argument in map(pinned, request.scenes):
         canonical = resolve(argument)
         for dimension in canonical.dimensions:
             if request.dimensions and dimension not in request.dimensions:
@@ -120,6 +120,7 @@ def _engine_slots(
             params = _minimal(canonical, variation.params)
             for dt in _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
+                check_size(canonical.scene(dimension, variation.params), dt)
                 for iterations in _iterations(request, variation, engine, base):
                     for ulp in (*request.ulps, *_moves(request, argument, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)
@@ -186,6 +187,10 @@ def _iterations(request: Request, variation: Variation, engine: Engine | None, s
 
 
 def has_iterations(engine: Engine, slot: Slot) -> bool:
-    """Whether the profile stops at an iteration count that can be replaced."""
+    """Whether the profile stops at an iteration count that can be replaced; one that fails says so in its cells."""
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return any(setting.name == "iterations" for setting in engine.settings(slot.profile, needs(scene), slot.dt))
+    try:
+        settings = engine.settings(slot.profile, needs(scene), slot.dt)
+    except EngineError:
+        return False
+    return any(setting.name == "iterations" for setting in settings)

@@ -1,17 +1,77 @@
-"""Turns a scene argument (a name of the catalogue, or a path) into a canonical scene."""
+"""Turns a scene argument (a name of the catalogue, or a path) into a canonical scene.
+
+A scene file is *pinned* before anything runs: ``drop.toml`` becomes ``drop.toml@3f2a9c1d``, its name and the hash of
+its text. Slots carry the pinned name, and the store keeps the text, so that a run means the scene it was started with
+whatever happens to the file.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
+from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
 from validation.scenes import CATALOGUE, matching
+
+_FILE = re.compile(r"(?P<path>.+\.(?:toml|json))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
+#: Texts of pinned scene files by pinned name.
+_texts: dict[str, str] = {}
 
 
 def is_file(argument: str) -> bool:
     """Whether the argument names a scene file rather than a scene of the catalogue."""
-    return argument not in CATALOGUE and Path(argument).suffix.lower() in (".toml", ".json")
+    return argument not in CATALOGUE and _FILE.fullmatch(argument) is not None
+
+
+def pinned(argument: str) -> str:
+    """Name of a scene that stays what it is: a file's name gets the hash of its text.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read, or is no longer the one that a pinned name means.
+    """
+    found = _FILE.fullmatch(argument)
+    if argument in CATALOGUE or argument in _texts or found is None:
+        return argument
+    from validation.scene_text import read_text
+
+    path, wanted = found["path"], found["digest"]
+    text = read_text(Path(path))
+    digest = _digest(text)
+    if wanted and wanted.lower() != digest:
+        raise SceneError(f"scene: {path} has changed since it was {wanted}; it is {digest} now")
+    name = f"{path}@{digest}"
+    _texts[name] = text
+    return name
+
+
+def texts_of(scenes: Iterable[str]) -> dict[str, str]:
+    """Texts of those scenes that are pinned files, by name."""
+    return {scene: _texts[scene] for scene in dict.fromkeys(scenes) if scene in _texts}
+
+
+def remember(texts: Mapping[str, str]) -> None:
+    """Make pinned scenes known in this process, so that their files are not needed.
+
+    Raises
+    ------
+    SceneError
+        If a text is not the one that its name means.
+    """
+    for name, text in texts.items():
+        found = _FILE.fullmatch(name)
+        if found is None or found["digest"] != _digest(text):
+            raise SceneError(f"scene: the text kept for {name} is not that file's")
+        _texts[name] = text
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 @cache
@@ -24,7 +84,8 @@ def resolve(argument: str) -> CanonicalScene:
         If there is no such scene, or the file is not a valid scene.
     """
     if is_file(argument):
-        from validation.scene_files import canonical_from_file
+        from validation.scene_files import canonical_from_text
 
-        return canonical_from_file(Path(argument))
+        name = pinned(argument)
+        return canonical_from_text(_texts[name], Path(name.rpartition("@")[0]))
     return matching(argument)[0]

@@ -11,16 +11,28 @@ import pandas as pd
 
 from adapters.scene import Scene
 from validation.canonical import Check
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.deviations import covering
-from validation.findings import finding_of, listed, reason_for, row_key
-from validation.posed import resolve
+from validation.findings import Known, known_of
+from validation.findings.files import findings_of
+from validation.posed import is_file, resolve
 from validation.studies import STUDIES, StudyResult
-from validation.verdicts import Physics, Prediction, Standing, Verdict, judge, judge_physics, predicted
+from validation.verdicts import (
+    Physics,
+    Prediction,
+    Standing,
+    Verdict,
+    judge,
+    judge_divergence,
+    judge_physics,
+    predicted,
+)
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
-ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out")
+ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
+#: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
+TRUTH_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,7 @@ class Row:
     slot: dict[str, Any] = field(default_factory=dict)
     cells: list[str] = field(default_factory=list)
     floor: float | None = None
+    certificate: str = ""
 
     @property
     def alarming(self) -> bool:
@@ -68,13 +81,16 @@ class Row:
         return asdict(self)
 
 
-def rows_of(run: str, observations: Iterable[Observation]) -> list[Row]:
+def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] = ()) -> list[Row]:
     """Judge all checks of all observations, and the studies that they feed.
 
-    Cells whose start was moved by units in the last place are not judged: they give the row of the unmoved cell its
-    noise floor.
+    Every slot of ``plan`` gets its rows: a cell that left no observation is *missing*, which is an alarm. Cells
+    whose start was moved by units in the last place are not judged: they give the row of the unmoved cell its noise
+    floor.
     """
     observations = list(observations)
+    seen = {observation.slot for observation in observations}
+    observations += [_missing(slot) for slot in plan if slot not in seen]
     moved: dict[Slot, list[Observation]] = defaultdict(list)
     for observation in observations:
         if observation.slot.ulp:
@@ -85,6 +101,11 @@ def rows_of(run: str, observations: Iterable[Observation]) -> list[Row]:
             judged = _cell_rows(run, observation)
             rows += [replace(row, floor=_floor(row, moved[observation.slot])) for row in judged]
     return rows + [_study_row(run, result) for study in STUDIES for result in study.results(observations)]
+
+
+def _missing(slot: Slot) -> Observation:
+    """Stand-in for a cell of the plan that has left nothing; it is shown, never stored."""
+    return Observation(slot, "", 0, "", Outcome.MISSING, "the plan has this cell, the run has no observation of it")
 
 
 def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
@@ -103,18 +124,55 @@ def _cell_rows(run: str, observation: Observation) -> list[Row]:
 
 
 def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
-    slot = observation.slot
-    value, why = observation.metrics.get(check.metric, (None, ""))
-    if observation.outcome in (Outcome.OK, Outcome.INVALID):
-        has_list = listed(slot.engine) is not None
-        finding = finding_of(slot, check.metric)
-        verdict = judge(value, check, _predictions(observation, scene, check, value), finding, has_list)
-        if observation.outcome is Outcome.INVALID:
-            verdict = Verdict(None, None, observation.reason)
-    else:
-        verdict = _verdict_of_outcome(observation, check)
-    reason = "; ".join(text for text in (why, verdict.reason) if text)
-    return _assemble(run, observation, slot, dict(scene.params), check, value, verdict, reason)
+    value, why = observation.metrics.get(check.metric, (None, "it was not measured"))
+    doubt = _doubt(observation, check)
+    if doubt:
+        observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
+    verdict = _verdict(observation, scene, check, value, why)
+    reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
+    return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
+
+
+def _verdict(observation: Observation, scene: Scene, check: Check, value: float | None, why: str) -> Verdict:
+    """What was observed, judged; cells without an answer have no physics, and unsupported ones must be known ones."""
+    slot, outcome = observation.slot, observation.outcome
+    if outcome is Outcome.OK:
+        known = _known(observation, slot, check)
+        return judge(value, check, _predictions(observation, scene, check, value), known, why)
+    if outcome is Outcome.DIVERGED:
+        return judge_divergence(_known(observation, slot, check), observation.reason)
+    findings = findings_of(slot.engine)
+    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene):
+        expected = findings.unsupported_by(slot)
+        return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
+    return Verdict(None, None, observation.reason)
+
+
+def _known(observation: Observation, slot: Slot, check: Check) -> Known:
+    return known_of(slot, check.metric, observation.engine_version, findings_of(slot.engine))
+
+
+def _doubt(observation: Observation, check: Check) -> str:
+    """Why a certified run cannot be truth for this check: its error for the step is not small beside the tolerance."""
+    errors = observation.certificate.get("metric_errors")
+    if observation.outcome is not Outcome.OK or errors is None or check.bound is None:
+        return ""
+    error, most = errors.get(check.metric, 0.0), TRUTH_SHARE * check.bound
+    if error is not None and error <= most:
+        return ""
+    known = "infinite" if error is None else f"{error:.3g}"
+    return f"certificate: error for the step {known}, at most {most:.3g}, a tenth of the tolerance"
+
+
+def _certificate(observation: Observation, check: Check) -> str:
+    """Which certificate ran, and to what the value is certified."""
+    found = observation.certificate
+    if "certified" not in found:
+        return ""
+    if "full" not in found:
+        return "light"
+    error = found["metric_errors"].get(check.metric)
+    return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
@@ -126,19 +184,13 @@ def _predictions(observation: Observation, scene: Scene, check: Check, value: fl
     return predicted(laws, scene, slot)
 
 
-def _verdict_of_outcome(observation: Observation, check: Check) -> Verdict:
-    """Diverged is a FAIL; unsupported must be a known one; the rest has no physics."""
-    slot = observation.slot
-    has_list = listed(slot.engine) is not None
-    if observation.outcome is Outcome.DIVERGED:
-        finding = finding_of(slot, check.metric)
-        standing = Standing.KNOWN if finding else (Standing.NEW if has_list else None)
-        reason = f"{observation.reason}; {finding.reason.text}" if finding else observation.reason
-        return Verdict(Physics.FAIL, standing, reason)
-    if observation.outcome is Outcome.UNSUPPORTED and has_list:
-        expected = reason_for(slot.engine, row_key(slot, check.metric), unsupported=True)
-        return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
-    return Verdict(None, None, observation.reason)
+def predictions_of(row: Row) -> list[Prediction]:
+    """What deviation laws say about a failing row, whether or not it is so; nothing about a study."""
+    if row.physics != Physics.FAIL.value or row.iterations is not None or len(row.cells) > 1:
+        return []
+    slot = slot_from_dict(row.slot)
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return predicted(covering(row.engine, row.engine_version, row.profile, scene.name, row.metric), scene, slot)
 
 
 def _assemble(
@@ -181,15 +233,16 @@ def _assemble(
         initial_change=list(observation.initial_change),
         slot=slot.as_dict(),
         cells=[observation.cell],
+        certificate=_certificate(observation, check),
     )
 
 
 def _study_row(run: str, result: StudyResult) -> Row:
     """Judge a study like an observation; its row lists its cells."""
     slot, check = result.slot, result.check
-    has_list = listed(slot.engine) is not None
-    verdict = judge(result.value, check, (), finding_of(slot, check.metric), has_list)
-    reason = "; ".join(text for text in (result.reason, verdict.reason) if text)
+    verdict = judge(result.value, check, (), _known(result.observation, slot, check), result.reason)
+    said = result.reason if result.value is not None else ""
+    reason = "; ".join(text for text in (said, verdict.reason) if text)
     row = _assemble(run, result.observation, slot, {}, check, result.value, verdict, reason)
     return Row(**{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0})
 

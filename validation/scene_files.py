@@ -1,95 +1,25 @@
 """Scene files (TOML or JSON): checked completely before anything else sees them.
 
-The file's types are checked here by pydantic, its physics by `adapters.scene.Scene`. A scene from a file has no
-closed form, so its final positions are shown without a truth; what must hold in any scene is judged: mechanical
-energy never grows, bodies do not overlap deeper than one step of motion.
+Their format is `validation.scene_format`. A scene from a file has no closed form: its final places, angles, velocities
+and forces are shown without a truth, unless its author states a number for one (``[[checks]]``); what must hold in
+any scene (`validation.invariants`) is judged.
 """
 
 from __future__ import annotations
 
-import json
-import math
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
-from adapters.needs import needs
-from adapters.scene import Scene, SceneError, scene_from_dict
+from adapters.plain import one_line
+from adapters.scene import Scene, SceneError
 from adapters.trajectory import Sampling, Trajectory
-from validation import metrics
+from validation import invariants
 from validation.canonical import CanonicalScene, Check, Measured
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class DiscModel(_Strict):
-    """Planar disc."""
-
-    type: Literal["disc"]
-    radius: float
-
-
-class SphereModel(_Strict):
-    """Ball."""
-
-    type: Literal["sphere"]
-    radius: float
-
-
-class BoxModel(_Strict):
-    """Box by half extents."""
-
-    type: Literal["box"]
-    half_extents: tuple[float, ...]
-
-
-class HalfSpaceModel(_Strict):
-    """Solid where normal . x <= offset."""
-
-    type: Literal["half_space"]
-    normal: tuple[float, ...]
-    offset: float = 0.0
-
-
-class BodyModel(_Strict):
-    """A body; see `adapters.scene.Body`."""
-
-    name: str
-    shape: Annotated[DiscModel | SphereModel | BoxModel | HalfSpaceModel, Field(discriminator="type")]
-    mass: float = 1.0
-    inertia: float | tuple[float, float, float] = 1.0
-    pose: tuple[float, ...] = ()
-    twist: tuple[float, ...] = ()
-    motion: Literal["free", "fixed", "prescribed"] = "free"
-    force: tuple[float, ...] = ()
-    torque: tuple[float, ...] = ()
-
-
-class PairModel(_Strict):
-    """Material of a pair; see `adapters.scene.Pair`."""
-
-    a: str = "*"
-    b: str = "*"
-    restitution: float = 0.0
-    friction: float = 0.0
-
-
-class SceneModel(_Strict):
-    """A scene file."""
-
-    name: str = Field(min_length=1)
-    version: int = 1
-    dimension: Literal[2, 3]
-    gravity: tuple[float, ...]
-    duration: float
-    impact_law: Literal["N-SIM", "N-SEQ"] = "N-SIM"
-    bodies: tuple[BodyModel, ...]
-    pairs: tuple[PairModel, ...] = ()
+from validation.quantities import force_window, quantity, unit
+from validation.scene_format import CheckModel, SceneModel, Stated, shown_quantities, stated
+from validation.scene_text import parsed, read_text, said
 
 
 def json_schema() -> dict[str, Any]:
@@ -98,38 +28,43 @@ def json_schema() -> dict[str, Any]:
 
 
 def load_scene(path: Path) -> Scene:
-    """Read and check a scene file.
+    """Read and check a scene file; raises as `load_stated`."""
+    return load_stated(path).scene
+
+
+def load_stated(path: Path) -> Stated:
+    """Read and check a scene file, with what was filled in and what its author knows.
 
     Raises
     ------
     SceneError
         One line that names the file and every field that is wrong.
     """
+    return stated_from_text(read_text(path), path)
+
+
+def stated_from_text(text: str, path: Path) -> Stated:
+    """Check the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    shown = one_line(path)
     try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
-    except OSError as error:
-        raise SceneError(f"scene: cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene: {path} is not valid {path.suffix[1:].upper()}: {error}") from None
-    try:
-        model = SceneModel.model_validate(data)
+        model = SceneModel.model_validate(parsed(text, path))
     except ValidationError as errors:
-        found = "; ".join(f"{_path(e['loc'])}: {e['msg']}" for e in errors.errors())
-        raise SceneError(f"{path}: {found}") from None
+        raise SceneError(f"{shown}: {said(errors)}") from None
     try:
-        return scene_from_dict(model.model_dump())
+        return stated(model)
     except SceneError as error:
-        raise SceneError(f"{path}: {error}") from None
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) or "file"
+        raise SceneError(f"{shown}: {one_line(error)}") from None
 
 
 def canonical_from_file(path: Path) -> CanonicalScene:
     """Wrap a scene file so that it runs like a scene of the catalogue."""
-    scene = load_scene(path)
+    return canonical_from_text(read_text(path), path)
+
+
+def canonical_from_text(text: str, path: Path) -> CanonicalScene:
+    """Wrap the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    read = stated_from_text(text, path)
+    scene = read.scene
     return CanonicalScene(
         scene.name,
         scene.version,
@@ -139,62 +74,48 @@ def canonical_from_file(path: Path) -> CanonicalScene:
         (scene.dimension,),
         (),
         lambda dimension, params: scene,
-        _exact,
-        _measure,
-        lambda scene: Sampling(1, None),
+        lambda scene: _exact(read),
+        lambda scene, trajectory: _measure(read, trajectory),
+        lambda scene: Sampling(1, scene.duration - force_window(scene)),
         lambda scene: None,
-        _checks,
+        lambda scene, dt, truth: _checks(read, dt),
+        read.notes,
     )
 
 
-def _exact(scene: Scene) -> dict[str, float]:
-    return {"energy_growth": 0.0, "penetration": 0.0}
+def _exact(read: Stated) -> dict[str, float]:
+    told = {_metric(check.quantity, check.at): check.value for check in read.checks}
+    return {"energy_growth": 0.0, "penetration": 0.0, **told}
 
 
-def _measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    energy = mechanical_energy(scene, trajectory)
-    gaps = metrics.separations(scene, trajectory)
+def _metric(name: str, at: float | None = None) -> str:
+    """Name of a quantity's metric: ``final[ball.y]``, or ``at[0.25 s][ball.y]``."""
+    return f"final[{name}]" if at is None else f"at[{at:.12g} s][{name}]"
+
+
+def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
+    beyond, depth = invariants.deepest(read.scene, trajectory)
     measured: dict[str, Measured] = {
-        "energy_growth": (max(0.0, float((energy - energy[0]).max())), ""),
-        "penetration": (max([0.0, *(-float(gap.min()) for gap in gaps.values())]), ""),
+        "energy_growth": invariants.energy_growth(read.scene, trajectory),
+        "penetration": beyond,
+        "deepest_overlap": depth,
     }
-    for name, i, k, axis in _coordinates(scene):
-        measured[f"final[{name}.{axis}]"] = (float(trajectory.pose[-1, i, k]), "")
+    shown = [(name, None) for name in shown_quantities(read.scene)]
+    for name, at in [*shown, *((check.quantity, check.at) for check in read.checks)]:
+        measured[_metric(name, at)] = quantity(read.scene, trajectory, name, at)
     return measured
 
 
-def _coordinates(scene: Scene) -> list[tuple[str, int, int, str]]:
-    axes = "xy" if scene.dimension == 2 else "xyz"
-    free = metrics.free_bodies(scene)
-    return [(scene.bodies[i].name, i, k, axis) for i in free for k, axis in enumerate(axes)]
+def _checks(read: Stated, dt: float) -> list[Check]:
+    told = {_metric(check.quantity, check.at): check for check in read.checks}
+    final = "shown for comparison between engines: the file states no number for it"
+    names = {_metric(name): name for name in shown_quantities(read.scene)}
+    shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
+    depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
+    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c) for m, c in told.items()), depth, *shown]
 
 
-def mechanical_energy(scene: Scene, trajectory: Trajectory) -> np.ndarray:
-    """Kinetic plus potential energy in gravity and constant forces, (s,) [J]."""
-    energy = metrics.kinetic_energy(scene, trajectory)
-    for i in metrics.free_bodies(scene):
-        body = scene.bodies[i]
-        load = body.mass * np.array(scene.gravity) + np.array(body.force)
-        energy = energy - trajectory.pose[:, i, : scene.dimension] @ load
-    return energy
-
-
-def _checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    wanted = needs(scene)
-    step = wanted.top_speed * dt + wanted.gravity * dt * dt
-    free = [body for body in scene.bodies if body.motion == "free"]
-    work = sum((body.mass * math.hypot(*scene.gravity) + math.hypot(*body.force)) * step for body in free) + sum(
-        abs(component) * dt for body in free for component in body.torque
+def _stated_check(metric: str, check: CheckModel) -> Check:
+    return Check(
+        metric, unit(check.quantity), check.value, check.tolerance, check.because, "the scene file's [[checks]]"
     )
-    energy = "external loads may do the work of one step more or less than sampled"
-    depth = "contact may be found one step of motion late"
-    checks = [
-        Check("energy_growth", "J", 0.0, work + 1e-12, energy, "contacts only take energy (e <= 1)"),
-        Check("penetration", "m", 0.0, step + 1e-12, depth, "bodies are impenetrable"),
-    ]
-    if any(body.motion == "prescribed" for body in scene.bodies):
-        checks = checks[1:]  # a driven body may feed energy in
-    final = "shown for comparison between engines: a scene from a file has no closed form"
-    return checks + [
-        Check(f"final[{name}.{axis}]", "m", None, None, final, "") for name, _, _, axis in _coordinates(scene)
-    ]

@@ -4,39 +4,61 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import sqlite3
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+from urllib.parse import quote
 
+from adapters.plain import one_line
+from adapters.scene import SceneError
+from validation import posed
 from validation.bench.timing import Timing, timing_from_dict
 from validation.cells import Observation, Slot, observation_from_dict, slot_from_dict
 from validation.identity import code_hash, commit, machine
 from validation.tracks import Recording, recording_from_bytes
 
 FILE = "results.sqlite"
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS runs (
+#: Version of the tables, kept as ``user_version``; 0 is a store from before versions, which had no scenes.
+VERSION = 1
+#: Seconds that a process waits for another one that writes.
+PATIENCE = 30.0
+#: Runs from moved starts, for the scatter of what another run found; never the latest run.
+SCATTER_TITLE = "scatter of "
+_SCHEMA = (
+    """CREATE TABLE IF NOT EXISTS runs (
     id TEXT PRIMARY KEY, date TEXT NOT NULL, commit_hash TEXT NOT NULL, machine TEXT NOT NULL,
-    title TEXT NOT NULL, plan TEXT NOT NULL, plan_hash TEXT NOT NULL, finished INTEGER NOT NULL DEFAULT 0);
-CREATE TABLE IF NOT EXISTS observations (
+    title TEXT NOT NULL, plan TEXT NOT NULL, plan_hash TEXT NOT NULL, finished INTEGER NOT NULL DEFAULT 0)""",
+    """CREATE TABLE IF NOT EXISTS observations (
     run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, cell TEXT NOT NULL, engine TEXT NOT NULL,
-    scene TEXT NOT NULL, outcome TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, slot));
-CREATE TABLE IF NOT EXISTS timings (
+    scene TEXT NOT NULL, outcome TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, slot))""",
+    """CREATE TABLE IF NOT EXISTS timings (
     run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, sampled INTEGER NOT NULL, round INTEGER NOT NULL,
     purpose TEXT NOT NULL, engine TEXT NOT NULL, scene TEXT NOT NULL, seconds REAL NOT NULL, body TEXT NOT NULL,
-    PRIMARY KEY (run, slot, purpose, sampled, round));
-CREATE TABLE IF NOT EXISTS protocols (run TEXT PRIMARY KEY REFERENCES runs(id), body TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS recordings (
+    PRIMARY KEY (run, slot, purpose, sampled, round))""",
+    "CREATE TABLE IF NOT EXISTS protocols (run TEXT PRIMARY KEY REFERENCES runs(id), body TEXT NOT NULL)",
+    """CREATE TABLE IF NOT EXISTS recordings (
     run TEXT NOT NULL REFERENCES runs(id), slot TEXT NOT NULL, request TEXT NOT NULL, body BLOB NOT NULL,
-    PRIMARY KEY (run, slot));
-"""
+    PRIMARY KEY (run, slot))""",
+    """CREATE TABLE IF NOT EXISTS scenes (
+    run TEXT NOT NULL REFERENCES runs(id), name TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, name))""",
+)
+_T = TypeVar("_T")
+#: A run's id names files and folders, so a store from elsewhere must not choose it freely.
+_ID = re.compile(r"[0-9A-Za-z][0-9A-Za-z_-]{0,63}")
 
 
 class StoreError(RuntimeError):
-    """The store cannot be used; one line."""
+    """The results cannot be kept or read; one line."""
+
+
+class MissingError(StoreError):
+    """What was asked for is not among the results; one line."""
 
 
 @dataclass(frozen=True)
@@ -58,28 +80,66 @@ class Store:
     Parameters
     ----------
     folder
-        Made if it does not exist.
+        Made if it does not exist. The store's file itself may be named instead.
+    create
+        False: results must be there.
+    write
+        Whether anything is written; by default only where results may be made. Without, not even a file beside them.
 
     Raises
     ------
+    MissingError
+        If there are no results to read.
     StoreError
-        If the folder or its file cannot be used.
+        If the folder or its file cannot be used, or is of a later version than this one.
     """
 
-    def __init__(self, folder: Path, create: bool = True) -> None:
-        path = folder / FILE if folder.is_dir() or not folder.suffix else folder
-        if not create and not path.exists():
-            raise StoreError(f"out: there are no results at {path}")
+    def __init__(self, folder: Path, create: bool = True, write: bool | None = None) -> None:
+        write = create if write is None else write
+        self.path = folder if folder.is_file() else folder / FILE
+        if not create and not self.path.exists():
+            raise MissingError(f"out: there are no results at {self.path}")
+        with self._guarded("use"):
+            if write:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self._db = _patiently(lambda: _opened(self.path))
+            else:
+                self._db = _opened_to_read(self.path)
+            version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version > VERSION:
+            self._db.close()
+            raise StoreError(f"out: {self.path} is of version {version}, made by a later release; this one reads up "
+                             f"to {VERSION}")  # fmt: skip
+        if write and version < VERSION:
+            with self._guarded("use"):
+                _patiently(self._make_tables)
+
+    def _make_tables(self) -> None:
+        with self._transaction():
+            for table in _SCHEMA:
+                self._db.execute(table)
+            self._db.execute(f"PRAGMA user_version = {VERSION}")
+
+    @contextmanager
+    def _guarded(self, what: str) -> Iterator[None]:
+        """Turn whatever a damaged, full, locked or foreign file raises into one line."""
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, timeout=30.0, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode=WAL")
-            # WAL with NORMAL survives the death of the process, which is what a run must survive.
-            self._db.execute("PRAGMA synchronous=NORMAL")
-            self._db.executescript(_SCHEMA)
-        except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"out: cannot use {path}: {error}") from None
-        self.path = path
+            yield
+        except (sqlite3.Error, OSError, KeyError, TypeError, ValueError, AttributeError) as error:
+            said = f"{type(error).__name__}: {error}" if isinstance(error, KeyError | TypeError) else str(error)
+            raise StoreError(f"out: cannot {what} {self.path}: {one_line(said)}") from None
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """Write all or nothing; the lock to write is taken first, so that two who read alike do not both write."""
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            self._db.execute("COMMIT")
+        except BaseException:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise
 
     def close(self) -> None:
         """Close the file."""
@@ -88,32 +148,29 @@ class Store:
     def start(self, title: str, slots: Sequence[Slot], fresh: bool = False) -> tuple[Run, set[str]]:
         """Resume the unfinished run of the same plan and code, or start a new one.
 
+        The plan names scene files with the hash of their text, and keeps the text.
+
         Returns
         -------
         The run, and the keys of the slots it already has.
         """
         plan = [slot.key() for slot in slots]
         plan_hash = hashlib.sha256(json.dumps([sorted(plan), code_hash()]).encode()).hexdigest()[:16]
-        query = "SELECT id FROM runs WHERE plan_hash = ? AND finished = 0 ORDER BY date DESC, id DESC LIMIT 1"
-        row = None if fresh else self._db.execute(query, (plan_hash,)).fetchone()
-        if row is not None:
+        made = json.dumps(machine()), title, json.dumps(plan), plan_hash
+        here = commit()
+        query = "SELECT id FROM runs WHERE plan_hash = ? AND finished = 0 ORDER BY rowid DESC LIMIT 1"
+        with self._guarded("write"), self._transaction():
+            row = None if fresh else self._db.execute(query, (plan_hash,)).fetchone()
+            if row is None:
+                now = datetime.now(UTC)
+                row = (self._free_id(now.strftime("%Y%m%d-%H%M%S")),)
+                date = now.isoformat(timespec="seconds")
+                self._db.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, 0)", (*row, date, here, *made))
+                texts = posed.texts_of(slot.scene for slot in slots)
+                scenes = [(*row, name, text) for name, text in texts.items()]
+                self._db.executemany("INSERT INTO scenes VALUES (?, ?, ?)", scenes)
             done = self._db.execute("SELECT slot FROM observations WHERE run = ?", row).fetchall()
-            return self.run(row[0]), {slot for (slot,) in done}
-        now = datetime.now(UTC)
-        run_id = self._free_id(now.strftime("%Y%m%d-%H%M%S"))
-        self._db.execute(
-            "INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, 0)",
-            (
-                run_id,
-                now.isoformat(timespec="seconds"),
-                commit(),
-                json.dumps(machine()),
-                title,
-                json.dumps(plan),
-                plan_hash,
-            ),
-        )
-        return self.run(run_id), set()
+        return self.run(row[0]), {slot for (slot,) in done}
 
     def _free_id(self, stem: str) -> str:
         taken = {row[0] for row in self._db.execute("SELECT id FROM runs")}
@@ -122,54 +179,67 @@ class Store:
     def add(self, run: Run, observation: Observation) -> None:
         """Keep an observation; it is on disk when this returns."""
         slot = observation.slot
-        self._db.execute(
-            "INSERT OR REPLACE INTO observations VALUES (?, ?, ?, ?, ?, ?, ?)",
-            (
-                run.id,
-                slot.key(),
-                observation.cell,
-                slot.engine,
-                slot.scene,
-                observation.outcome.value,
-                json.dumps(observation.as_dict(), default=str),
-            ),
-        )
+        row = (run.id, slot.key(), observation.cell, slot.engine, slot.scene, observation.outcome.value)
+        body = json.dumps(observation.as_dict(), default=str)
+        self._write("INSERT OR REPLACE INTO observations VALUES (?, ?, ?, ?, ?, ?, ?)", (*row, body))
+
+    def _write(self, statement: str, values: Sequence[Any]) -> None:
+        with self._guarded("write"):
+            self._db.execute(statement, values)
 
     def finish(self, run: Run) -> None:
         """Mark the run as complete, so that the same plan starts a new one next time."""
-        self._db.execute("UPDATE runs SET finished = 1 WHERE id = ?", (run.id,))
+        self._write("UPDATE runs SET finished = 1 WHERE id = ?", (run.id,))
 
     def runs(self) -> list[Run]:
-        """All runs, oldest first."""
-        ids = self._db.execute("SELECT id FROM runs ORDER BY date, id").fetchall()
+        """All runs, oldest first: in the order in which they were started, whatever the clock said."""
+        with self._guarded("read"):
+            ids = self._db.execute("SELECT id FROM runs ORDER BY rowid").fetchall()
         return [self.run(run_id) for (run_id,) in ids]
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run; the latest is a bench only if there is nothing else.
+        """Return one run; the latest is a bench or a scatter only if there is nothing else.
 
         Raises
         ------
-        StoreError
+        MissingError
             If there is none of that name.
         """
-        where, args = (
-            ("id = ?", (run_id,))
-            if run_id != "latest"
-            else ("1 ORDER BY title LIKE 'bench %', date DESC, id DESC LIMIT 1", ())
-        )
+        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ?, rowid DESC LIMIT 1"
+        where, args = ("id = ?", run_id) if run_id != "latest" else (last, f"{SCATTER_TITLE}%")
         columns = "id, date, commit_hash, machine, title, plan, finished"
-        row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
-        if row is None:
-            known = ", ".join(r[0] for r in self._db.execute("SELECT id FROM runs")) or "none"
-            raise StoreError(f"run: there is no run {run_id!r} in {self.path}; it has {known}")
-        return Run(row[0], row[1], row[2], json.loads(row[3]), row[4], tuple(json.loads(row[5])), bool(row[6]))
+        with self._guarded("read"):
+            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", (args,)).fetchone()
+            known = [str(r[0]) for r in self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20")]
+            if row is None:
+                said = one_line(", ".join(known) or "none")
+                raise MissingError(f"run: there is no run {run_id!r} in {self.path}; it has {said}")
+            if not _ID.fullmatch(str(row[0])):
+                raise ValueError(f"{one_line(str(row[0]), 80)!r} is not the id of a run")
+            texts = (one_line(row[1]), one_line(row[2]), dict(json.loads(row[3])), one_line(row[4]))
+            return Run(row[0], *texts, tuple(json.loads(row[5])), bool(row[6]))
 
     def observations(self, run: Run) -> list[Observation]:
-        """Observations of a run, in the order of its plan."""
-        rows = self._db.execute("SELECT slot, body FROM observations WHERE run = ?", (run.id,)).fetchall()
-        order = {key: position for position, key in enumerate(run.plan)}
-        rows.sort(key=lambda row: order.get(row[0], len(order)))
-        return [observation_from_dict(json.loads(body)) for _, body in rows]
+        """Observations of a run, in the order of its plan; its scene files need not be there any more."""
+        self._remember_scenes(run)
+        with self._guarded("read"):
+            rows = self._db.execute("SELECT slot, body FROM observations WHERE run = ?", (run.id,)).fetchall()
+            order = {key: position for position, key in enumerate(run.plan)}
+            rows.sort(key=lambda row: order.get(row[0], len(order)))
+            return [observation_from_dict(json.loads(body)) for _, body in rows]
+
+    def scenes(self, run: Run) -> dict[str, str]:
+        """Texts of the scene files of a run, by the name that its slots have for them."""
+        with self._guarded("read"):
+            if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'scenes'").fetchone():
+                return {}  # a store of version 0
+            return dict(self._db.execute("SELECT name, body FROM scenes WHERE run = ?", (run.id,)).fetchall())
+
+    def _remember_scenes(self, run: Run) -> None:
+        try:
+            posed.remember(self.scenes(run))
+        except SceneError as error:
+            raise StoreError(f"out: cannot read {self.path}: {one_line(error)}") from None
 
     def add_timings(self, run: Run, timings: Sequence[Timing]) -> None:
         """Keep raw timings, in one transaction."""
@@ -178,36 +248,77 @@ class Store:
             slot, body = timing.slot, json.dumps(timing.as_dict())
             unit = (run.id, slot.key(), timing.sampled, timing.round, timing.purpose)
             rows.append((*unit, slot.engine, slot.scene, timing.seconds, body))
-        self._db.execute("BEGIN")
-        self._db.executemany("INSERT OR REPLACE INTO timings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
-        self._db.execute("COMMIT")
+        with self._guarded("write"), self._transaction():
+            self._db.executemany("INSERT OR REPLACE INTO timings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
     def clear_timings(self, run: Run) -> None:
         """Drop the timings of a run that was interrupted: rounds of two lanes do not mix."""
-        self._db.execute("DELETE FROM timings WHERE run = ?", (run.id,))
+        self._write("DELETE FROM timings WHERE run = ?", (run.id,))
 
     def timings(self, run: Run) -> list[Timing]:
         """Raw timings of a run, in the order in which they were taken."""
-        rows = self._db.execute("SELECT body FROM timings WHERE run = ? ORDER BY rowid", (run.id,)).fetchall()
-        return [timing_from_dict(json.loads(body)) for (body,) in rows]
+        with self._guarded("read"):
+            rows = self._db.execute("SELECT body FROM timings WHERE run = ? ORDER BY rowid", (run.id,)).fetchall()
+            return [timing_from_dict(json.loads(body)) for (body,) in rows]
 
     def set_protocol(self, run: Run, protocol: dict[str, Any]) -> None:
         """Keep how a bench run was made: seed, limits, clock, what was left out and why."""
-        self._db.execute("INSERT OR REPLACE INTO protocols VALUES (?, ?)", (run.id, json.dumps(protocol)))
+        self._write("INSERT OR REPLACE INTO protocols VALUES (?, ?)", (run.id, json.dumps(protocol)))
 
     def protocol(self, run: Run) -> dict[str, Any] | None:
         """Protocol of a bench run; None for a run that timed nothing."""
-        row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
-        return None if row is None else dict(json.loads(row[0]))
+        with self._guarded("read"):
+            row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
+            return None if row is None else dict(json.loads(row[0]))
 
     def add_recording(self, run: Run, slot: Slot, recording: Recording) -> None:
         """Keep what a replay shows of a cell."""
         row = (run.id, slot.key(), json.dumps(slot.as_dict()), recording.to_bytes())
-        self._db.execute("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", row)
+        self._write("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", row)
 
     def recordings(self, run: Run) -> list[tuple[Slot, Recording]]:
         """Recordings of a run, in the order of its plan."""
-        rows = self._db.execute("SELECT slot, request, body FROM recordings WHERE run = ?", (run.id,)).fetchall()
-        order = {key: position for position, key in enumerate(run.plan)}
-        rows.sort(key=lambda row: order.get(row[0], len(order)))
-        return [(slot_from_dict(json.loads(slot)), recording_from_bytes(body)) for _, slot, body in rows]
+        self._remember_scenes(run)
+        with self._guarded("read"):
+            found = "SELECT slot, request, body FROM recordings WHERE run = ?"
+            rows = self._db.execute(found, (run.id,)).fetchall()
+            order = {key: position for position, key in enumerate(run.plan)}
+            rows.sort(key=lambda row: order.get(row[0], len(order)))
+            return [(slot_from_dict(json.loads(slot)), recording_from_bytes(body)) for _, slot, body in rows]
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
+    connection.execute("PRAGMA journal_mode=WAL")
+    # WAL with NORMAL survives the death of the process, which is what a run must survive.
+    connection.execute("PRAGMA synchronous=NORMAL")
+    connection.execute("PRAGMA temp_store=MEMORY")  # a full folder for temporary files is not our business
+    return connection
+
+
+def _opened_to_read(path: Path) -> sqlite3.Connection:
+    """Open without writing; where not even the log's index can be made, as a file that nobody changes."""
+    address = f"file:{quote(str(path.resolve()))}?mode=ro"
+    for suffix in ("", "&immutable=1"):
+        connection = sqlite3.connect(address + suffix, uri=True, timeout=PATIENCE, isolation_level=None)
+        try:
+            connection.execute("PRAGMA temp_store=MEMORY")
+            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+            return connection
+        except sqlite3.OperationalError:
+            connection.close()
+            if suffix or path.with_name(path.name + "-wal").exists():  # what stands in a log must not be overlooked
+                raise
+    raise AssertionError("unreachable")
+
+
+def _patiently(action: Callable[[], _T]) -> _T:
+    """Repeat what fails because another process opens the same file: a change of the journal does not wait."""
+    ends = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return action()
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > ends:
+                raise
+            time.sleep(0.05)

@@ -63,16 +63,34 @@ def bounce_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Chec
         velocity_error.append(apex * g / speed)
         name = f"apex[{n}]"
         checks.append(Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt"))
-    growth = per_bounce * math.sqrt(2.0 * g * height) * dt / height if e == 1.0 else 0.0
-    grows = "an apex may exceed the last one by no more than the sampling of an apex, g dt^2/8"
-    if e == 1.0:
-        grows = "e = 1: an apex may exceed the last one by the impact's location within a step, v dt"
-    checks.append(Check("apex_growth", "1", 0.0, growth + g * dt * dt / 8.0 / height, grows, "conservation of energy"))
+    checks.append(_growth_check(height, g, dt))
     if len(velocity_error) >= 3:
         checks.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
     if "rest_time" in truth:
         checks.append(_rest_check(e, height, g, dt, truth["rest_time"]))
     return checks
+
+
+def _growth_check(height: float, g: float, dt: float) -> Check:
+    """No bounce may add energy, whatever e <= 1; an impact that is found late adds none either.
+
+    The semi-implicit step keeps ``H = v^2/2 + g y - s g v dt/2`` in flight, s = +1 velocity first, -1 position first; a
+    mid-point step has s = 0. An impact replaces the velocity -|v| that its step began with by e |v|, in the place of
+    gravity; the body then moves by e |v| dt (s = +1), by -|v| dt (s = -1, with the old velocity) or by the mean
+    (s = 0). At any height y, so however late or early the contact was found,
+
+        H after - H before  =  -(1 - e^2) v^2/2 - (1 - e) g |v| dt/2  <=  0,   and 0 for e = 1.
+
+    So no allowance for the location of an impact is owed: whoever reflects gravity's own g dt as well gains |v| dt of
+    height at every bounce and is to be seen. What is left is the start: released at rest at a sample, the ball moves on
+    a parabola whose top lies half a step beside that sample, g (dt/2)^2/2 = g dt^2/8 above it.
+    """
+    because = (
+        "e <= 1 adds no energy and both step orders keep their energy through a late impact: only the top of the first "
+        "parabola lies up to g dt^2/8 above the sample of release"
+    )
+    bound = g * dt * dt / 8.0 / height + ROUND_OFF
+    return Check("apex_growth", "1", 0.0, bound, because, "conservation of energy")
 
 
 def _interval_check(e: float, height: float, g: float, dt: float, error: list[float], truth: float) -> Check:
@@ -102,21 +120,30 @@ def _rest_check(e: float, height: float, g: float, dt: float, truth: float) -> C
 
 
 def stack_checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Bounds for `validation.scenes.stack`, in natural units of a step."""
+    """Bounds for `validation.scenes.stack`, in natural units of a step.
+
+    Positions add up along the column, overlaps do not. A body's drift is the sum of the slips of the interfaces below
+    it, x1 each, hence n x1 at the top. An overlap belongs to one interface: if its contact is missing for one step (it
+    starts at a gap of exactly 0, which may count as open), the upper body falls relative to the lower one with at most
+    the full g, since the lower one is held or falls too, and adds x1. The next step finds the contact; more than x1
+    needs a contact that was missing twice or held too little, which is what the check is for, however high the column.
+    """
     n, g, mass = int(scene.params["n"]), scene.params["g"], scene.params["mass"]
     x1, v1 = g * dt * dt, g * dt
+    top = scene.bodies[-1].pose[scene.dimension - 1]  # heights are rounded relative to the column's
     settle = min(100.0 * n * dt, scene.duration - WINDOW)
     load = 2.0 * 0.01 * dt / WINDOW
-    moved = "n bodies may each move by what one step of free fall adds, n g dt^2"
+    moved = "each of n interfaces may slip by what one step of free fall adds, and slips add up: n g dt^2"
+    sunk = "one interface whose contact is found one step late: one step of free fall, g dt^2, whatever lies above"
     energy = "n bodies below the speed that counts as motion, v1/100 = g dt/100"
-    settles = "moving at v1/100 for longer would use up the allowed n g dt^2; and the last second must be at rest"
+    settles = "moving at v1/100 for longer would use up the drift of n g dt^2; and the last second must be at rest"
     carried = "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted"
     scatter = "a body slower than v1/100 changes its momentum by at most 2 m v1/100 a step"
     source = "static equilibrium"
     checks = [
         Check("settle_time", "s", truth["settle_time"], settle, settles, source),
         Check("drift", "m", truth["drift"], n * x1, moved, source),
-        Check("penetration", "m", truth["penetration"], n * x1, moved, source),
+        Check("penetration", "m", truth["penetration"], x1 + ROUND_OFF * top, sunk, source),
         Check("kinetic_energy", "J", truth["kinetic_energy"], n * 0.5 * mass * (0.01 * v1) ** 2, energy, source),
         Check("impulse_scatter", "1", truth["impulse_scatter"], 0.02, scatter, source),
     ]

@@ -3,8 +3,8 @@
 physics
     PASS or FAIL against the truth under the engine-blind tolerance. Nothing an engine is known for changes it.
 standing
-    of a FAIL: *explained* by a deviation law, *known* (listed with a reason), *new*, or *drifted* (it left the band
-    of its law, or passes where a FAIL is listed).
+    of a row that does not pass: *explained* by a deviation law, *known* (a finding lists it, and its value lies within
+    the finding's band), *new*, or *drifted*: it left the band of its law or of its finding, on either side.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Slot
 from validation.deviation import Deviation
-from validation.findings import Finding
+from validation.findings import Finding, Known
 
 #: A law, the value it predicts, and the band it allows.
 Prediction = tuple[Deviation, float, float]
@@ -70,44 +70,73 @@ def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot) -> list[Predi
     return [(law, *prediction) for law, prediction in said if prediction is not None]
 
 
-def judge(
-    value: float | None,
-    check: Check,
-    predictions: Iterable[Prediction],
-    finding: Finding | None,
-    has_list: bool,
-) -> Verdict:
+def judge(value: float | None, check: Check, predictions: Iterable[Prediction], known: Known, why: str = "") -> Verdict:
     """Judge one measured value.
 
     Parameters
     ----------
     predictions
         What the engine's deviation laws predict for it.
-    finding
-        Its entry in the engine's list, or None.
-    has_list
-        Whether the engine has a list at all.
+    known
+        What is known about its row.
+    why
+        Why there is no value, if there is none.
     """
-    physics = judge_physics(value, check)
-    if physics is None or value is None:
+    if check.truth is None or check.bound is None:
         return Verdict(None, None)
-    if finding is not None and finding.status == "marginal":
-        return Verdict(physics, Standing.KNOWN, f"marginal: {finding.reason.text}")
-    if physics is Physics.PASS:
-        if finding is not None and finding.status == "known":
-            return Verdict(physics, Standing.DRIFTED, f"passes, but is listed: {finding.reason.text}")
-        return Verdict(physics, None)
-    predictions = list(predictions)
+    if value is None:
+        return _without_value(known, why)
+    physics = judge_physics(value, check)
+    predictions = list(predictions) if physics is Physics.FAIL else []
     for law, centre, band in predictions:
         if abs(value - centre) <= band:
             return Verdict(physics, Standing.EXPLAINED, f"{law.because} (predicted {centre:.6g} +- {band:.1g})")
-    if finding is not None:
-        return Verdict(physics, Standing.KNOWN, finding.reason.text)
-    if predictions:
+    if predictions:  # a row that a law speaks about is its law's: no list excuses it
         law, centre, band = predictions[0]
         return Verdict(
             physics, Standing.DRIFTED, f"left the band of its law, {centre:.6g} +- {band:.1g}: {law.because}"
         )
-    if has_list:
-        return Verdict(physics, Standing.NEW, "neither listed nor explained by a law")
-    return Verdict(physics, None, "the engine has no list of findings")
+    if known.finding is not None:
+        return _against_finding(physics, value, known.finding)
+    if physics is Physics.PASS:
+        return Verdict(physics, None)
+    return _unlisted(physics, known, "neither listed nor explained by a law")
+
+
+def _without_value(known: Known, why: str) -> Verdict:
+    """A judged check must have a value, unless it is listed with the reason why there is none."""
+    finding = known.finding
+    if finding is None:
+        return _unlisted(None, known, "; ".join(filter(None, ("has no value, and is not listed as having none", why))))
+    if finding.value is None and not finding.diverged:
+        return Verdict(None, Standing.KNOWN, finding.family.reason)
+    return Verdict(None, Standing.DRIFTED, f"has no value any more; {_listed_as(finding)}")
+
+
+def _against_finding(physics: Physics | None, value: float, finding: Finding) -> Verdict:
+    if finding.value is None or not abs(value - finding.value) <= finding.band:
+        passes = "passes, but " if physics is Physics.PASS else ""
+        return Verdict(physics, Standing.DRIFTED, f"{passes}{_listed_as(finding)}")
+    marginal = "passes within the band of what is listed as failing: " if physics is Physics.PASS else ""
+    return Verdict(physics, Standing.KNOWN, f"{marginal}{finding.family.reason}")
+
+
+def _listed_as(finding: Finding) -> str:
+    if finding.value is None:
+        return f"is listed as {'diverging' if finding.diverged else 'having no value'}: {finding.family.reason}"
+    return f"is listed with {finding.value:.6g} +- {finding.band:.1g}: {finding.family.reason}"
+
+
+def _unlisted(physics: Physics | None, known: Known, why: str) -> Verdict:
+    said = "; ".join(filter(None, (why if known.expected else "", known.remark)))
+    return Verdict(physics, Standing.NEW if known.expected else None, said)
+
+
+def judge_divergence(known: Known, why: str) -> Verdict:
+    """A cell that ended in numbers that are none fails every check; *known* if it is listed as doing so."""
+    if known.finding is None:
+        said = "; ".join(filter(None, (why, known.remark)))
+        return Verdict(Physics.FAIL, Standing.NEW if known.expected else None, said)
+    if known.finding.diverged:
+        return Verdict(Physics.FAIL, Standing.KNOWN, f"{why}; {known.finding.family.reason}")
+    return Verdict(Physics.FAIL, Standing.DRIFTED, f"{why}; {_listed_as(known.finding)}")

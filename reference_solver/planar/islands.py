@@ -7,6 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
+from reference_solver.pieces import Journal
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.certificate import is_finite
 from reference_solver.planar.columns import (
@@ -158,7 +159,8 @@ def step_islands(
 ) -> int:
     """Make the step of every island; bodies change only if all stayed in their bounds."""
     islands = world.islands
-    opened = tally[OPENED]
+    opened, journal = tally[OPENED], sub.journal
+    pieces, entries, contacts = journal.used[0], journal.used[1], journal.used[2]
     rows.counts[KEPT] = 0
     outcome = MADE
     for i in range(len(bodies.kind)):
@@ -183,6 +185,7 @@ def step_islands(
         own.clock[CONFINED] = 0.0
         if outcome != MADE:
             own.clock[LEFT] = own.clock[UNSETTLED] = 0.0
+            journal.used[0], journal.used[1], journal.used[2] = pieces, entries, contacts
             rows.counts[REMEMBERED] = 0
             return outcome
         keep_remembered(rows)
@@ -283,6 +286,24 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         sub.lasting,
         pair,
         world.limit[:count],
+        journal_part(sub.journal, count),
+    )
+
+
+@inner_kernel
+def journal_part(journal: Journal, count: int) -> Journal:
+    """The journal, with room for the states of the first bodies."""
+    return Journal(
+        journal.used,
+        journal.time,
+        journal.label,
+        journal.body,
+        journal.before,
+        journal.after,
+        journal.name,
+        journal.wrench,
+        journal.pose[:count],
+        journal.twist[:count],
     )
 
 

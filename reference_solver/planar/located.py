@@ -11,6 +11,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, is_finite, open_solve, row_work
@@ -31,6 +32,7 @@ from reference_solver.planar.columns import (
     TARGET,
 )
 from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
+from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import (
     LANDED,
@@ -195,8 +197,10 @@ def sub_step(
     if end < length:
         cut_work(bodies, rows, sub, tally, end, end / length)
     enter_contacts(bodies, rows, ledger)
+    enter_sub_step(bodies, rows, sub, options, end, curved > 0.0)
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
+        enter_release(bodies, rows, sub, options, end)
     if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
         count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
@@ -235,10 +239,12 @@ def settle(
         rows.real[c, TARGET] = rows.real[c, PN] = rows.real[c, PT] = 0.0
         rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
     if approaches:
+        keep_state(sub.journal, bodies.pose, bodies.twist)
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
         enter_contacts(bodies, rows, ledger)
+        enter_settled(bodies, rows, sub, options)
     sub.clock[UNSETTLED] = 0.0
     return True
 

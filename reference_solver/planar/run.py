@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import close_step
 from reference_solver.model import Array
 from reference_solver.planar.islands import step_world
 from reference_solver.planar.kinematics import copy_vectors
@@ -34,6 +35,7 @@ def run_located(
             return k
         if not step_world(bodies, pairs, rows, problem, sub, ledger, options, tally, world):
             return k
+        close_step(sub.journal)
         if sampled:
             sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
     return steps

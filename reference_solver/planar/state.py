@@ -24,6 +24,7 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
+from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
     BODY_REALS,
@@ -131,6 +132,7 @@ class SubStep(NamedTuple):
     lasting: Lasting
     meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
     limit: Array  # (n, 4): lower and upper bounds of the centres, where they are confined [m]
+    journal: Journal
 
 
 class World(NamedTuple):
@@ -181,6 +183,7 @@ class Buffer(NamedTuple):
     offset: Indices  # (s + 1,)
     integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
+    journal: Journal
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -286,6 +289,7 @@ def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
         lasting=allocate_lasting(2, n, contacts),
         meeting=meeting,
         limit=np.zeros((n, 4)),
+        journal=allocate_journal(2, n, 0),
     )
 
 

@@ -9,10 +9,12 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
+from reference_solver.planar.entries import enter_fixed_step
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.manifolds import detect, remember
@@ -86,8 +88,11 @@ def run_steps(
         sampled = stride > 0 and (k + 1) % stride == 0
         if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(rows.real) > len(buffer.real):
             return k
+        keep_state(buffer.journal, bodies.pose, bodies.twist)
         if not step(bodies, pairs, rows, problem, options, tally):
             return k
+        enter_fixed_step(buffer.journal, bodies, rows, options)
+        close_step(buffer.journal)
         if sampled:
             sample(bodies, rows, buffer, (k + 1) // stride - 1)
     return steps

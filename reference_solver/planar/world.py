@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import Any
 
 import numpy as np
 
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
+from reference_solver.pieces import allocate_journal
 from reference_solver.planar.ledger import copy_ledger
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
@@ -54,6 +54,7 @@ class World:
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
+        self.journal = allocate_journal(2, n, 0)
 
     @property
     def pose(self) -> Array:
@@ -104,10 +105,11 @@ class World:
         return assemble(trial._bodies, trial._rows, trial._options)
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
-        state: Any = (self._bodies, self._pairs, self._rows, self._problem)
+        state = (self._bodies, self._pairs, self._rows, self._problem)
         if self._options.scheme == LOCATED:
-            own = (self._sub, self._ledger, self._options, self.tally, self._world)
-            return int(run_located(*state, *own, buffer, done, steps, stride))
+            sub = self._sub._replace(journal=self.journal)
+            own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
+            return int(run_located(*(*state, sub, *own)))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def _most_contacts(self) -> int:
@@ -116,12 +118,13 @@ class World:
     def _buffer(self, samples: int, room: int) -> Buffer:
         frames = np.zeros((samples, len(self.pose), 3))
         offset = np.zeros(samples + 1, np.int64)
-        return Buffer(frames, frames.copy(), offset, np.zeros((room, 3), np.int64), np.zeros((room, 7)))
+        names, real = np.zeros((room, 3), np.int64), np.zeros((room, 7))
+        return Buffer(frames, frames.copy(), offset, names, real, self.journal)
 
     def _doubled(self, buffer: Buffer) -> Buffer:
         """Twice the room for contacts, and what has been recorded so far."""
         bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + self._most_contacts()))
-        for old, new in zip(buffer, bigger, strict=True):
+        for old, new in zip(buffer[:5], bigger[:5], strict=True):
             new[: len(old)] = old
         return bigger
 

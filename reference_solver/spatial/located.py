@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.planar.impact import LANDED, NO_IMPACT, REBOUNDED
 from reference_solver.planar.located import NOTHING_LEFT, SERIES_PASSES, SHORT
 from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import open_solve, point_work
+from reference_solver.spatial.entries import enter_release, enter_sub_step
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
@@ -37,8 +39,9 @@ from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
-from reference_solver.stepping.clock import EVENTS, HELD, LEFT, REBOUND, count_event, open_step, weigh_event
+from reference_solver.stepping.clock import EVENTS, HELD, LEFT, OUTCOME, REBOUND, count_event, open_step, weigh_event
 from reference_solver.stepping.noise import EVENT_BUDGET
+from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import (
     CONTACT_WORK,
     LOAD_WORK,
@@ -111,14 +114,17 @@ def sub_step(
     if end < length:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
     enter_contacts(manifolds, ledger)
+    keep_state(sub.journal, bodies.pose, bodies.before)
     move_along(bodies, end, end == length and smooth == 0.0)
     if smooth > 0.0:
         end_phase(bodies, sub, tally, end)
     if pushed:
         displace(bodies, options.dt)
+    enter_sub_step(bodies, manifolds, sub, options, end)
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
-    if end < left:
+        enter_release(bodies, manifolds, sub, options, end)
+    if end < left and not (smooth == end and sub.clock[OUTCOME] == SHORTENED):
         count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
@@ -234,6 +240,7 @@ def run_located(
             return k
         if not located_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
             return k
+        close_step(sub.journal)
         if sampled:
             sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
     return steps

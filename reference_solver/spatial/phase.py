@@ -19,7 +19,7 @@ from reference_solver.spatial.operations import Spatial, displace
 from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub
-from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.clock import HELD, OUTCOME
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.phase import FAILED, begin_phase, find_phase, go_back, step_phase, write_path
@@ -131,6 +131,7 @@ def enter_phase(
         return 0.0
     copy_twists(bodies.first, bodies.twist)
     time, outcome = find_phase(space, lasting, left)
+    sub_step.clock[OUTCOME] = outcome
     if outcome == FAILED:
         copy_twists(bodies.last, bodies.twist)
         return 0.0

@@ -27,6 +27,7 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
+from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
 from reference_solver.tally import SIZE as TALLY_SIZE
@@ -152,6 +153,7 @@ class Buffer(NamedTuple):
     offset: Indices  # (s + 1,)
     names: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
+    journal: Journal
 
 
 class Detection(NamedTuple):
@@ -234,6 +236,7 @@ class SubStep(NamedTuple):
     rows: Array  # (k, 2, 3, 6): their rows at its start
     end_pose: Array  # (n, 7): poses at its end
     end_twist: Array  # (n, 6)
+    journal: Journal
 
 
 class Ledger(NamedTuple):
@@ -256,6 +259,7 @@ def allocate_sub_step(bodies: int) -> SubStep:
         rows=np.zeros((MOST_ROWS, 2, 3, 6)),
         end_pose=np.zeros((bodies, 7)),
         end_twist=np.zeros((bodies, 6)),
+        journal=allocate_journal(3, 0, 0),
     )
 
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
+from reference_solver.spatial.entries import enter_fixed_step
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
@@ -76,8 +78,11 @@ def run_steps(
         sampled = stride > 0 and (k + 1) % stride == 0
         if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + POINTS * len(room) > len(buffer.real):
             return k
+        keep_state(buffer.journal, bodies.pose, bodies.twist)
         if not step(bodies, detection, room, memory, problem, options, tally):
             return k
+        enter_fixed_step(buffer.journal, bodies, room[: detection.found[MANIFOLDS]], options)
+        close_step(buffer.journal)
         if sampled:
             sample(bodies, room[: detection.found[MANIFOLDS]], buffer, (k + 1) // stride - 1)
     return steps

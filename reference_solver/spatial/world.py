@@ -9,6 +9,7 @@ import numpy as np
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
+from reference_solver.pieces import allocate_journal
 from reference_solver.planar.state import LOCATED, options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
@@ -47,6 +48,7 @@ class World:
         self._options = options(settings, needs)
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
+        self.journal = allocate_journal(3, n, 0)
         initialise(self._bodies)
 
     @property
@@ -79,10 +81,8 @@ class World:
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
         if self._options.scheme == LOCATED:
-            made = run_located(
-                *state, self._sub_step, self._ledger, self._options, self.tally, buffer, done, steps, stride
-            )
-            return int(made)
+            sub = self._sub_step._replace(journal=self.journal)
+            return int(run_located(*state, sub, self._ledger, self._options, self.tally, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def contacts(self) -> Contacts:
@@ -115,12 +115,13 @@ class World:
             offset=np.zeros(samples + 1, np.int64),
             names=np.zeros((room, 3), np.int64),
             real=np.zeros((room, 10)),
+            journal=self.journal,
         )
 
     def _doubled(self, buffer: Buffer) -> Buffer:
         """Twice the room for contacts, and what has been recorded so far."""
         bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + self._most_points))
-        for old, new in zip(buffer, bigger, strict=True):
+        for old, new in zip(buffer[:5], bigger[:5], strict=True):
             new[: len(old)] = old
         return bigger
 

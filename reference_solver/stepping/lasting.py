@@ -57,6 +57,7 @@ class Lasting(NamedTuple):
     direction: Array  # (k, T): unit vector of the slip, where it slips
     begun: Array  # (k, T): the same at the start of the phase
     impulse: Array  # (k, D): integral of the force on B over the phase, world axes [N s]
+    moment: Array  # (k, V - D): of it about the world's origin [N m s]
     work: Array  # (k, 2): work on the relative motion and of moving surfaces [J]
     base: Array  # (n, P): poses at the start of the phase
     before: Array  # (n, V): twists there
@@ -110,6 +111,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         direction=np.zeros((k, t)),
         begun=np.zeros((k, t)),
         impulse=np.zeros((k, dimension)),
+        moment=np.zeros((k, v - dimension)),
         work=np.zeros((k, 2)),
         base=np.zeros((n, p)),
         before=np.zeros((n, v)),

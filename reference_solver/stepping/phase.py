@@ -247,6 +247,8 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
     for k in range(lasting.size[CONTACTS]):
         for d in range(lasting.impulse.shape[1]):
             lasting.impulse[k, d] = 0.0
+        for d in range(lasting.moment.shape[1]):
+            lasting.moment[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
     lasting.length[0] = length
     weigh_stage(bodies, lasting, 0, length)
@@ -292,6 +294,13 @@ def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> Non
         return
     for d in range(lasting.impulse.shape[1]):
         lasting.impulse[k, d] += size * lasting.frame[k, row, d]
+    axes, b = lasting.impulse.shape[1], lasting.body[k, 1]
+    for d in range(lasting.moment.shape[1]):
+        # The row's lever about the centre of B, and the centre's about the origin.
+        first, second = ((d + 1) % 3, (d + 2) % 3) if axes == 3 else (0, 1)
+        lever = bodies.pose[b, first] * lasting.frame[k, row, second]
+        lever -= bodies.pose[b, second] * lasting.frame[k, row, first]
+        lasting.moment[k, d] += size * (lever + lasting.jacobian[k, 1, row, axes + d])
     lasting.work[k, 0] += size * lasting.speed[k, row]
     for side in range(2):
         i = lasting.body[k, side]

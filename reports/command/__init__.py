@@ -3,7 +3,7 @@
 One module per group of subcommands; importing it registers them.
 """
 
-from reports.command import benching, certifying, comparing, inspecting, reporting, running
+from reports.command import accepting, benching, certifying, comparing, inspecting, reporting, running, showing
 from reports.command.group import main
 
-__all__ = ["benching", "certifying", "comparing", "inspecting", "main", "reporting", "running"]
+__all__ = ["accepting", "benching", "certifying", "comparing", "inspecting", "main", "reporting", "running", "showing"]

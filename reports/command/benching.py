@@ -15,19 +15,22 @@ from typing import Any
 import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from adapters.scene import SceneError
 from reports import speed
+from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, parameter, request_from, selection
 from reports.progress import run_plan
+from reports.stages import stage
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.primary import PRIMARY
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.units import Unit, prepared
 from validation.cells import Slot, parse_dt
-from validation.store import Run, Store, StoreError
+from validation.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
 #: Two bench runs on one machine must agree within their intervals on this share of their ratios.
@@ -36,15 +39,16 @@ AGREEMENT = 0.9
 
 @main.command()
 @selection
-@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes for the errors; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=click.FloatRange(1.0), help="Per cell [s].")
+@click.option("--jobs", default=0, type=JOBS, help="Worker processes for the errors; 0: one per core.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--seed", type=int, help="Of the random order; drawn and printed if not given.")
 @click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--brief", is_flag=True, help="Print no tables: they stand in OUT/bench and in the report.")
 @AS_JSON
 @OUT
-def bench(out: Path, as_json: bool, **options: Any) -> None:
+def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     """Measure errors and times of SCENES over steps and iterations; time at equal error, scaling, overhead.
 
     Errors come first, in worker processes; then everything is timed in a lane of its own. --quick takes under two
@@ -61,9 +65,9 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
     if not cells:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(f"{len(cells)} cells")
+        click.echo(json.dumps({"cells": len(cells)}) if as_json else f"{len(cells)} cells")
         return
-    store = Store(out)
+    store = Store(folder(out))
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
     title = f"bench {request.suite}: {' '.join(request.scenes)}"
@@ -71,9 +75,10 @@ def bench(out: Path, as_json: bool, **options: Any) -> None:
         store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False
     )
     limits = QUICK if request.suite == "quick" else FULL
-    _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
+    with stage(console, "timing"):
+        _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
     store.finish(run)
-    _show(store, run, out, as_json, console)
+    _show(store, run, out, as_json, brief, console)
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(0 if agrees else 1)
@@ -85,7 +90,7 @@ def _earlier(store: Store, name: str | None) -> Run | None:
         return None
     found = [run for run in reading.bench_runs(store) if name in ("latest", run.id)]
     if not found:
-        raise StoreError(f"against: there is no bench run {name!r} in {store.path}")
+        raise MissingError(f"against: there is no bench run {name!r} in {store.path}")
     return found[-1]
 
 
@@ -116,18 +121,26 @@ def _time(store: Store, run: Run, units: Sequence[Unit], limits: Limits, seed: i
     store.set_protocol(run, protocol)
 
 
-def _show(store: Store, run: Run, out: Path, as_json: bool, console: Console) -> None:
+def _show(store: Store, run: Run, out: Path, as_json: bool, brief: bool, console: Console) -> None:
     tables, protocol = speed.tables_of(store, run), store.protocol(run) or {}
     written = speed.write_all(out, run, protocol, tables, speed.raw_of(store, run))
     if as_json:
         click.echo(speed.as_json(run, protocol, tables))
-    for table in speed.level_tables(tables["work_points"]):
+    console.print(speed.quality_line(tables["timings"]), highlight=False)
+    if speed.busy(tables["timings"]):
+        console.print(Text(speed.busy(tables["timings"]), style="bold"))
+    if not brief:
+        _print_tables(tables, console)
+    console.print(f"run {run.id}, seed {protocol.get('seed')}; written: {written[0].parent}", highlight=False)
+
+
+def _print_tables(tables: speed.Tables, console: Console) -> None:
+    busy = speed.busy(tables["timings"])
+    for table in speed.level_tables(tables["work_points"], ranked=not busy):
         console.print(table)
-    console.print("*: cheapest; -: not reached in this sweep; 1/240 x30: step and iterations that did it", style="dim")
+    console.print(Text(speed.KEY, style="dim"))
     console.print(speed.overhead_table(tables["overhead"]))
     console.print(speed.scaling_table(tables["scaling"], tables["scaling_fits"]))
-    console.print(speed.quality_line(tables["timings"]), highlight=False)
-    console.print(f"run {run.id}, seed {protocol.get('seed')}; written: {written[0].parent}", highlight=False)
 
 
 def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:

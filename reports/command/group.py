@@ -1,33 +1,76 @@
-"""The group of all subcommands, and what they share: wrong calls become one line and exit code 2."""
+"""The group of all subcommands, and what they share: what goes wrong becomes one line and a status of its own."""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from adapters.engine import EngineError
+from adapters.isolation import IsolationError
+from adapters.plain import one_line
 from adapters.scene import SceneError
-from validation.store import StoreError
+from reports.command import statuses
+from validation.findings import FindingsError
+from validation.store import MissingError, StoreError
+from validation.workers import LimitError
 
 #: Everything a wrong call can raise; the command turns each into one line and exit code 2.
-WRONG_CALL = (SceneError, EngineError, StoreError)
+WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
+#: What the machine refuses: a process, its memory.
+TOO_LITTLE = (LimitError, IsolationError)
 OUT = click.option("--out", default="crosscheck-out", show_default=True, type=Path, help="Folder for results.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 
 
 class _Group(click.Group):
-    """Prints what a wrong call raises as one line and exits with 2."""
+    """Prints what goes wrong as one line; the status says whose fault it was (`reports.command.statuses`)."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        try:
+            try:
+                return super().main(*args, **kwargs)
+            finally:
+                sys.stdout.flush()  # a full disk must be noticed here, not while the interpreter ends
+        except WRONG_CALL as error:
+            _leave(str(error), statuses.WRONG_CALL)
+        except TOO_LITTLE as error:
+            _leave(str(error), statuses.INCOMPLETE)
+        except StoreError as error:
+            _leave(str(error), statuses.RESULTS)
+        except BrokenPipeError:
+            _silence_stdout()  # whoever read our output has seen enough, but not all of it
+            sys.exit(statuses.RESULTS)
+        except OSError as error:
+            _silence_stdout()
+            _leave(f"{error.filename or 'the output'}: {error.strerror or error}", statuses.RESULTS)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except WRONG_CALL as error:
-            click.echo(f"crosscheck: {error}", err=True)
-            ctx.exit(2)
         except KeyboardInterrupt:
-            ctx.exit(130)
+            ctx.exit(statuses.INTERRUPTED)
+
+
+def _leave(line: str, status: int) -> NoReturn:
+    with contextlib.suppress(OSError):  # if stderr is gone as well, the status still says it
+        click.echo(f"crosscheck: {one_line(line, 2000)}", err=True)
+    sys.exit(status)
+
+
+def _silence_stdout() -> None:
+    """Point stdout at nothing: what is left in its buffer would fail again when the interpreter ends."""
+    try:
+        descriptor = sys.stdout.fileno()
+    except (OSError, ValueError):  # not a file at all, as under a test runner
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, descriptor)
+    os.close(null)
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})

@@ -6,12 +6,13 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import click
+from rich.console import Console
 
 from adapters import registry
-from reports import listing
+from reports import listing, tables
+from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from validation.store import Store
 
@@ -29,60 +30,20 @@ def list_(what: str, as_json: bool, out: Path) -> None:
         data = {"scenes": listing.scenes, "engines": listing.engines, "checks": listing.checks}[what]()
     if as_json:
         click.echo(json.dumps(data, indent=1))
-        return
-    for entry in data:
-        click.echo(_entry_line(entry))
-
-
-def _entry_line(entry: dict[str, Any]) -> str:
-    head = str(entry.get("name") or entry.get("id"))
-    rest = [_flat(value) for key, value in entry.items() if key not in ("name", "id") and value not in ("", [], None)]
-    return f"{head:<24} " + " | ".join(rest)
-
-
-def _flat(value: Any) -> str:
-    return (
-        ", ".join(map(str, value))
-        if isinstance(value, list)
-        else f"{value:g}"
-        if isinstance(value, float)
-        else str(value)
-    )
+    else:
+        tables.listed(what, data, Console())
 
 
 @main.command()
-@click.argument("name")
+@click.argument("name", shell_complete=names_of_either)
 @AS_JSON
 def describe(name: str, as_json: bool) -> None:
     """Describe a scene or an engine: law, parameters, checks with reasons; profiles, settings, quirks."""
     data = listing.describe(name)
-    click.echo(json.dumps(data, indent=1, default=str) if as_json else _outline(data))
-
-
-def _outline(data: Any, indent: int = 0) -> str:
-    pad = "  " * indent
-    if isinstance(data, dict):
-        return "\n".join(
-            f"{pad}{key}: {_inline(value)}" if _is_plain(value) else f"{pad}{key}:\n{_outline(value, indent + 1)}"
-            for key, value in data.items()
-        )
-    if isinstance(data, list):
-        return "\n".join(f"{pad}- {_inline(item)}" if _is_plain(item) else _item(item, indent) for item in data)
-    return "\n".join(pad + line for line in str(data).splitlines())
-
-
-def _item(item: Any, indent: int) -> str:
-    if isinstance(item, dict) and all(_is_plain(v) for v in item.values()):
-        return "  " * indent + "- " + "; ".join(f"{k} {_inline(v)}" for k, v in item.items() if v != "")
-    return "  " * indent + "-\n" + _outline(item, indent + 1)
-
-
-def _is_plain(value: Any) -> bool:
-    return not isinstance(value, dict | list) and "\n" not in str(value)
-
-
-def _inline(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    if as_json:
+        click.echo(json.dumps(data, indent=1, default=str))
+    else:
+        tables.described(data, Console())
 
 
 @main.command()
@@ -90,12 +51,15 @@ def _inline(value: Any) -> str:
 def doctor(as_json: bool) -> None:
     """Check the installation: engines, versions, CPU, caches, and whose packages are on this path."""
     data = listing.doctor()
-    click.echo(json.dumps(data, indent=1) if as_json else _outline(data))
+    if as_json:
+        click.echo(json.dumps(data, indent=1))
+    else:
+        tables.health(data, Console())
     sys.exit(1 if any("is not ours" in problem for problem in data["problems"]) else 0)
 
 
 @main.command("check-adapter")
-@click.argument("name")
+@click.argument("name", shell_complete=engine_names)
 @AS_JSON
 def check_adapter_(name: str, as_json: bool) -> None:
     """Run the conformance checks on the adapter of an engine; exits with 1 if it breaks one."""

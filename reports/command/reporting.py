@@ -2,48 +2,59 @@
 
 from __future__ import annotations
 
+import json
+import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
+from rich.console import Console
 
 from adapters.engine import EngineError
-from reports.command.group import OUT, main
+from reports.command.files import FILE, writable
+from reports.command.group import AS_JSON, OUT, main
+from reports.stages import stage
 from validation.store import Store
 
 
 @main.command()
 @click.argument("run", default="latest")
-@click.option("-o", "--output", type=Path, help="File to write; OUT/report.html by default.")
+@click.option("-o", "--output", type=FILE, help="File to write; OUT/report.html by default.")
+@click.option("--open", "show", is_flag=True, help="Also open it in the browser.")
+@AS_JSON
 @OUT
-def report(run: str, output: Path | None, out: Path) -> None:
+def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) -> None:
     """Write the report of RUN (the latest by default) as one HTML file that needs no network.
 
     The last bench in the same store, if there is one, becomes its part about speed.
     """
+    path = writable(output or out / "report.html", "output")
     with _extra("report"):
         from reports.page import load_source, render
-    source = load_source(out, run)
-    path = output or out / "report.html"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(render(source), encoding="utf-8")
-    click.echo(str(path))
+    with stage(Console(stderr=True), "report"):
+        source = load_source(out, run)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(render(source), encoding="utf-8")
+    click.echo(json.dumps({"run": source.run.id, "path": str(path)}) if as_json else str(path))
+    if show and not webbrowser.open(path.resolve().as_uri()):
+        click.echo(f"crosscheck: open: no browser was found; the report is {path}", err=True)
 
 
 @main.command()
 @click.argument("run", default="latest")
-@click.option("-o", "--output", type=Path, help="File to write; OUT/crosscheck-<run>.zip by default.")
+@click.option("-o", "--output", type=FILE, help="File to write; OUT/crosscheck-<run>.zip by default.")
+@AS_JSON
 @OUT
-def bundle(run: str, output: Path | None, out: Path) -> None:
+def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
     """Write RUN (the latest by default) as one archive: raw rows, environment, report, citation, checksums."""
     with _extra("bundle"):
         from reports.bundle import write_bundle
     store = Store(out, create=False)
-    path = output or out / f"crosscheck-{store.run(run).id}.zip"
+    path = writable(output or out / f"crosscheck-{store.run(run).id}.zip", "output")
     store.close()
-    write_bundle(out, run, path)
-    click.echo(str(path))
+    names = write_bundle(out, run, path)
+    click.echo(json.dumps({"path": str(path), "files": names}) if as_json else str(path))
 
 
 @contextmanager

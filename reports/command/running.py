@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
 
-from adapters import registry
+from adapters.engine import EngineError
+from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports import exports
+from reports.command import statuses
+from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import request_from, selection
-from reports.findings import finding_line, lines
-from reports.matrix import legend, matrix_of, table_of, versions_of
+from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
-from validation.acceptance import accept as write_findings
-from validation.cells import Slot, slot_from_dict
+from reports.summary import show
+from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
+from validation.posed import pinned, resolve
 from validation.rows import Row, rows_of
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
@@ -28,38 +31,48 @@ from validation.workers import TIMEOUT, run_cells
 
 @main.command()
 @selection
-@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=click.FloatRange(1.0), help="Per cell [s].")
+@click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--all-findings", is_flag=True, help="Print every finding, not the worst of each family.")
-@click.option("--junit", type=Path, help="Also write JUnit XML to this file.")
-@click.option("--markdown", type=Path, help="Also write a Markdown summary to this file.")
+@click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
+@click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run SCENES (names, globs or files; all by default) and judge them.
 
-    Exits with 1 if a row is new, drifted, INVALID, CRASHED or TIMED OUT, with 2 if the call is wrong.
+    Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
+    if not all of it ran.
     """
     console = Console(stderr=True)
     options["full"] = not options["quick"]
+    for name in ("junit", "markdown"):
+        if options[name]:
+            writable(options[name], name)
     request = request_from(options)
     chosen = slots(request)
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
+    folder(out)
+    for name in request.scenes:
+        for note in resolve(name).notes:
+            console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done))
+    rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     _show(rows, out, as_json, console, options)
-    sys.exit(1 if any(row.alarming for row in rows) else 0)
+    absent = missing(options["engine"])
+    for line in absent:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    sys.exit(statuses.verdict(any(row.alarming for row in rows), done.finished and not absent))
 
 
 def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
@@ -71,54 +84,58 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    for line in lines(plain, None if options["all_findings"] else 1):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(table_of(matrix_of(plain), versions_of(plain)))
-    console.print(legend(), style="dim", markup=False)
-    console.print(f"{len(rows)} rows; written: {', '.join(str(path) for path in written.values())}", markup=False)
+    show(plain, console, files=written.values())
 
 
 @main.command("run-cell")
 @click.option("--batch", is_flag=True, help="Read one JSON object per line, write one observation per line.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=click.FloatRange(1.0), help="Per cell [s].")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
+@click.option("--jobs", default=1, show_default=True, type=JOBS, help="Worker processes.")
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
-    """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive."""
-    text = sys.stdin.read()
-    cells = [_slot(line) for line in (text.splitlines() if batch else [text]) if line.strip()]
-    if not cells:
+    """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive.
+
+    With --batch every line gets an answer: an observation, or {"line": N, "error": "..."} for a line that is no slot
+    or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
+    """
+    text = sys.stdin.buffer.read().decode(errors="replace")
+    cells: dict[Slot, int] = {}
+    wrong, left = 0, 0
+
+    def refuse(line: int, error: str) -> None:
+        click.echo(json.dumps({"line": line, "error": error}))
+
+    for number, line in enumerate(text.splitlines() if batch else [text], start=1):
+        if not line.strip():
+            continue
+        try:
+            cells.setdefault(_slot(line), number)
+        except (SceneError, EngineError) as error:
+            if not batch:
+                raise
+            wrong += 1
+            refuse(number, str(error))
+    if not cells and not wrong:
         raise SceneError("slot: nothing on stdin")
-    for observation in run_cells(cells, jobs, timeout):
+
+    def leave(slot: Slot, reason: str) -> None:
+        nonlocal left
+        left += 1
+        refuse(cells[slot], f"left: {reason}")
+
+    for observation in run_cells(list(cells), jobs, timeout, leave=leave):
         click.echo(json.dumps(observation.as_dict(), default=str))
+    sys.exit(statuses.WRONG_CALL if wrong else statuses.INCOMPLETE if left else statuses.FINE)
 
 
 def _slot(text: str) -> Slot:
+    """Slot in a line of JSON, as one that can be run: its scene is pinned, its parameters are the scene's own."""
     try:
         data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise SceneError(f"slot: is not JSON: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"slot: is not JSON: {one_line(error)}") from None
     if not isinstance(data, dict):
         raise SceneError("slot: must be a JSON object")
     slot = slot_from_dict(data)
-    registry.find(slot.engine)
+    slot = replace(slot, scene=pinned(slot.scene))
+    prepare(slot)
     return slot
-
-
-@main.command()
-@click.argument("run", default="latest")
-@click.option("--engine", multiple=True, required=True, metavar="E", help="Whose list to write (repeat for more).")
-@OUT
-def accept(run: str, engine: tuple[str, ...], out: Path) -> None:
-    """List the FAIL rows of RUN as known findings; only rows for which reasons.toml has a reason.
-
-    Writes validation/findings/<engine>.csv of this checkout. Read the diff before you commit it: a finding is
-    listed to be shown, not to be hidden.
-    """
-    for name in engine:
-        registry.find(name)
-    counts, unexplained = write_findings(exports.load_rows(out, run), engine)
-    for name, count in counts.items():
-        click.echo(f"{name}: {count} rows listed")
-    for row in unexplained:
-        click.echo("no reason is written for: " + finding_line(row.as_dict()), err=True)
-    sys.exit(1 if unexplained else 0)

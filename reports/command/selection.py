@@ -9,10 +9,39 @@ import click
 
 from adapters import registry
 from adapters.scene import SceneError
-from validation.cells import parse_dt
+from reports.command.completion import engine_names, scene_names
+from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.plan import Request
-from validation.posed import is_file
+from validation.posed import is_file, pinned
 from validation.scenes import matching
+
+
+class _Seconds(click.ParamType):
+    """A limit of time: a number of seconds that a run can wait for."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            seconds = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number of seconds", param, ctx)
+        if not 1.0 <= seconds <= LONGEST:  # NaN is neither
+            self.fail(f"{value} is not between 1 and {LONGEST:g} seconds", param, ctx)
+        return seconds
+
+
+#: Longest time that a cell may be given [s]: a week.
+LONGEST = 7 * 86400.0
+SECONDS = _Seconds()
+#: More workers than any machine has cores are a slip of the pen; how many are started the machine decides.
+JOBS = click.IntRange(0, 4096)
+
+
+def missing(engines: Sequence[str]) -> list[str]:
+    """A line for each engine that was named and is not there: its cells have no answer."""
+    absent = [found for found in map(registry.find, engines) if found.engine is None]
+    return [f"engine: {found.name} was named, but did not run: {found.reason}" for found in absent]
 
 
 def parameter(text: str) -> tuple[str, float]:
@@ -29,7 +58,7 @@ def parameter(text: str) -> tuple[str, float]:
 def _scene_names(arguments: Sequence[str]) -> list[str]:
     names: list[str] = []
     for argument in arguments or ["*"]:
-        names += [argument] if is_file(argument) else [scene.name for scene in matching(argument)]
+        names += [pinned(argument)] if is_file(argument) else [scene.name for scene in matching(argument)]
     return list(dict.fromkeys(names))
 
 
@@ -55,14 +84,27 @@ def request_from(options: dict[str, Any]) -> Request:
 def selection(command: Callable[..., None]) -> Callable[..., None]:
     """Options that choose cells; shared by every command that runs some."""
     options = (
-        click.argument("scenes", nargs=-1),
+        click.argument("scenes", nargs=-1, shell_complete=scene_names),
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
-        click.option("--engine", multiple=True, metavar="E", help="Only this engine (repeat for more)."),
+        click.option(
+            "--engine",
+            multiple=True,
+            metavar="E",
+            shell_complete=engine_names,
+            help="Only this engine (repeat for more).",
+        ),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
         click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
-        click.option("--iterations", multiple=True, type=click.IntRange(1), help="Replace the profile's count."),
-        click.option("--ulp", multiple=True, type=int, help="Move the start by this many units in the last place."),
+        click.option(
+            "--iterations", multiple=True, type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count."
+        ),
+        click.option(
+            "--ulp",
+            multiple=True,
+            type=click.IntRange(-MOST_ULPS, MOST_ULPS),
+            help="Move the start by this many units in the last place.",
+        ),
         click.option("--quick/--full", "quick", default=True, help="Suite; quick is the default."),
     )
     for option in reversed(options):

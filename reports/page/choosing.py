@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from reports.cures import Change, changes, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
 from reports.speed import duration
 from reports.wording import mark_of, number
-from validation.cells import Observation, format_dt
+from validation.cells import format_dt
 from validation.plan import QUICK_DT
-from validation.tracks import SHOWN
 
 #: Scene, dimension.
 Line = tuple[str, int]
@@ -133,16 +133,6 @@ def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
 
 
 @dataclass(frozen=True)
-class Change:
-    """A setting that differs between two profiles of one engine."""
-
-    name: str
-    before: str
-    after: str
-    because: str
-
-
-@dataclass(frozen=True)
 class Cure:
     """An engine as shipped on one scene, and the profile that does better, with what it changes."""
 
@@ -156,6 +146,7 @@ class Cure:
     before_text: str
     after_text: str
     changes: list[Change]
+    paste: str
 
 
 def cures(source: Source, shipped: str = "default", better: str = "tuned") -> list[Cure]:
@@ -189,45 +180,11 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     return Cure(
         scene, dimension, engine, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
-        _changes(source.observations, scene, dimension, engine, shipped, better),
+        changes(source.observations, scene, dimension, engine, shipped, better),
+        pasteable(source.observations, scene, dimension, engine, shipped, better),
     )  # fmt: skip
 
 
 def _value(row: Plain) -> str:
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     return f"{number(row['value'], 4)}{unit} (truth {number(row['truth'], 4)}, tolerance {number(row['tolerance'], 2)})"
-
-
-def settings_of(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
-) -> list[Mapping[str, Any]]:
-    """Settings of a profile on a scene, as its representative cell (else its first one) got them."""
-    own = [
-        o for o in observations
-        if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
-        and o.settings and o.slot.iterations is None
-    ]  # fmt: skip
-    shown = [o for o in own if o.slot.params == SHOWN.get(scene, ())]
-    return list((shown or own)[0].settings) if own else []
-
-
-def _changes(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
-) -> list[Change]:
-    old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
-    new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
-    changes = []
-    for name, setting in new.items():
-        if name not in old or old[name]["value"] != setting["value"]:
-            was = setting_text(old[name]["value"]) if name in old else "as shipped"
-            changes.append(Change(name, was, setting_text(setting["value"]), setting["because"]))
-    return changes
-
-
-def setting_text(value: Any) -> str:
-    """A setting's value as people write it."""
-    if isinstance(value, bool) or value is None:
-        return str(value)
-    if isinstance(value, list | tuple):
-        return " ".join(setting_text(item) for item in value)
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -10,14 +10,16 @@ from typing import Any
 from adapters import registry
 from adapters.engine import EngineFacts
 from adapters.planted_faults import CAUGHT_BY
-from reports.page.choosing import Cure, cures, setting_text
+from reports.cures import setting_text
+from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
 from reports.page.source import Source
 from reports.page.verdicts import slug
 from reports.wording import number
-from validation.cells import Observation
+from validation.cells import Observation, slot_from_dict
 from validation.deviations import deviations_of
-from validation.findings import listed, reasons
+from validation.findings import Unsupported
+from validation.findings.files import findings_of
 
 #: The engine that is ours; its failures are shown first.
 OURS = "reference"
@@ -126,7 +128,7 @@ def _sheet(source: Source, engine: str) -> EngineSheet:
     versions = ", ".join(dict.fromkeys(o.engine_version for o in own if o.engine_version))
     return EngineSheet(
         engine, slug("fairness", engine), registry.facts(engine), versions, sheets, _laws(source, engine),
-        _listed(source, engine), listed(engine) is not None, _unsupported(own),
+        _listed(source, engine), findings_of(engine) is not None, _unsupported(own),
     )  # fmt: skip
 
 
@@ -205,15 +207,25 @@ def _laws(source: Source, engine: str) -> list[Law]:
 
 
 def _listed(source: Source, engine: str) -> list[Listed]:
-    """Reasons that speak about this engine; the wildcard of an engine is everybody's."""
+    """Families and reasons of unsupported cells of this engine, with how many rows of this run carry them."""
+    findings = findings_of(engine)
+    if findings is None:
+        return []
     rows = [row["reason"] for row in source.of(engine=engine) if row["standing"] == "known"]
     found = []
-    for reason in reasons().values():
-        if reason.engine in (engine, "*"):
-            where = f"{reason.profile} on {reason.scene}/{reason.metric}"
-            count = sum(reason.text in text for text in rows)
-            found.append(Listed(reason.id, reason.text, reason.source, where, count))
+    for family in findings.families.values():
+        where = f"{', '.join(family.profiles)} on {family.scene}/{', '.join(family.metrics)}"
+        count = sum(family.reason in text for text in rows)
+        found.append(Listed(family.id, family.reason, f"{family.source} (releases {family.releases})", where, count))
+    for entry in findings.unsupported:
+        where = f"{entry.scene} {f'{entry.dimension}-D' if entry.dimension else ''}".strip()
+        count = sum(1 for row in source.of(engine=engine, outcome="unsupported") if _is_about(row, entry))
+        found.append(Listed(entry.id, entry.reason, entry.source, where, count))
     return found
+
+
+def _is_about(row: Mapping[str, Any], entry: Unsupported) -> bool:
+    return row["standing"] == "known" and entry.covers(slot_from_dict(row["slot"]))
 
 
 def _unsupported(observations: Iterable[Observation]) -> list[tuple[str, str, int]]:

@@ -11,12 +11,10 @@ import pandas as pd
 
 from reports import speed
 from validation.bench import reading
-from validation.cells import Observation, Outcome, Slot
-from validation.posed import resolve
+from validation.cells import Observation, Slot
 from validation.rows import rows_of
 from validation.store import Run, Store
 from validation.tracks import Recording
-from validation.verdicts import judge_physics
 
 Plain = Mapping[str, Any]
 
@@ -100,21 +98,5 @@ def load_source(folder: Path, run: str = "latest") -> Source:
 
 def _bench(store: Store, run: Run) -> Bench:
     observations = store.observations(run)
-    rows = [row for observation in observations for row in _physics(observation)]
+    rows = [row for observation in observations for row in speed.physics(observation)]
     return Bench(run, store.protocol(run) or {}, speed.tables_of(store, run), observations, rows)
-
-
-def _physics(observation: Observation) -> list[Plain]:
-    """Rows of a bench's cell that say PASS or FAIL and nothing else: standings belong to the run, and cost time."""
-    slot = observation.slot
-    canonical = resolve(slot.scene)
-    scene = canonical.scene(slot.dimension, dict(slot.params))
-    same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
-    rows: list[Plain] = []
-    for check in canonical.checks(scene, slot.dt):
-        value = observation.metrics.get(check.metric, (None, ""))[0]
-        physics = judge_physics(value, check) if observation.outcome is Outcome.OK else None
-        error = None if value is None or check.truth is None else value - check.truth
-        row = {"metric": check.metric, "error": error, "tolerance": check.bound, "standing": None}
-        rows.append({**same, **row, "physics": physics and physics.value, "outcome": observation.outcome.value})
-    return rows

@@ -26,23 +26,25 @@ SAID = {
     "invalid": ("!", "INVALID"),
     "crashed": ("!", "CRASHED"),
     "timed_out": ("!", "TIMED OUT"),
+    "missing": ("!", "MISSING"),
     "unsupported": ("–", "n/a"),
     "not_installed": ("–", "not installed"),
     "none": ("–", "no value"),
 }
-ALARMS = ("crashed", "timed_out", "invalid", "new", "drifted")
+ALARMS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
 #: What the words mean, for the legend.
 MEANINGS = {
     "pass": "within the stated tolerance of the truth",
     "explained": "fails, and lies where a law of the engine predicts it",
-    "known": "fails, and is listed with a reason",
-    "fail": "fails; the engine has no list of known findings",
-    "new": "fails, and nobody knew",
-    "drifted": "left the band of its law, or passes although listed",
+    "known": "fails, and is listed with a reason and this value",
+    "fail": "fails; findings are not listed for this engine, or not outside the quick suite",
+    "new": "fails or has no value, and nobody knew",
+    "drifted": "left the band of its law or of what is listed",
     "diverged": "the state exploded or stopped being finite",
     "invalid": "the profile does not realise what it declares (see receipts)",
     "crashed": "the engine raised an error or killed its process",
     "timed_out": "no answer in time",
+    "missing": "planned, but the run has nothing of it",
     "unsupported": "cannot be asked of this engine",
     "not_installed": "the engine is not installed here",
     "none": "the engine does not report what this needs",

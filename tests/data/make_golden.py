@@ -76,7 +76,7 @@ def main() -> None:
     files = {
         "base": lines,
         "flip": moved(lines, 2.0 * row["tolerance"], "fail"),
-        "drift": moved(lines, 1e-3 * row["tolerance"], "pass"),
+        "drift": moved(lines, 2e-2 * row["tolerance"], "pass"),
         "slow": slower(lines, 2.0),
         "noise": slower(moved(lines, 0.5 * row["floor"], "pass"), 1.01),
     }

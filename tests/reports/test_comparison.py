@@ -1,6 +1,7 @@
 """compare finds each planted change of the golden set, and nothing else."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,7 @@ def test_text_and_markdown_name_the_row_and_the_command():
     assert "1 verdict flipped (1 regressed)" in text
     assert "crosscheck run bounce" in text
     markdown = compare("base", "flip", "--markdown").stdout
-    assert "| verdict flipped | worse | chipmunk/tuned bounce 2-D" in markdown
+    assert "| verdict flipped | worse | 1 | chipmunk/tuned bounce 2-D" in markdown
 
 
 def test_rows_of_one_side_only_are_said(tmp_path):
@@ -71,8 +72,8 @@ def test_rows_of_one_side_only_are_said(tmp_path):
     shorter.write_text("\n".join(lines[1:]) + "\n")
     base = GOLDEN / "base.jsonl"
     result = CliRunner().invoke(main, ["compare", str(base), str(shorter), "--json"])
-    assert [c["kind"] for c in json.loads(result.stdout)["changes"]] == ["only in A"]
-    assert result.exit_code == 1
+    assert [(c["kind"], c["regressed"]) for c in json.loads(result.stdout)["changes"]] == [("not run in B", False)]
+    assert result.exit_code == 0  # what was not run is no regression
     result = CliRunner().invoke(main, ["compare", str(base), str(shorter), "--json", "--only-changed"])
     assert json.loads(result.stdout)["changes"] == []
 
@@ -84,3 +85,47 @@ def test_a_file_of_something_else_is_refused_in_one_line(tmp_path, content):
     result = CliRunner().invoke(main, ["compare", str(path), str(path)])
     assert result.exit_code == 2
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def planted(tmp_path, change):
+    """Path of the golden rows with ``change(row)`` done to every row that has a value and a tolerance."""
+    lines = [json.loads(line) for line in (GOLDEN / "base.jsonl").read_text().splitlines()]
+    for line in lines:
+        if line.get("value") is not None and line.get("tolerance"):
+            line |= {"floor": None, **change(line)}
+            line["error"] = None if line["truth"] is None else line["value"] - line["truth"]
+    path = tmp_path / "planted.jsonl"
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path
+
+
+@pytest.mark.parametrize(("share", "counts"), [(1e-9, False), (0.009, False), (0.02, True)])
+def test_a_change_counts_from_a_hundredth_of_the_tolerance_on(tmp_path, share, counts):
+    base = planted(tmp_path, lambda row: {})
+    before = tmp_path / "before.jsonl"
+    base.rename(before)
+    after = planted(tmp_path, lambda row: {"value": row["value"] + share * row["tolerance"]})
+    result = CliRunner().invoke(main, ["compare", str(before), str(after), "--json"])
+    found = json.loads(result.stdout)["changes"]
+    assert bool(found) == counts
+    assert {c["kind"] for c in found} <= {"value changed"}
+
+
+def test_one_unit_in_the_last_place_is_nothing(tmp_path):
+    before = planted(tmp_path, lambda row: {}).rename(tmp_path / "before.jsonl")
+    after = planted(tmp_path, lambda row: {"value": math.nextafter(row["value"], math.inf)})
+    result = CliRunner().invoke(main, ["compare", str(before), str(after)])
+    assert result.exit_code == 0 and "nothing changed" in result.stdout
+
+
+def test_the_head_says_runs_and_versions_and_lines_are_families(tmp_path):
+    before = planted(tmp_path, lambda row: {}).rename(tmp_path / "before.jsonl")
+    change = {"run": "other", "engine_version": "9.9"}
+    after = planted(tmp_path, lambda row: change | {"value": row["value"] + 0.5 * row["tolerance"]})
+    text = CliRunner().invoke(main, ["compare", str(before), str(after)]).stdout
+    assert text.startswith("A: ") and "\nB: other (" in text and "-> 9.9" in text
+    every = json.loads(CliRunner().invoke(main, ["compare", str(before), str(after), "--json"]).stdout)
+    lines = [line for line in text.splitlines() if line.startswith("value changed")]
+    metrics = {(c["engine"], c["profile"], c["scene"], c["metric"].partition("[")[0]) for c in every["changes"]}
+    assert len(lines) <= 2 * len(metrics) and len(metrics) <= len(every["changes"])
+    assert every["b"]["versions"] and set(every["b"]["versions"].values()) == {"9.9"}

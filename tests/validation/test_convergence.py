@@ -41,7 +41,13 @@ def test_the_standard_error_covers_the_order_of_noisy_errors():
         ([1e-3 / dt for dt in DTS], Limit.NOT),
         ([0.1, 0.9, 0.05, 0.8, 0.2], Limit.NOISY),
         ([0.1, 0.05], Limit.NOISY),
+        ([0.1, 1e-16], Limit.NOISY),
         ([], Limit.NOISY),
+        # A lucky phase at the finest step, and errors that rise on the way, are no convergence.
+        ([3.5e-5, 3.2e-4, 2.2e-14], Limit.NOISY),
+        ([1e-3, 1e-3, 1e-15], Limit.NOISY),
+        ([1e-3, 1e-15, 1e-3, 1e-15, 1e-15], Limit.NOISY),
+        ([1e-3, 1e-15, 1e-15], Limit.TRUTH),
     ],
 )
 def test_each_kind_of_sequence_gets_its_verdict(errors, limit):

@@ -1,80 +1,277 @@
-"""The lists of known findings: every row has a reason with a source, and lists are written only with reasons."""
+"""Findings: every member has a value, a band and a family with a reason; nothing wider is read from a file."""
 
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
-from validation import findings
-from validation.acceptance import accept
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import Observation, Outcome, Slot, parse_dt
+from validation.findings import Family, Finding, FindingsError, files, known_of, row_key
+from validation.plan import in_quick_suite
 from validation.rows import rows_of
+from validation.scenes import CATALOGUE
+from validation.studies import STUDIES
 
 ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
-SLOT = Slot("incline", (("ratio", 0.99),), 2, "mujoco", "default", 1 / 240)
-
-
-def observed(slot, **metrics):
-    values = {name: (value, "") for name, value in metrics.items()}
-    return Observation(slot, "cell", 1, "0", Outcome.OK, metrics=values)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_every_listed_row_is_covered_by_the_reason_it_names(engine):
-    for key, finding in (findings.listed(engine) or {}).items():
-        assert finding.reason.covers(engine, key), key
-        assert finding.status in ("known", "marginal")
-
-
-def test_every_reason_has_a_text_and_a_source():
-    for reason in findings.reasons().values():
-        assert len(reason.text) > 20
-        assert reason.source
-        assert reason.engine in ENGINES
-
-
-def test_a_fail_without_a_written_reason_is_refused(tmp_path):
-    slot = replace(SLOT, engine="nameless")
-    rows = rows_of("run", [observed(slot, creep=1.0)])
-    counts, unexplained = accept(rows, ["nameless"], tmp_path)
-    assert counts == {"nameless": 0}
-    assert [row.metric for row in unexplained] == ["creep"]
+SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)
+FAMILY = """
+[[family]]
+id = "creeps"
+profiles = ["default"]
+scene = "incline"
+metrics = ["creep"]
+reason = "it is soft"
+source = "its manual"
+releases = ">=1.0,<2"
+"""
+UNSUPPORTED = """
+[[unsupported]]
+id = "planar"
+profiles = ["*"]
+scene = "*"
+dimension = 3
+reason = "it is planar"
+source = "its manual"
+"""
+HEAD = ",".join(files.COLUMNS) + "\n"
+MEMBER = "creeps,default,2,ratio=0.99,1/240,,creep,0.5,1e-3\n"
 
 
 @pytest.fixture
-def listing(tmp_path, monkeypatch):
-    """Lists live in an empty folder, and one reason covers everything of the engine `nameless`."""
-    reason = findings.Reason("why", "a long enough text", "manual", "nameless", "*", "*", "*")
-    monkeypatch.setattr(findings, "reasons", lambda: {"why": reason})
-    monkeypatch.setattr(findings, "files", lambda name: tmp_path)
-    findings.listed.cache_clear()
-    yield
-    findings.listed.cache_clear()
+def findings(tmp_path, monkeypatch):
+    """Write the findings of the engine `nameless`, and let them be found."""
+
+    def write(families=FAMILY, members=HEAD + MEMBER):
+        folder = tmp_path / "nameless"
+        folder.mkdir(exist_ok=True)
+        (folder / files.FAMILIES).write_text(families)
+        (folder / files.MEMBERS).write_text(members)
+        files.findings_of.cache_clear()
+        return folder
+
+    monkeypatch.setattr(files, "OURS", tmp_path)
+    yield write
+    files.findings_of.cache_clear()
 
 
-def test_a_listed_row_is_known_and_keeps_its_fail(tmp_path, listing):
-    slot = replace(SLOT, engine="nameless")
-    assert [(r.physics, r.standing) for r in rows_of("run", [observed(slot, creep=1.0)])] == [("fail", None)]
-    accept(rows_of("run", [observed(slot, creep=1.0)]), ["nameless"], tmp_path)
-    (row,) = rows_of("run", [observed(slot, creep=1.0)])
-    assert (row.physics, row.standing) == ("fail", "known")
-    assert not row.alarming
-    (row,) = rows_of("run", [observed(slot, creep=0.0)])
-    assert (row.physics, row.standing) == ("pass", "drifted")
-    assert row.alarming
+def observed(slot, version="1.2", outcome=Outcome.OK, **metrics):
+    values = {name: (value, "") for name, value in metrics.items()}
+    return Observation(slot, "cell", 1, version, outcome, metrics=values)
 
 
-def test_rows_of_slots_that_did_not_run_stay_listed(tmp_path, listing):
-    first = replace(SLOT, engine="nameless")
-    second = replace(first, dimension=3)
-    for slot in (first, second):
-        accept(rows_of("run", [observed(slot, creep=1.0)]), ["nameless"], tmp_path)
-    assert {key[2] for key in findings.listed("nameless")} == {"2", "3"}
+def judged(slot, version="1.2", outcome=Outcome.OK, **metrics):
+    (row,) = rows_of("run", [observed(slot, version, outcome, **metrics)])
+    return row.physics, row.standing, row.alarming
 
 
-def test_outside_the_quick_suite_a_reason_s_pattern_makes_a_fail_known_and_a_pass_nothing_special(tmp_path, listing):
-    accept([], ["nameless"], tmp_path)
-    slot = replace(SLOT, engine="nameless", dt=1 / 1000)
-    assert [(r.physics, r.standing) for r in rows_of("run", [observed(slot, creep=1.0)])] == [("fail", "known")]
-    assert [(r.physics, r.standing) for r in rows_of("run", [observed(slot, creep=0.0)])] == [("pass", None)]
-    inside = replace(slot, dt=1 / 240)
-    assert [(r.physics, r.standing) for r in rows_of("run", [observed(inside, creep=1.0)])] == [("fail", "new")]
+# ---- what is committed ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
+    findings = files.findings_of(engine)
+    assert findings is not None
+    for family in findings.families.values():
+        assert len(family.reason) > 20 and family.source
+        assert SpecifierSet(family.releases)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_member_is_a_row_that_the_quick_suite_states(engine):
+    for key in files.findings_of(engine).members:
+        profile, scene, dimension, params, dt, iterations, metric = key
+        numbers = dict(pair.split("=") for pair in params.split())
+        given = tuple((name, float(value)) for name, value in numbers.items())
+        slot = Slot(
+            scene, given, int(dimension), engine, profile, parse_dt(dt), int(iterations) if iterations else None
+        )
+        assert in_quick_suite(slot), key
+        canonical = CATALOGUE[scene]
+        stated = {check.metric for check in canonical.checks(canonical.scene(slot.dimension, dict(given)), slot.dt)}
+        assert metric in stated | {study.name for study in STUDIES if study.scene == scene}, key
+
+
+# ---- what a row's standing is --------------------------------------------------------------------------------------
+
+
+def test_a_listed_row_is_known_within_its_band_and_drifted_outside_it_on_either_side(findings):
+    findings()
+    assert judged(SLOT, creep=0.5005) == ("fail", "known", False)
+    assert judged(SLOT, creep=0.502) == ("fail", "drifted", True)
+    assert judged(SLOT, creep=0.498) == ("fail", "drifted", True)
+    assert judged(SLOT, creep=0.0) == ("pass", "drifted", True)
+
+
+def test_a_fail_that_is_not_listed_is_new_though_a_family_would_cover_it(findings):
+    findings(members=HEAD)
+    assert judged(SLOT, creep=0.5) == ("fail", "new", True)
+
+
+def test_a_check_without_a_value_is_new_unless_listed_as_having_none(findings):
+    findings(members=HEAD)
+    assert judged(SLOT) == (None, "new", True)
+    findings(members=HEAD + "creeps,default,2,ratio=0.99,1/240,,creep,,\n")
+    assert judged(SLOT) == (None, "known", False)
+    assert judged(SLOT, creep=0.0) == ("pass", "drifted", True)
+
+
+def test_a_divergence_is_known_only_if_listed_as_one(findings):
+    findings()
+    assert judged(SLOT, outcome=Outcome.DIVERGED) == ("fail", "drifted", True)
+    findings(members=HEAD + "creeps,default,2,ratio=0.99,1/240,,creep,diverged,\n")
+    assert judged(SLOT, outcome=Outcome.DIVERGED) == ("fail", "known", False)
+    assert judged(SLOT, creep=0.5) == ("fail", "drifted", True)
+
+
+def test_a_family_holds_for_its_releases_and_no_others(findings):
+    findings()
+    assert judged(SLOT, "2.0", creep=0.5) == ("fail", "new", True)
+    assert judged(SLOT, "not a version", creep=0.5) == ("fail", "new", True)
+    assert judged(SLOT, "1.9.1+5f3a", creep=0.5) == ("fail", "known", False)
+
+
+def test_outside_the_quick_suite_a_family_gives_no_standing_and_what_no_family_is_like_is_new(findings):
+    findings()
+    outside = replace(SLOT, dt=1 / 1000)
+    assert judged(outside, creep=0.5) == ("fail", None, False)
+    assert judged(outside, creep=0.0) == ("pass", None, False)
+    assert judged(replace(outside, profile="other"), creep=0.5) == ("fail", "new", True)
+    assert "it is soft" in known_of(outside, "creep", "1.2", files.findings_of("nameless")).remark
+
+
+def test_unsupported_cells_must_be_known_ones(findings):
+    findings(families=UNSUPPORTED, members=HEAD)
+    spatial = replace(SLOT, dimension=3)
+    assert judged(spatial, outcome=Outcome.UNSUPPORTED) == (None, "known", False)
+    assert judged(SLOT, outcome=Outcome.UNSUPPORTED) == (None, "new", True)
+
+
+def test_an_engine_without_findings_is_unlisted(findings):
+    assert judged(SLOT, creep=0.5) == ("fail", None, False)
+    assert judged(SLOT) == (None, None, False)
+
+
+@pytest.mark.parametrize("outcome", ["invalid", "crashed", "timed_out", "missing"])
+def test_a_cell_without_an_answer_is_an_alarm_though_its_rows_are_listed(findings, outcome):
+    findings()
+    assert judged(SLOT, outcome=Outcome(outcome), creep=0.5) == (None, None, True)
+
+
+def test_a_planned_cell_without_an_observation_has_its_rows_and_is_an_alarm(findings):
+    findings()
+    other = replace(SLOT, params=(("ratio", 0.9),))
+    rows = rows_of("run", [observed(other, creep=0.0)], [other, SLOT])
+    assert [(row.outcome, row.metric, row.alarming) for row in rows] == [
+        ("ok", "creep", False), ("missing", "creep", True)]  # fmt: skip
+
+
+# ---- what a file may say -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("families", "members", "said"),
+    [
+        (FAMILY.replace('["default"]', '["*"]').replace('["creep"]', '["*"]'), HEAD, "name one of them"),
+        (FAMILY.replace('"incline"', '"*"'), HEAD, "scene must be the name of one scene"),
+        (FAMILY.replace('"it is soft"', '" "'), HEAD, "reason is missing"),
+        (FAMILY.replace('source = "its manual"\n', ""), HEAD, "source is missing"),
+        (FAMILY.replace(">=1.0,<2", "about 1"), HEAD, "no version specifier"),
+        (FAMILY.replace("releases", "release"), HEAD, "release is no field"),
+        (FAMILY.replace('["creep"]', '"creep"'), HEAD, "metrics must be a list of names"),
+        (FAMILY + FAMILY, HEAD, "family creeps stands twice"),
+        ("[[family", HEAD, "families.toml"),
+        (UNSUPPORTED.replace("3", "4"), HEAD, "dimension must be 2 or 3"),
+        (FAMILY, "a,b\n", "the first line must be"),
+        (FAMILY, HEAD + MEMBER + MEMBER, "stands twice"),
+        (FAMILY, HEAD + MEMBER.replace("creeps", "slides"), "there is no family 'slides'"),
+        (FAMILY, HEAD + MEMBER.replace("default", "tuned"), "does not speak about tuned creep"),
+        (FAMILY, HEAD + MEMBER.replace(",creep,", ",acceleration,"), "does not speak about default acceleration"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", ""), "must be numbers"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "inf"), "must be finite"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0"), "the band above 0"),
+        (FAMILY, HEAD + "creeps,default\n", "has 2 fields"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_one_line_that_names_the_entry(findings, families, members, said):
+    folder = findings(families, members)
+    with pytest.raises(FindingsError) as caught:
+        files.read("nameless", folder)
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("profiles", ['["reference"]', '["classical", "reference"]'])
+def test_rows_of_a_profile_that_promises_a_solution_cannot_be_listed_by_hand_either(findings, profiles):
+    folder = findings(FAMILY.replace('["default"]', profiles), HEAD)
+    with pytest.raises(FindingsError, match="never listed"):
+        files.read("reference", folder)
+    folder = findings(FAMILY.replace('["default"]', '["*"]'), HEAD + MEMBER.replace("default", "reference"))
+    with pytest.raises(FindingsError, match="never listed"):
+        files.read("reference", folder)
+
+
+def test_what_is_written_is_read_again_within_a_twentieth_of_its_band(findings):
+    folder = findings()
+    family = files.read("nameless", folder).families["creeps"]
+    members = {
+        row_key(replace(SLOT, iterations=n), "creep"): Finding(family, value, band)
+        for n, (value, band) in enumerate([(1.23456789e-5, 1e-9), (-0.98765, 1e-2), (1e6, 3.0), (0.0, 1e-12)], start=1)
+    } | {row_key(SLOT, "creep"): Finding(family, None, diverged=True)}
+    members[row_key(replace(SLOT, dimension=3), "creep")] = Finding(family, None)
+    files.write_members(folder, members)
+    again = files.read("nameless", folder).members
+    assert again.keys() == members.keys()
+    for key, finding in members.items():
+        assert again[key].diverged == finding.diverged
+        if finding.value is None:
+            assert again[key].value is None
+        else:
+            assert abs(again[key].value - finding.value) <= 0.05 * finding.band
+            assert again[key].band == pytest.approx(finding.band, rel=0.05)
+
+
+def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):
+    folder = findings()
+    family = Family("quoted", ("a", "b"), "stack", ("drift",), 'it "slips" \\ \t by 3 µm', "its manual", "==1.*")
+    files.add_families(folder, [family])
+    assert files.read("nameless", folder).families["quoted"] == family
+
+
+# ---- findings that another package brings --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package that brings findings of `nameless`, and must not be imported for them."""
+    folder = tmp_path / "site" / "nameless_crosscheck"
+    (folder / "data" / "findings").mkdir(parents=True)
+    (folder / "__init__.py").write_text("raise RuntimeError('imported')\n")
+    (folder / "data" / "findings" / files.FAMILIES).write_text(FAMILY)
+    (folder / "data" / "findings" / files.MEMBERS).write_text(HEAD + MEMBER)
+    monkeypatch.syspath_prepend(str(folder.parent))
+
+    def named(value):
+        monkeypatch.setattr(files, "entry_points", lambda group: [EntryPoint("nameless", value, group)])
+        files.findings_of.cache_clear()
+
+    yield named
+    files.findings_of.cache_clear()
+
+
+def test_an_engine_s_package_brings_its_findings_without_being_imported(package):
+    package("nameless_crosscheck:data.findings")
+    assert judged(SLOT, creep=0.5) == ("fail", "known", False)
+
+
+@pytest.mark.parametrize("value", ["nameless_crosscheck:nothing", "nameless_crosscheck", "not_there:findings", "a b:c"])
+def test_an_entry_point_that_names_no_folder_is_refused_in_one_line(package, value):
+    package(value)
+    with pytest.raises(FindingsError, match="is not a folder of an installed package"):
+        files.findings_of("nameless")
+
+
+def test_two_folders_for_one_engine_are_refused(package, findings):
+    findings()
+    package("nameless_crosscheck:data.findings")
+    with pytest.raises(FindingsError, match="one of them must go"):
+        files.findings_of("nameless")

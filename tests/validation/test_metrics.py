@@ -93,20 +93,6 @@ angles = st.floats(-math.pi, math.pi)
 coordinates = st.floats(-2.0, 2.0)
 
 
-@given(coordinates, coordinates, angles, angles, st.floats(0.1, 1.0), st.floats(0.1, 1.0))
-def test_boxes_are_separated_exactly_if_an_edge_line_parts_their_corners(x, y, turn_a, turn_b, hx, hy):
-    a, b = Box((hx, hy)), Box((0.4, 0.7))
-    pose_a, pose_b = np.array([0.0, 0.0, turn_a]), np.array([x, y, turn_b])
-    gap = separation(a, pose_a[None], b, pose_b[None])[0]
-    best = -np.inf  # brute force: over all edge normals of both boxes, the gap between the projections of corners
-    ca, cb = corners(a, pose_a), corners(b, pose_b)
-    for turn in (turn_a, turn_b):
-        for k in range(4):
-            n = np.array([math.cos(turn + k * math.pi / 2), math.sin(turn + k * math.pi / 2)])
-            best = max(best, (cb @ n).min() - (ca @ n).max())
-    assert gap == pytest.approx(best, abs=1e-12)
-
-
 @given(coordinates, coordinates, st.floats(0.1, 1.0))
 def test_round_shapes_and_half_spaces_are_exact(x, y, r):
     disc, floor = Disc(r), HalfSpace((0.6, 0.8), 0.25)

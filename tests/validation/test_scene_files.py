@@ -1,11 +1,19 @@
 """Scene files are refused with one line that names the field."""
 
 import json
+import math
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from adapters.engine import Contacts
 from adapters.scene import SceneError
-from validation.scene_files import json_schema, load_scene
+from adapters.trajectory import ContactRecord, Trajectory
+from reports.findings import refusals
+from validation.cells import Observation, Outcome, Slot
+from validation.rows import rows_of
+from validation.scene_files import canonical_from_file, json_schema, load_scene
 
 GOOD = """
 name = "drop"
@@ -26,6 +34,8 @@ pose = [0.0, 1.0, 0.0]
 restitution = 0.5
 friction = 0.3
 """
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def read(tmp_path, text, name="scene.toml"):
@@ -73,3 +83,150 @@ def test_a_missing_file_is_named(tmp_path):
 
 def test_the_schema_names_every_field():
     assert {"name", "dimension", "gravity", "duration", "bodies", "pairs"} <= set(json_schema()["properties"])
+
+
+def stated(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return canonical_from_file(path)
+
+
+def test_a_missing_inertia_is_derived_from_shape_and_mass_and_said(tmp_path):
+    canonical = stated(tmp_path, GOOD.replace("mass = 1.0\ninertia = 0.125", "mass = 3.0"))
+    assert canonical.scene(2).bodies[1].inertia == pytest.approx(0.5 * 3.0 * 0.25)
+    assert canonical.notes == ("ball.inertia: 0.375 kg m^2, of a uniform disc; none was given",)
+
+
+def test_a_density_gives_mass_and_inertia_and_says_so(tmp_path):
+    canonical = stated(tmp_path, GOOD.replace("mass = 1.0\ninertia = 0.125", "density = 2.0"))
+    body = canonical.scene(2).bodies[1]
+    assert body.mass == pytest.approx(2.0 * math.pi * 0.25)
+    assert body.inertia == pytest.approx(0.5 * body.mass * 0.25)
+    assert [note.partition(":")[0] for note in canonical.notes] == ["ball.mass", "ball.inertia"]
+
+
+def test_nothing_is_said_where_everything_is_given(tmp_path):
+    assert stated(tmp_path, GOOD).notes == ()
+
+
+def test_a_normal_is_normalised_and_keeps_its_offset(tmp_path):
+    canonical = stated(tmp_path, GOOD.replace("normal = [0.0, 1.0]", "normal = [0.0, 5.0], offset = 0.25"))
+    shape = canonical.scene(2).bodies[0].shape
+    assert shape.normal == (0.0, 1.0) and shape.offset == 0.25
+    assert "length 5" in canonical.notes[0]
+
+
+@pytest.mark.parametrize(("angle", "normal"), [("0.0", (0.0, 1.0)), ("0.3", (-math.sin(0.3), math.cos(0.3)))])
+def test_a_half_space_is_tilted_by_its_angle(tmp_path, angle, normal):
+    shape = stated(tmp_path, GOOD.replace("normal = [0.0, 1.0]", f"angle = {angle}")).scene(2).bodies[0].shape
+    assert shape.normal == pytest.approx(normal, abs=1e-15)
+
+
+CHECK = """
+[[checks]]
+quantity = "ball.vy"
+value = -0.981
+tolerance = 1e-3
+at = 0.1
+because = "g t"
+[[checks]]
+quantity = "ball.angle"
+value = 0.0
+tolerance = 1e-9
+"""
+
+
+def falling(scene, spin=0.0):
+    """Exact free fall of the ball, sampled at 1/100 s."""
+    t = np.arange(51) / 100.0
+    pose, twist = np.zeros((51, 2, 3)), np.zeros((51, 2, 3))
+    pose[:, 1, 1], twist[:, 1, 1] = 1.0 - 0.5 * 9.81 * t * t, -9.81 * t
+    pose[:, 1, 2], twist[:, 1, 2] = np.arctan2(np.sin(spin * t), np.cos(spin * t)), spin
+    rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0981), 0.0)] * 51, 2)
+    return Trajectory(t, pose, twist, ContactRecord(np.arange(51), np.arange(52), rows), 0.01, "completed")
+
+
+def judged(canonical, trajectory):
+    scene = canonical.scene(2)
+    measured = canonical.measure(scene, trajectory)
+    checks = [check for check in canonical.checks(scene, trajectory.dt) if check.truth is not None]
+    return {check.metric: abs(measured[check.metric][0] - check.truth) <= check.bound for check in checks}
+
+
+def test_numbers_that_a_user_states_are_judged(tmp_path):
+    canonical = stated(tmp_path, GOOD + CHECK)
+    found = judged(canonical, falling(canonical.scene(2)))
+    assert found["at[0.1 s][ball.vy]"] and found["final[ball.angle]"]
+    found = judged(canonical, falling(canonical.scene(2), spin=20.0))
+    assert found["at[0.1 s][ball.vy]"] and not found["final[ball.angle]"]
+    wrong = stated(tmp_path, GOOD + CHECK.replace("-0.981", "-0.983"))
+    assert not judged(wrong, falling(wrong.scene(2)))["at[0.1 s][ball.vy]"]
+
+
+def test_places_angles_velocities_and_forces_are_shown(tmp_path):
+    canonical = stated(tmp_path, GOOD)
+    measured = canonical.measure(canonical.scene(2), falling(canonical.scene(2), spin=20.0))
+    assert measured["final[ball.y]"][0] == pytest.approx(1.0 - 0.5 * 9.81 * 0.25)
+    assert measured["final[ball.vy]"][0] == pytest.approx(-9.81 * 0.5)
+    assert measured["final[ball.angle]"][0] == pytest.approx(10.0)  # more than one turn
+    assert measured["final[ball.omega]"][0] == 20.0
+    assert measured["final[ball.fy]"][0] == pytest.approx(9.81)
+    shown = {c.metric: c.unit for c in canonical.checks(canonical.scene(2), 0.01) if c.truth is None}
+    assert shown["final[ball.fy]"] == "N" and shown["final[ball.angle]"] == "rad"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("mass = 1.0", "mass = 1.0\ndensity = 2.0", "ball.density"),
+        ("mass = 1.0", "density = -2.0", "ball.density"),
+        ("normal = [0.0, 1.0]", "normal = [0.0, 0.0]", "floor.shape.normal"),
+        ("normal = [0.0, 1.0]", "normal = [0.0, 1.0], angle = 0.1", "its normal or by its angle"),
+        (", normal = [0.0, 1.0]", "", "its normal or by its angle"),
+        ("ball.vy", "cube.vy", "checks.0.quantity: 'cube.vy' names no body"),
+        ("ball.vy", "ball.vz", "checks.0.quantity: 'vz' is not one of"),
+        ("ball.vy", "floor/ball.vy", "only a force is between two bodies"),
+        ("at = 0.1", "at = 0.9", "checks.0.at: 0.9 s is after the end"),
+        ("tolerance = 1e-3", "tolerance = 0.0", "checks.0.tolerance"),
+        ("ball.vy", "ball.fy", "checks.0.at: a force is a mean"),
+        ("ball.angle", "ball.vy", "checks.1.at"),
+    ],
+)
+def test_a_wrong_statement_is_named_in_one_line(tmp_path, old, new, named):
+    text = (GOOD + CHECK).replace(old, new, 1)
+    if named == "checks.1.at":
+        text, named = text + "at = 0.1\n", "'ball.vy' is stated 2 times"
+    with pytest.raises(SceneError) as caught:
+        read(tmp_path, text)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_an_engine_refuses_is_unsupported_in_one_line_and_no_alarm(tmp_path):
+    path = tmp_path / "space.toml"
+    path.write_text(
+        GOOD.replace("dimension = 2", "dimension = 3")
+        .replace("gravity = [0.0, -9.81]", "gravity = [0.0, 0.0, -9.81]")
+        .replace("normal = [0.0, 1.0]", "normal = [0.0, 0.0, 1.0]")
+        .replace('type = "disc"', 'type = "sphere"')
+        .replace("inertia = 0.125", "inertia = [0.1, 0.1, 0.1]")
+        .replace("pose = [0.0, 1.0, 0.0]", "pose = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]")
+    )
+    slot = Slot(str(path), (), 3, "chipmunk", "default", 1 / 240)
+    refused = Observation(slot, "cell", 1, "7", Outcome.UNSUPPORTED, "chipmunk is planar")
+    rows = rows_of("run", [refused])
+    assert rows and not any(row.alarming for row in rows)
+    assert list(refusals([row.as_dict() for row in rows])) == [f"UNSUPPORTED: chipmunk {path}: chipmunk is planar"]
+
+
+def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
+    canonical = stated(tmp_path, text)
+    scene = canonical.scene(2)
+    ramp, box = scene.bodies
+    height = float(np.dot(ramp.shape.normal, box.pose[:2])) - box.shape.half_extents[0]
+    assert height == pytest.approx(0.0, abs=1e-15)  # it touches the ramp
+    (check,) = (check for check in canonical.checks(scene, 1 / 240) if "[[checks]]" in check.source)
+    slide = 9.81 * (math.sin(0.3) - 0.1 * math.cos(0.3))
+    assert check.truth == pytest.approx(math.cos(0.3) * slide * scene.duration, abs=5e-4)
+    assert len(canonical.notes) == 2

@@ -125,8 +125,9 @@ def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LE
     """Per series and error level: the cheapest point that was run with at most that error; never between points.
 
     Columns: `SERIES`, ``level``; ``cost``, ``cost_low``, ``cost_high``, ``cost_corrected``, ``error``, ``dt``,
-    ``iterations``, ``slot``; ``rank`` (1 is the cheapest of its scene, dimension and level), ``times_cheapest``;
-    ``reason`` where no point reaches the level.
+    ``iterations``, ``slot``; ``rank`` (1 is the cheapest of its scene, dimension and level), ``tied`` (its interval
+    overlaps that of the cheapest, so that the two are not told apart), ``times_cheapest``; ``reason`` where no point
+    reaches the level.
     """
     rows = []
     for names, group in grouped(points, SERIES):
@@ -176,12 +177,29 @@ def _ranked(table: pd.DataFrame, column: str, factor: str) -> pd.DataFrame:
     if len(table):
         grouped = table.groupby(["scene", "dimension", "level"])[column]
         table["rank"] = grouped.rank(method="min")
+        table["tied"] = _tied(table, column)
         best = grouped.transform("min")
         table[factor] = np.where(
             best > 0.0, table[column] / best.where(best > 0.0), np.where(table[column] == 0, 1, np.inf)
         )
         table.loc[table[column].isna(), factor] = math.nan
     return table
+
+
+def _tied(table: pd.DataFrame, column: str) -> pd.Series:
+    """Which rows are not told apart from the best of their scene, dimension and level.
+
+    Costs carry the bootstrap interval of their median: two that overlap are a tie. Errors are deterministic: only
+    equal ones are.
+    """
+    tied = table["rank"] == 1
+    if column != "cost":
+        return tied
+    for _, group in table.groupby(["scene", "dimension", "level"]):
+        best = group[group["rank"] == 1]
+        if len(best):
+            tied.loc[group.index] = group["cost_low"] <= best["cost_high"].max()
+    return tied
 
 
 def _empty_per_step(summary: pd.DataFrame) -> dict[tuple[Any, ...], float]:

@@ -99,12 +99,12 @@ def bounce_law(profile: str, metric: str) -> Law:
 def start_overlap_law(scene: Scene, dt: float) -> tuple[float, float] | None:
     """Deepest overlap of the tuned column: half the slop it starts with.
 
-    The band is n g dt^2, the motion that the engine-blind tolerance grants any column, here about that start.
+    The band is g dt^2, the motion that the engine-blind tolerance grants any interface, here about that start.
     """
     start = {s.name: s.value for s in tuned_profile(needs(scene), dt)}["start_overlap"]
     if scene.dimension != 2 or start == 0.0:
         return None
-    return start, (len(scene.bodies) - 1) * math.hypot(*scene.gravity) * dt * dt
+    return start, math.hypot(*scene.gravity) * dt * dt
 
 
 def touching_start_law(scene: Scene, dt: float) -> tuple[float, float] | None:

@@ -1,118 +1,173 @@
-"""Known findings: FAIL rows that are listed with a reason, and cells that are known to be unsupported.
+"""Known findings: families of rows that do not pass, each member with its value and band, each family with a reason.
 
-``<engine>.csv`` lists the FAIL rows of the quick suite, one per line (status only, no values); ``reasons.toml`` holds
-the reasons, each with the pattern of rows it speaks about and a source, and the patterns of cells that are
-unsupported. An engine without a list is *unlisted*: its FAILs have no standing and do not fail the command.
+    family    one engine, one scene, the profiles and metrics it speaks about, reason, source, releases it holds for
+    member    one row of the quick suite: the value that was found, and the band within which it is the same finding
+
+A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and
+whether it passes or fails. A member without a value says that the check has none on this row, and its family why.
+Rows outside the quick suite have no members: a family says what they are like, it gives them no standing.
+
+Ours stand in ``validation/findings/<engine>/``; the package of another engine brings its own (`validation.findings.
+files`). An engine without findings is *unlisted*: its FAILs have no standing and do not fail the command.
 """
 
 from __future__ import annotations
 
-import csv
-import tomllib
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from functools import cache
-from importlib.resources import files
-from pathlib import Path
+
+from packaging.specifiers import SpecifierSet
+from packaging.version import InvalidVersion
 
 from validation.cells import Slot, format_dt
 from validation.plan import in_quick_suite
 
-COLUMNS = ("profile", "scene", "dimension", "params", "dt", "iterations", "metric", "status", "reason")
+#: Identity of a row within its engine: profile, scene, dimension, params, dt, iterations, metric.
 Key = tuple[str, ...]
+#: Profiles that promise a solution: what fails there is a defect of ours, and no reason makes it known.
+NEVER_LISTED = frozenset({("reference", "reference")})
+
+
+class FindingsError(ValueError):
+    """A file of findings is wrong; one line that names file and entry."""
 
 
 @dataclass(frozen=True)
-class Reason:
-    """Why a group of rows fails."""
+class Family:
+    """Rows that fail for one reason.
+
+    Parameters
+    ----------
+    profiles, metrics
+        Names; ``("*",)`` is all of them, but never for both. A metric with an index is named without it.
+    reason, source
+        The mechanism in one sentence, and where it is documented, read or measured.
+    releases
+        Versions of the engine it holds for, as a version specifier (``>=3.2.7,<3.3``).
+    """
 
     id: str
-    text: str
-    source: str
-    engine: str
-    profile: str
+    profiles: tuple[str, ...]
     scene: str
-    metric: str
-    dimension: str = "*"
-    params: str = "*"
-    unsupported: bool = False
+    metrics: tuple[str, ...]
+    reason: str
+    source: str
+    releases: str
 
-    def covers(self, engine: str, key: Key) -> bool:
-        """Whether this reason speaks about the row with ``key`` (see `row_key`) of ``engine``."""
-        profile, scene, dimension, params, _dt, _iterations, metric = key
-        pairs = (
-            (engine, self.engine),
-            (profile, self.profile),
-            (scene, self.scene),
-            (metric, self.metric),
-            (dimension, self.dimension),
-            (params, self.params),
+    def covers(self, key: Key) -> bool:
+        """Whether this family speaks about a row of its engine."""
+        profile, scene, metric = key[0], key[1], key[6].partition("[")[0]
+        return scene == self.scene and _among(profile, self.profiles) and _among(metric, self.metrics)
+
+    def holds_for(self, version: str) -> bool:
+        """Whether it was found in this release of the engine."""
+        try:
+            return SpecifierSet(self.releases).contains(version, prereleases=True)
+        except InvalidVersion:
+            return False
+
+
+@dataclass(frozen=True)
+class Unsupported:
+    """Cells that an engine cannot be asked, and why; ``"*"`` and 0 mean any scene and any dimension."""
+
+    id: str
+    profiles: tuple[str, ...]
+    scene: str
+    dimension: int
+    reason: str
+    source: str
+
+    def covers(self, slot: Slot) -> bool:
+        """Whether the engine cannot be asked this slot."""
+        return (
+            _among(slot.profile, self.profiles)
+            and self.scene in ("*", slot.scene)
+            and self.dimension in (0, slot.dimension)
         )
-        return all(fnmatchcase(value, pattern) for value, pattern in pairs)
+
+
+def _among(name: str, names: tuple[str, ...]) -> bool:
+    return name in names or "*" in names
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A known row: ``known`` (listed, fails), ``marginal`` (listed, may do either) or ``pattern``.
+    """A member of a family: what was found on one row.
 
-    ``pattern`` is a row outside the quick suite, which is not listed one by one: a FAIL is known if a written reason
-    covers it, a PASS is nothing special.
+    Parameters
+    ----------
+    value
+        In the metric's unit; None where the row has no value.
+    band
+        It is the same finding as long as it is this close.
+    diverged
+        The cell ended in numbers that are none.
     """
 
-    status: str
-    reason: Reason
+    family: Family
+    value: float | None
+    band: float = 0.0
+    diverged: bool = False
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that is known about one engine."""
+
+    engine: str
+    families: Mapping[str, Family]
+    unsupported: tuple[Unsupported, ...]
+    members: Mapping[Key, Finding]
+
+    def family_of(self, key: Key) -> Family | None:
+        """First family that speaks about a row."""
+        return next((family for family in self.families.values() if family.covers(key)), None)
+
+    def unsupported_by(self, slot: Slot) -> Unsupported | None:
+        """Why this slot cannot be asked, if that is known."""
+        return next((entry for entry in self.unsupported if entry.covers(slot)), None)
 
 
 def row_key(slot: Slot, metric: str) -> Key:
-    """Identity of a row within its engine's list."""
+    """Identity of a row within its engine's findings."""
     iterations = "" if slot.iterations is None else str(slot.iterations)
     dt = format_dt(slot.dt)
     return (slot.profile, slot.scene, str(slot.dimension), slot.params_text(), dt, iterations, metric)
 
 
-@cache
-def reasons() -> dict[str, Reason]:
-    """All reasons by id, in the order of the file: the first that covers a row is its reason."""
-    data = tomllib.loads(files(__name__).joinpath("reasons.toml").read_text(encoding="utf-8"))
-    return {entry["id"]: Reason(**entry) for entry in data.get("reason", [])}
+@dataclass(frozen=True)
+class Known:
+    """What is known about one row before it is judged.
+
+    Parameters
+    ----------
+    finding
+        Its entry, if there is one that holds for the release that ran.
+    expected
+        Whether a row that does not pass must have an entry: its engine has findings, and no family says of a row
+        outside the quick suite what it is like.
+    remark
+        What else is to be said: the family of a row outside the suite, or an entry of other releases.
+    """
+
+    finding: Finding | None
+    expected: bool
+    remark: str = ""
 
 
-@cache
-def listed(engine: str) -> dict[Key, Finding] | None:
-    """Listed rows of ``engine`` by key; None if it has no list yet."""
-    path = files(__name__).joinpath(f"{engine}.csv")
-    if not path.is_file():
-        return None
-    known = reasons()
-    rows = csv.DictReader(path.read_text(encoding="utf-8").splitlines())
-    return {tuple(row[c] for c in COLUMNS[:7]): Finding(row["status"], known[row["reason"]]) for row in rows}
-
-
-def reason_for(engine: str, key: Key, unsupported: bool = False) -> Reason | None:
-    """First reason that covers a row (of a FAIL, or of an unsupported cell)."""
-    chosen = (reason for reason in reasons().values() if reason.unsupported == unsupported)
-    return next((reason for reason in chosen if reason.covers(engine, key)), None)
-
-
-def finding_of(slot: Slot, metric: str) -> Finding | None:
-    """What is known about a row: its entry in the list, or for slots outside the quick suite a reason's pattern."""
-    known = listed(slot.engine)
-    if known is None:
-        return None
+def known_of(slot: Slot, metric: str, version: str, findings: Findings | None) -> Known:
+    """Look a row up, for the release ``version`` that ran."""
+    if findings is None:
+        return Known(None, False, "the engine has no list of findings")
     key = row_key(slot, metric)
-    if key in known or in_quick_suite(slot):
-        return known.get(key)
-    reason = reason_for(slot.engine, key)
-    return Finding("pattern", reason) if reason else None
-
-
-def write_list(engine: str, entries: Iterable[tuple[Key, str, str]], folder: Path | None = None) -> Path:
-    """Write the list of ``engine``: ``(key, status, reason id)`` per row, sorted."""
-    path = (folder or Path(str(files(__name__)))) / f"{engine}.csv"
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows([*key, status, reason] for key, status, reason in sorted(entries))
-    listed.cache_clear()
-    return path
+    finding = findings.members.get(key)
+    if finding is not None:
+        family = finding.family
+        if family.holds_for(version):
+            return Known(finding, True)
+        return Known(None, True, f"listed for releases {family.releases} only: {family.reason}")
+    like = None if in_quick_suite(slot) else findings.family_of(key)
+    if like is not None and like.holds_for(version):
+        return Known(None, False, f"outside the quick suite, not listed; rows like it: {like.reason}")
+    return Known(None, True)

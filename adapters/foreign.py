@@ -1,0 +1,229 @@
+"""Engines of others are looked at from outside: imported, asked and judged in a process that may die.
+
+    parent: ForeignEngine --("settings", profile, needs, dt)--> child: the plugin itself
+
+A plugin that aborts, exits or hangs when it is imported is a reason in a table; values of the wrong type are an error
+of that engine. Only worker processes load a plugin for good (`adapters.registry.load_engines_here`).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from importlib.metadata import EntryPoint
+from multiprocessing.connection import Connection
+from typing import Any
+
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Setting, Simulation
+from adapters.isolation import Child, IsolationError, Lost
+from adapters.needs import Needs
+from adapters.plain import NAME, one_line, plain
+from adapters.scene import Scene
+
+#: Seconds for an import: the largest engines with Python bindings take about ten on a cold disk.
+PATIENCE = 30.0
+#: Seconds for a question to an engine that is loaded.
+ANSWER = 10.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """An engine that was looked for: loaded (or described by its process), or the reason why not.
+
+    ``fatal``: the plugin ends or hangs the process that imports it.
+    """
+
+    name: str
+    engine: Engine | None
+    version: str
+    reason: str = ""
+    facts: EngineFacts | None = None
+    fatal: bool = False
+
+
+class ForeignEngine(Engine):
+    """An engine whose plugin lives in another process: it has facts and settings, and builds nothing."""
+
+    def __init__(self, entry: EntryPoint, child: Child, told: Mapping[str, Any]) -> None:
+        self.facts = facts_from(told["facts"])
+        self.profiles = {name: partial(self._ask, name) for name in told["profiles"]}
+        self._version = str(told["version"])
+        self._entry, self._child = entry, child
+
+    def version(self) -> str:
+        """Version that the plugin told."""
+        return self._version
+
+    def _ask(self, profile: str, needs: Needs, dt: float) -> list[Setting]:
+        question = {"profile": profile, "needs": asdict(needs), "dt": dt}
+        try:
+            self._child.send(json.dumps(question).encode())
+            told = json.loads(self._child.receive(ANSWER))
+        except Lost as lost:
+            self._child.stop()
+            self._child, _ = _asked(self._entry)
+            raise EngineError(f"settings: {self.name}/{profile}: {lost}") from None
+        if "error" in told:
+            raise EngineError(f"settings: {self.name}/{profile}: {told['error']}")
+        return [Setting(**setting) for setting in told["settings"]]
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Only the plugin itself can say."""
+        raise EngineError(f"engine: {self.name} is loaded in worker processes only")
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Only the plugin itself can."""
+        raise EngineError(f"engine: {self.name} is loaded in worker processes only")
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Only the plugin itself can say."""
+        raise EngineError(f"engine: {self.name} is loaded in worker processes only")
+
+
+def probe(entry: EntryPoint) -> Found:
+    """Look at a plugin from outside; never raises for what it does."""
+    try:
+        child, told = _asked(entry)
+    except IsolationError as error:
+        return Found(entry.name, None, "", str(error))
+    facts = facts_from(told["facts"]) if told.get("facts") else None
+    if told.get("reason"):
+        child.stop()
+        return Found(entry.name, None, "", told["reason"], facts, bool(told.get("fatal")))
+    return Found(entry.name, ForeignEngine(entry, child, told), told["version"], "", facts)
+
+
+def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
+    child = Child(serve)
+    child.send(json.dumps([entry.name, entry.value, entry.group]).encode())
+    try:
+        told: dict[str, Any] = json.loads(child.receive(PATIENCE))
+    except Lost as lost:
+        child.stop()
+        said = one_line(child.tail().rpartition("\n")[2])
+        reason = f"{lost} while it was imported" + (f": {said}" if said else "")
+        return child, {"reason": reason, "fatal": True}
+    return child, told
+
+
+def serve(connection: Connection) -> None:
+    """Answer for one plugin until the other end closes; runs in the child."""
+    from adapters.registry import loaded
+
+    name, value, group = json.loads(connection.recv_bytes())
+    found = loaded(EntryPoint(name, value, group))
+    told: dict[str, Any] = {"version": found.version, "reason": found.reason}
+    if found.facts is not None:
+        told["facts"] = plain_facts(found.facts)
+    if found.engine is not None:
+        told["profiles"] = list(found.engine.profiles)
+    connection.send_bytes(json.dumps(told).encode())
+    while found.engine is not None:
+        try:
+            asked = json.loads(connection.recv_bytes())
+        except EOFError:
+            return
+        connection.send_bytes(json.dumps(_settings(found.engine, asked)).encode())
+
+
+def _settings(engine: Engine, asked: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        given = engine.settings(asked["profile"], Needs(**asked["needs"]), asked["dt"])
+        return {"settings": [plain(asdict(setting)) for setting in checked_settings(given)]}
+    except BaseException as error:  # whatever a plugin raises is its own error
+        return {"error": said_by(error)}
+
+
+def said_by(error: BaseException) -> str:
+    """Type and first line of what was raised, in one line."""
+    return one_line(f"{type(error).__name__}: {one_line(error)}".rstrip(": "))
+
+
+def checked_settings(given: Any) -> list[Setting]:
+    """Settings as an engine gave them, if they are settings.
+
+    Raises
+    ------
+    EngineError
+        Naming what is of the wrong type.
+    """
+    if not isinstance(given, list | tuple):
+        raise EngineError(f"settings: a {type(given).__name__} was given, a list is needed")
+    for setting in given:
+        if not isinstance(setting, Setting) or not isinstance(setting.name, str):
+            raise EngineError(f"settings: a {type(setting).__name__} was given, a Setting with a name is needed")
+        if isinstance(setting.value, float) and not math.isfinite(setting.value):
+            raise EngineError(f"settings: {one_line(setting.name, NAME)} is {setting.value}, not a finite number")
+    return list(given)
+
+
+def checked_refusal(given: Any) -> str | None:
+    """Refusal as an engine gave it: a line, or None.
+
+    Raises
+    ------
+    EngineError
+        If it is neither.
+    """
+    if given is not None and not isinstance(given, str):
+        raise EngineError(f"refuses: a {type(given).__name__} was given, a sentence or None is needed")
+    return one_line(given) if given is not None else None
+
+
+def checked_facts(facts: Any) -> EngineFacts:
+    """Facts of an engine with every text cleaned and every type right.
+
+    Raises
+    ------
+    EngineError
+        Naming the fact that is wrong.
+    """
+    if not isinstance(facts, EngineFacts):
+        raise EngineError(f"facts: a {type(facts).__name__} was given, EngineFacts are needed")
+    try:
+        return facts_from(plain_facts(facts))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise EngineError(f"facts: {said_by(error)}") from None
+
+
+def plain_facts(facts: EngineFacts) -> dict[str, Any]:
+    """Facts as JSON-ready data."""
+    data = {name: getattr(facts, name) for name in facts.__dataclass_fields__}
+    data["scheme"] = vars(facts.scheme)
+    data["quirks"] = [vars(quirk) for quirk in facts.quirks]
+    data["profile_schemes"] = {name: vars(scheme) for name, scheme in facts.profile_schemes.items()}
+    return dict(plain(data))
+
+
+def facts_from(data: Mapping[str, Any]) -> EngineFacts:
+    """Inverse of `plain_facts`.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        If the data is not that of facts.
+    """
+    dimensions = frozenset(int(d) for d in data["dimensions"])
+    if not dimensions or not dimensions <= {2, 3}:
+        raise ValueError(f"dimensions are {sorted(dimensions)}, 2 and 3 are possible")
+    step = float(data["customary_dt"])
+    if not (math.isfinite(step) and step > 0.0):
+        raise ValueError(f"customary_dt is {step}, a positive number of seconds is needed")
+    return EngineFacts(
+        one_line(data["name"], NAME),
+        one_line(data["title"], NAME),
+        one_line(data["package"], NAME),
+        dimensions,
+        _scheme(data["scheme"]),
+        step,
+        tuple(Quirk(**{key: str(text) for key, text in quirk.items()}) for quirk in data["quirks"]),
+        {str(version): str(why) for version, why in data["known_bad_versions"].items()},
+        {str(name): _scheme(scheme) for name, scheme in data["profile_schemes"].items()},
+    )
+
+
+def _scheme(data: Mapping[str, Any]) -> Scheme:
+    return Scheme(str(data["order"]), int(data["position_offset"]))

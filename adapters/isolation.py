@@ -1,0 +1,235 @@
+"""A process that may die: foreign code runs in it, and whatever that code does, the parent goes on.
+
+    parent --(bytes)--> child: serve(connection) in a session of its own, with limits, its output in a pipe
+       ^ an answer; or the child's end with its reason and the last of what it wrote
+
+The pipe needs no file and no semaphore, so neither a full temporary folder nor a missing /dev/shm matters. When a child
+is stopped, everything that it started is stopped as well.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import time
+import weakref
+from collections.abc import Callable
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from adapters.plain import lines, one_line
+
+_PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+#: Bytes of a child's output that are kept: enough for the last lines of a traceback.
+LOG_BYTES = 2**16
+LOG_LINES = 5
+#: Largest answer [bytes]: an observation takes some kilobytes, a recording about one megabyte.
+MOST_BYTES = 2**26
+_children: weakref.WeakSet[Child] = weakref.WeakSet()
+
+
+class IsolationError(RuntimeError):
+    """The machine does not let us start a process; one line."""
+
+
+class Lost(RuntimeError):
+    """A child that ended, or that did not answer; the message says how, in one line."""
+
+
+class Child:
+    """One process that serves a connection.
+
+    Parameters
+    ----------
+    serve
+        Function of a module, called with the connection in the child; it returns when the other end closes.
+    memory
+        Address space [bytes], or None for no limit of ours.
+
+    Raises
+    ------
+    IsolationError
+        If no process can be started.
+    """
+
+    def __init__(self, serve: Callable[[Connection], None], memory: int | None = None) -> None:
+        context = multiprocessing.get_context("spawn")  # forks would inherit what the parent has open and loaded
+        try:
+            self.connection, theirs = context.Pipe()
+            self.log, writing = context.Pipe(duplex=False)
+            self._process = context.Process(target=_main, args=(serve, theirs, writing, os.getpid(), memory))
+            self._process.start()
+        except (OSError, MemoryError) as error:
+            raise IsolationError(f"process: cannot start one: {one_line(error) or type(error).__name__}") from None
+        theirs.close()
+        writing.close()
+        os.set_blocking(self.log.fileno(), False)
+        self.written = b""
+        self._reason = ""
+        _children.add(self)
+
+    @property
+    def sentinels(self) -> list[Any]:
+        """What becomes ready when the child answers, writes or ends."""
+        written = [self.log] if self.drain() else []  # a closed output is always ready, and says nothing more
+        return [self.connection, *written, self._process.sentinel]
+
+    def send(self, message: bytes) -> None:
+        """Ask; a child that is gone is noticed when its answer is read."""
+        with contextlib.suppress(OSError):
+            self.connection.send_bytes(message)
+
+    def has_answer(self) -> bool:
+        """Whether `receive` returns or raises at once; reads what the child wrote meanwhile."""
+        self.drain()
+        try:
+            return self.connection.poll()
+        except OSError:
+            return True
+
+    def receive(self, timeout: float | None = None) -> bytes:
+        """Answer of the child.
+
+        Raises
+        ------
+        Lost
+            If it ended, closed its end, answered too much, or not within ``timeout`` [s].
+        """
+        ends = None if timeout is None else time.monotonic() + timeout
+        while not self.has_answer():
+            left = None if ends is None else ends - time.monotonic()
+            if left is not None and left <= 0.0:
+                raise Lost(f"no answer after {timeout:g} s")
+            if self._process.sentinel in wait(self.sentinels, left) and not self.has_answer():
+                raise Lost(self.stop())
+        try:
+            return self.connection.recv_bytes(MOST_BYTES)
+        except (EOFError, OSError):
+            raise Lost(self.stop()) from None
+
+    def drain(self) -> bool:
+        """Read what the child wrote, keep the end of it; False if it closed its output."""
+        if self._process is None:
+            return False
+        try:
+            while chunk := os.read(self.log.fileno(), LOG_BYTES):
+                self.written = (self.written + chunk)[-LOG_BYTES:]
+            return False
+        except OSError:  # nothing there at the moment
+            return True
+
+    def ended(self) -> bool:
+        """Whether the process has ended."""
+        return self._process is None or bool(wait([self._process.sentinel], 0.0))
+
+    def tail(self) -> str:
+        """Last lines of what the child wrote since `written` was cleared."""
+        self.drain()
+        return lines(self.written.decode(errors="replace"), LOG_LINES)
+
+    def stop(self) -> str:
+        """End the child and everything it started; says how it had ended if it did so itself."""
+        if self._process is None:
+            return self._reason
+        process, pid = self._process, self._process.pid or 0
+        # A child that has just closed its connection is about to end: its own reason says more than our kill.
+        ended = bool(wait([process.sentinel], 0.5)) if self._closed() else bool(wait([process.sentinel], 0.0))
+        self.drain()
+        # The process is not waited for yet, so its number and its group's cannot belong to somebody else.
+        for other in _descendants(pid):
+            _kill(other)
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(OSError):  # it may have had no time to make a group
+                os.killpg(pid, signal.SIGKILL)
+        if not ended:
+            process.kill()
+        process.join()
+        self._reason = _cause(process.exitcode) if ended else "the process closed its connection"
+        self.drain()
+        self.connection.close()
+        self.log.close()
+        self._process = None  # type: ignore[assignment]
+        _children.discard(self)
+        return self._reason
+
+    def _closed(self) -> bool:
+        try:
+            return self.connection.poll()
+        except OSError:
+            return True
+
+
+def _main(
+    serve: Callable[[Connection], None], connection: Connection, log: Connection, parent: int, memory: int | None
+) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if hasattr(os, "setsid"):
+        os.setsid()  # its children are killed as a group, and Ctrl-C is the parent's business
+    if os.getppid() != parent:  # it died before we asked
+        os._exit(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    for stream in (1, 2):
+        os.dup2(log.fileno(), stream)
+    log.close()
+    limit(memory)
+    serve(connection)
+
+
+def limit(memory: int | None) -> None:
+    """Limit this process: no core files, and an address space of ``memory`` [bytes] or what the machine allows."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if memory is not None:
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        most = memory if hard == resource.RLIM_INFINITY else min(memory, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def _cause(code: int | None) -> str:
+    if code is None or code >= 0:
+        return f"the process ended with exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:  # real-time signals have no names of their own
+        name = f"signal {-code}"
+    return f"the process was killed by {name}"
+
+
+def _descendants(pid: int | None) -> list[int]:
+    """Processes that ``pid`` started, and theirs, where the system says so: some leave the group."""
+    found: list[int] = []
+    todo = [pid]
+    while todo:
+        folder = f"/proc/{todo.pop()}/task"
+        try:
+            for task in os.listdir(folder):
+                with open(f"{folder}/{task}/children") as stream:
+                    new = [int(word) for word in stream.read().split()]
+                found += new
+                todo += new
+        except OSError:
+            continue
+    return found
+
+
+def _kill(pid: int) -> None:
+    with contextlib.suppress(OSError):
+        os.kill(pid, signal.SIGKILL)
+
+
+@atexit.register
+def _stop_all() -> None:
+    for child in list(_children):
+        child.stop()

@@ -1,0 +1,81 @@
+"""What comes from outside becomes plain data, once: short text without control characters, numbers, lists, tables.
+
+Engines, their plugins and scene files choose names, reasons, versions and what they read back. All of it ends in a
+terminal, in XML, in a table or on a page; so it is cleaned where it enters, and whoever shows it need not think of it.
+"""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Mapping
+from typing import Any
+
+#: Longest reason [characters]: three lines of a wide terminal.
+REASON = 500
+#: Longest name or version [characters]; more does not fit a column.
+NAME = 80
+#: Most items and levels of a table that an engine reads back; real ones have some hundred, three deep.
+ITEMS, LEVELS = 4096, 8
+#: Categories of Unicode that no reader sees or that steer what shows them: control, format (which turns the direction
+#: of writing), lone surrogates, private use, unassigned (XML allows some of these, no terminal shows them), and line
+#: and paragraph separators.
+_STEERING = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
+
+
+def one_line(text: Any, most: int = REASON) -> str:
+    """First line of ``text`` that says something, control characters shown as escapes, at most ``most`` characters."""
+    whole = _as_text(text, 8 * most)
+    return _cut(_visible(next((line for line in whole.splitlines() if line.strip()), "").strip()), most)
+
+
+def lines(text: str, count: int, most: int = REASON) -> str:
+    """Last ``count`` lines of ``text``, each cleaned as by `one_line`."""
+    return "\n".join(_cut(_visible(line), most) for line in text.splitlines()[-count:])
+
+
+def is_visible(text: str) -> bool:
+    """Whether ``text`` holds nothing that `one_line` would escape."""
+    return not any(unicodedata.category(c) in _STEERING for c in text)
+
+
+def plain(value: Any, level: int = 0) -> Any:
+    """``value`` as JSON-ready data: what is no number, word, list or table becomes its text; NaN and inf as words."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return one_line(value)
+    if isinstance(value, Mapping) and level < LEVELS:
+        items = list(value.items())[:ITEMS]
+        return {one_line(key, NAME): plain(item, level + 1) for key, item in items}
+    if isinstance(value, list | tuple | set | frozenset) and level < LEVELS:
+        return [plain(item, level + 1) for item in list(value)[:ITEMS]]
+    if isinstance(value, int):
+        return int(value) if abs(value) < 2**63 else one_line(hex(value))
+    if hasattr(value, "tolist") and getattr(value, "size", ITEMS + 1) <= ITEMS and level < LEVELS:
+        return plain(value.tolist(), level + 1)  # arrays and numbers of numpy
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else str(float(value))
+    return one_line(value)
+
+
+def _as_text(value: Any, most: int) -> str:
+    """Text of anything; an object that cannot even say what it is gets the name of its type."""
+    try:
+        return (value if isinstance(value, str) else str(value))[:most]
+    except BaseException:
+        return f"a {type(value).__name__} without a text"
+
+
+def _visible(text: str) -> str:
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_escaped(c) if unicodedata.category(c) in _STEERING else c for c in text)
+
+
+def _escaped(character: str) -> str:
+    return " " if character == "\t" else f"\\u{{{ord(character):x}}}"
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 4] + " ..."

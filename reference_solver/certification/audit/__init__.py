@@ -1,0 +1,128 @@
+"""The audit of a run: what it did against the model alone, by code that shares nothing with the solver.
+
+`audit` reads the pieces of a run (`reference_solver.pieces`) and a `Model`, computes masses, levers, laws and gaps
+anew, and returns one `Finding` for each check. Nothing here imports ``planar/``, ``spatial/`` or ``direct/``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_solver.certification.audit import contact, energy, motion, space
+from reference_solver.certification.audit.run import Run
+from reference_solver.model import Model
+from reference_solver.pieces import FIXED
+from reference_solver.records import Record
+
+
+class Check(NamedTuple):
+    """Largest value of one quantity with which a run may pass, and what is wrong when it is exceeded."""
+
+    limit: float
+    meaning: str
+
+
+class Finding(NamedTuple):
+    """What one check measured."""
+
+    name: str
+    value: float
+    limit: float
+    meaning: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the value is within its limit; nan is not."""
+        return bool(self.value <= self.limit)
+
+    def __str__(self) -> str:
+        return f"{self.meaning}: {self.name} {self.value:.3g}, at most {self.limit:.3g}"
+
+
+#: All checks. Shares are of the contact's or body's own scale.
+CHECKS = {
+    "finite": Check(0.0, "a state or an impulse is no number"),
+    # Pieces hand over the very numbers.
+    "joined": Check(0.0, "bodies do not go on where they were"),
+    # What is left of a step below 1e-14 of it is dropped, once a step.
+    "time": Check(1e-12, "pieces do not fill the time"),
+    # Solves leave 1e-13 of their speeds and gather round-off with every sweep: 2e-11 (`certificate.GATES`), thrice.
+    "momentum": Check(1e-10, "impulses and loads do not explain a change of momentum"),
+    # As momentum, and the quadrature of a phase of fifth order: (w h)^6 of a body that turns .03 rad in a piece.
+    "spin": Check(1e-9, "moments and torques do not explain a change of angular momentum"),
+    # Free flight is a parabola, to round-off, as a share of the body.
+    "flight": Check(1e-12, "a body in free flight leaves its parabola"),
+    # What a push out of an overlap moves in one piece: a thousandth of the overlap that is allowed.
+    "path": Check(1e-9, "a body's way is not that of its velocity"),
+    # The independent integration is exact to 1e-10 of a turn of .3 rad.
+    "turn": Check(1e-9, "a body that nothing touches does not turn by Euler's equations"),
+    "prescribed": Check(1e-12, "a body that is not free does not move as prescribed"),
+    # Clamped at zero, which is exact.
+    "pull": Check(1e-14, "a contact pulls"),
+    # Clamped with four roundings; turned into world axes with as many.
+    "cone": Check(1e-12, "friction exceeds mu p_n"),
+    # A solve's residual, 1e-13, over the ratio of the two scales that it and the audit use.
+    "normal": Check(1e-9, "normal impulses do not obey restitution and complementarity"),
+    "friction": Check(1e-9, "friction does not oppose the slip"),
+    "moment": Check(1e-10, "moments are not those of the impulses at their points"),
+    # A wedge or a lever multiplies impulses; a million times the momentum at hand is none of either.
+    "scale": Check(1e6, "an impulse is beyond any physical scale"),
+    "unknown": Check(0.0, "impulses act on bodies that their piece does not hold"),
+    # A thousandth of the overlap that is allowed.
+    "apart": Check(1e-9, "an impulse acts between bodies that do not touch"),
+    # Loss of separation along the solver's normal, as a share of the body.
+    "direction": Check(1e-9, "a contact's normal is none of its bodies"),
+    "place": Check(1e-9, "a contact's point is on no surface of its bodies"),
+    # Coordinates must resolve the overlap that is allowed ten times over.
+    "resolution": Check(1e-7, "bodies are so far out that their places are no longer resolved"),
+    # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
+    "overlap": Check(1e-6, "bodies are in each other: a contact or an impact was missed"),
+    "start": Check(1e-6, "bodies overlap at the start"),
+    # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
+    "gained": Check(1e-9, "energy was gained"),
+    # The fixed-step law gets g h wrong, without saying where.
+    "fallback": Check(0.0, "steps went by the fixed-step law"),
+}
+
+
+def audit(model: Model, record: Record, dt: float, located: bool = True) -> list[Finding]:
+    """Return what all checks measured of a recorded run from its start.
+
+    Parameters
+    ----------
+    model
+        What was to be simulated.
+    record
+        Of `Simulation.record` with ``pieces=True``, from the first step on.
+    dt
+        Step [s].
+    located
+        Whether steps were to be cut at events; if not, the fixed-step law is no fallback.
+
+    Raises
+    ------
+    ValueError
+        If the record has no pieces.
+    """
+    if record.pieces is None:
+        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
+    run = Run(model, record.pieces, dt)
+    start = np.array([body.pose for body in model.bodies], dtype=float)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return [
+            Finding(name, value, *CHECKS[name])
+            for name, value in _measured(run, start, record, located)
+            if name in CHECKS
+        ]
+
+
+def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:
+    yield from motion.measured(run, start, record.pose[-1])
+    yield from contact.measured(run)
+    yield from space.measured(run, start)
+    yield from energy.measured(run)
+    fixed = run.pieces.step[run.pieces.scheme == FIXED]
+    yield "fallback", float(len(np.unique(fixed))) if located else 0.0

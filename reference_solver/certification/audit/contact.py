@@ -1,0 +1,135 @@
+"""Whether impulses obey the laws of contact: Newton's restitution, Signorini's complementarity, Coulomb's cone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.model import Array
+
+#: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
+SOFT_STEPS = 2.0
+
+
+def measured(run: Run) -> Iterator[tuple[str, float]]:
+    """Yield what is measured of all contacts."""
+    names = ("pull", "cone", "normal", "friction", "moment", "scale", "held", "unknown")
+    if not len(run.pieces.body_a):
+        yield from ((name, 0.0) for name in names)
+        return
+    yield from zip(names, _laws(run), strict=True)
+
+
+def _laws(run: Run) -> Iterator[float]:
+    pieces = run.pieces
+    row_a, row_b = run.side
+    a, b, n = pieces.body_a, pieces.body_b, pieces.normal
+    restitution, mu = run.model.restitution[a, b], run.model.friction[a, b]
+    before, after = (
+        run.velocity_at(row_b, b, pieces.point, late) - run.velocity_at(row_a, a, pieces.point, late)
+        for late in (False, True)
+    )
+    approach, leaves = (before * n).sum(axis=1), (after * n).sum(axis=1)
+    pressed = (pieces.impulse * n).sum(axis=1)
+    along = pieces.impulse - pressed[:, None] * n
+    held_back = np.linalg.norm(along, axis=1)
+    mass = _reduced_mass(run)
+    speed = _speeds(run)
+    scale = mass * speed + pressed.clip(min=0.0)
+    owner = run.contact_owner
+    impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
+
+    yield _worst(-pressed, scale)
+    yield _worst(held_back - mu * pressed.clip(min=0.0), scale)
+
+    # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
+    # allowed after an impact is -e u-; a soft rebound may be held instead, and is then counted.
+    rebound = np.where(impact, np.maximum(-restitution * approach, 0.0), 0.0)
+    soft = rebound <= SOFT_STEPS * run.pull * run.dt
+    # Where rows turn within a piece, the velocity at its start must be none: that of a later piece tells of its end.
+    ends = np.where(frozen, leaves, approach)
+    defect = np.abs(pressed - np.maximum(pressed - mass * (ends - rebound), 0.0))
+    stopped = np.abs(pressed - np.maximum(pressed - mass * ends, 0.0))
+    held = impact & soft & (rebound > 0.0) & (stopped < defect)
+    defect = np.where(held, stopped, defect)
+    # Rebounds that are released leave with what was held, which their own piece cannot tell; and what is not pressed
+    # and is not an impact may part, or come closer: a gap is a matter of geometry.
+    parting = ~impact & (pressed <= 0.0)
+    defect = np.where(release | parting, 0.0, defect)
+    yield _worst(defect, scale)
+
+    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it.
+    slip = np.where(frozen[:, None], after, before)
+    slip = slip - (slip * n).sum(axis=1)[:, None] * n
+    wanted = along - mass[:, None] * slip
+    size = np.linalg.norm(wanted, axis=1)
+    limit = mu * pressed.clip(min=0.0)
+    wanted *= np.where(size > limit, limit / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
+    # Where the direction of a slip turns within a piece, its friction is a mean of directions.
+    first, last = (x - (x * n).sum(axis=1)[:, None] * n for x in (before, after))
+    turned = np.where(frozen, 0.0, limit * _angle(first, last))
+    yield _worst(np.linalg.norm(along - wanted, axis=1) - turned, scale)
+
+    about = cross(pieces.point, pieces.impulse)
+    arm = np.linalg.norm(pieces.point, axis=1) + run.size
+    off = np.linalg.norm(pieces.moment - about, axis=1)
+    yield _worst(np.where(frozen, off, 0.0), arm * np.linalg.norm(pieces.impulse, axis=1))
+
+    yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
+    yield float(held.sum() + (release & (pressed > 0.0)).sum())
+    movable = (run.free[a] & (row_a < 0)) | (run.free[b] & (row_b < 0))
+    yield float(movable.sum())
+
+
+def _reduced_mass(run: Run) -> Array:
+    """Mass (c,) that a contact feels at least along its normal [kg]: levers only lower it."""
+    pieces = run.pieces
+    inverse = np.zeros(len(pieces.body_a))
+    for i, row in ((pieces.body_a, run.side[0]), (pieces.body_b, run.side[1])):
+        arm = pieces.point - np.where((row >= 0)[:, None], pieces.pose_before[row, : run.d], pieces.point)
+        lever = (arm * arm).sum(axis=1) / run.moments[i].min(axis=1)
+        inverse += np.where(run.free[i], 1.0 / run.mass[i] + lever, 0.0)
+    return np.asarray(1.0 / np.where(inverse > 0.0, inverse, 1.0))
+
+
+def _speeds(run: Run) -> Array:
+    """Speeds (c,) whose differences a contact's velocity is: of both points, before and after, and of loads [m/s]."""
+    pieces = run.pieces
+    total = np.full(len(pieces.body_a), run.pull * run.dt)
+    for i, row in ((pieces.body_a, run.side[0]), (pieces.body_b, run.side[1])):
+        arm = pieces.point - np.where((row >= 0)[:, None], pieces.pose_before[row, : run.d], pieces.point)
+        far = np.linalg.norm(arm, axis=1)
+        for twist in (pieces.twist_before, pieces.twist_after):
+            v, w = twist[row, : run.d], twist[row, run.d :]
+            total += np.where(row >= 0, np.linalg.norm(v, axis=1) + far * np.linalg.norm(w, axis=1), 0.0)
+        del i
+    return np.asarray(0.5 * total)
+
+
+def _angle(one: Array, other: Array) -> Array:
+    """Sine bound of the angle between rows, 2 where either is nothing."""
+    a, b = np.linalg.norm(one, axis=1), np.linalg.norm(other, axis=1)
+    safe = (a > 0.0) & (b > 0.0)
+    unit = [x / np.where(safe, size, 1.0)[:, None] for x, size in ((one, a), (other, b))]
+    return np.where(safe, np.linalg.norm(unit[0] - unit[1], axis=1), 2.0)
+
+
+def _momentum_at_hand(run: Run) -> float:
+    """Momentum that all motion and loads of the run could give to one contact [N s]."""
+    pieces, free = run.pieces, run.free
+    arm = np.where(np.isfinite(run.reach), run.reach, 0.0)
+    speeds = np.zeros(len(free))
+    # At the start of the run and by loads over its time: what follows from impulses does not vouch for them.
+    duration = float((pieces.step.max() + 1 - pieces.step.min()) * run.dt)
+    for i, body in enumerate(run.model.bodies):
+        twist = twist_of(body)
+        speeds[i] = np.linalg.norm(twist[: run.d]) + arm[i] * np.linalg.norm(twist[run.d :])
+    fastest = float(speeds.max()) + run.pull * max(duration, run.dt)
+    return float(run.mass[free].sum() * fastest) if free.any() and fastest > 0.0 else 1.0
+
+
+def _worst(defect: Array, scale: Array) -> float:
+    share = np.divide(defect, scale, out=np.where(defect > 0.0, np.inf, 0.0), where=scale > 0.0)
+    return float(max(share.max(initial=0.0), 0.0))

@@ -1,0 +1,279 @@
+"""Where bodies are to each other, by the certificate's own geometry: overlaps, missed contacts, wrong normals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_solver.certification.audit.run import Indices, Run
+from reference_solver.certification.geometry import Nearest, nearest, rotation
+from reference_solver.model import Array, HalfSpace
+
+#: Halvings of an interval in which two bodies might have met: sixteen parts of it.
+HALVINGS = 4
+
+
+class _Point:
+    """A shape without extent: its distance from a body is that of a place."""
+
+    radius = 0.0
+
+
+class Path(NamedTuple):
+    """Motion of one body: k intervals that follow each other."""
+
+    begin: Array  # (k,)
+    length: Array  # (k,)
+    pose: Array  # (k, 3 | 7) at their starts
+    way: Array  # (k, 3 | 6) displacement and turn over each
+    first: Array  # (k, 3 | 6) twist at the start of each
+    last: Array  # (k, 3 | 6) and at its end
+
+
+def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
+    """Yield what is measured of all pairs of bodies; ``start`` (n, P) are the poses at the start."""
+    contacts = _touching(run)
+    yield "apart", contacts[0]
+    yield "direction", contacts[1]
+    yield "place", contacts[2]
+    yield "resolution", float(np.spacing(np.abs(start[run.free, : run.d]).max(initial=0.0)) / run.size)
+    deep, first = _overlaps(run, start)
+    yield "overlap", deep
+    yield "start", first
+
+
+def _touching(run: Run) -> tuple[float, float, float]:
+    """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
+
+    Of contacts that carry something. Those of the fixed-step law may close a gap, and are not asked.
+    """
+    pieces = run.pieces
+    worst = [0.0, 0.0, 0.0]
+    fixed = run.is_fixed[run.contact_owner]
+    carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~fixed & np.isfinite(pieces.normal).all(axis=1)
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    for pair in np.unique(pairs[carry]):
+        rows = np.flatnonzero(carry & (pairs == pair))
+        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+        pose_a, pose_b = (_pose(run, i, run.side[k][rows]) for k, i in enumerate((a, b)))
+        shape_a, shape_b = run.model.bodies[a].shape, run.model.bodies[b].shape
+        found = _distinct(shape_a, pose_a, shape_b, pose_b)
+        size = min(run.extent[a], run.extent[b])
+        noise = 16.0 * np.spacing(max(np.abs(pieces.point[rows]).max(), np.abs(pose_b[:, : run.d]).max()))
+        worst[0] = max(worst[0], float((np.abs(found.gap) - noise).max() / size))
+        # Any direction along which the bodies are as far apart as they are is a normal: of edges there are many.
+        n = pieces.normal[rows]
+        parted = _along(shape_a, pose_a, shape_b, pose_b, n, run.d)
+        lost = (found.gap - parted - noise) / size
+        length = np.abs(np.linalg.norm(n, axis=1) - 1.0)
+        worst[1] = max(worst[1], float(lost.max()), float(length.max()))
+        place = _placed(pieces.point[rows], run.d)
+        sides = [_distinct(shape, pose, _Point(), place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
+        worst[2] = max(worst[2], float(max((np.abs(s) - np.abs(found.gap) - noise).max() for s in sides) / size))
+    return max(worst[0], 0.0), max(worst[1], 0.0), max(worst[2], 0.0)
+
+
+def _distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Nearest:
+    """As `nearest`, asked once where poses (s, P) repeat those before: what rests costs nothing."""
+    both = np.concatenate([pose_a, pose_b], axis=1)
+    new = np.ones(len(both), bool)
+    new[1:] = (both[1:] != both[:-1]).any(axis=1)
+    found = nearest(shape_a, pose_a[new], shape_b, pose_b[new])
+    which = np.cumsum(new) - 1
+    return Nearest(*(field[which] for field in found))
+
+
+def _pose(run: Run, i: int, rows: Indices) -> Array:
+    """Poses (s, P) of body i at the start of the pieces of ``rows``; the model's where a piece does not hold it."""
+    own = np.array(run.model.bodies[i].pose, dtype=float)
+    return np.where((rows >= 0)[:, None], run.pieces.pose_before[rows], own)
+
+
+def _placed(point: Array, d: int) -> Array:
+    """Poses of a place."""
+    return np.concatenate(
+        [point, np.zeros((len(point), 1))] if d == 2 else [point, np.tile(np.eye(4)[0], (len(point), 1))], axis=1
+    )
+
+
+def _along(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array, n: Array, d: int) -> Array:
+    """Separation (s,) of two bodies along ``n``; of a half-space, less what another direction than its own loses."""
+    heights = []
+    for shape, pose, sign in ((shape_a, pose_a, 1.0), (shape_b, pose_b, -1.0)):
+        if isinstance(shape, HalfSpace):
+            own = np.einsum("sij,j->si", rotation(pose), np.array(shape.normal))
+            # Its surface along n is its own, where n is its normal; the miss counts in full.
+            heights.append((own * pose[:, :d]).sum(axis=1) + shape.offset + np.linalg.norm(sign * n - own, axis=1))
+        else:
+            centre = (sign * n * pose[:, :d]).sum(axis=1)
+            heights.append(centre + _half_width(shape, pose, sign * n))
+    return np.asarray(-heights[0] - heights[1])
+
+
+def _half_width(shape: Any, pose: Array, n: Array) -> Array:
+    """How far a body reaches along n (s, d) from its centre [m]."""
+    local = np.einsum("sij,si->sj", rotation(pose), n)
+    if hasattr(shape, "half_extents"):
+        return np.asarray(np.abs(local) @ np.array(shape.half_extents))
+    if hasattr(shape, "vertices"):
+        return np.asarray((local @ np.array(shape.vertices).T).max(axis=1))
+    if hasattr(shape, "half_length"):
+        return np.asarray(np.abs(local[:, 0]) * shape.half_length + shape.radius)
+    return np.full(len(n), float(shape.radius))
+
+
+def _overlaps(run: Run, start: Array) -> tuple[float, float]:
+    """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width."""
+    paths = [_path(run, i, start) for i in range(len(run.free))]
+    low, high = (np.array([x(path) for path in paths]) for x in (_low, _high))
+    arm = np.where(np.isfinite(run.reach), run.reach, np.inf)[:, None]
+    worst, first = 0.0, 0.0
+    for i in range(len(paths)):
+        meets = ((low[i] - arm[i] <= high + arm) & (low - arm <= high[i] + arm[i])).all(axis=1)
+        for j in np.flatnonzero(meets):
+            if j <= i or not (run.free[i] or run.free[j]):
+                continue
+            deep, begin = _pair(run, i, int(j), paths[i], paths[int(j)])
+            size = min(run.extent[i], run.extent[j])
+            worst, first = max(worst, -deep / size), max(first, -begin / size)
+    return worst, first
+
+
+def _low(path: Path) -> Array:
+    d = 2 if path.pose.shape[1] == 3 else 3
+    return np.asarray((np.minimum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) - _bulge(path, d)).min(axis=0))
+
+
+def _high(path: Path) -> Array:
+    d = 2 if path.pose.shape[1] == 3 else 3
+    return np.asarray((np.maximum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) + _bulge(path, d)).max(axis=0))
+
+
+def _bulge(path: Path, d: int) -> Array:
+    """How far a path may leave the straight line between its ends (k, 1) [m]."""
+    change = np.linalg.norm(path.last[:, :d] - path.first[:, :d], axis=1)
+    return np.asarray((0.5 * path.length * change)[:, None])
+
+
+def _path(run: Run, i: int, start: Array) -> Path:
+    """Motion of body i; of one that no piece holds, rest."""
+    pieces = run.pieces
+    rows = np.flatnonzero((pieces.body == i) & run.is_forces[run.owner])
+    v = 3 if run.d == 2 else 6
+    if not len(rows):
+        whole = float((pieces.step.max() + 1) * run.dt) if len(pieces) else run.dt
+        rest = np.zeros((1, v))
+        return Path(np.zeros(1), np.array([whole]), start[i][None], rest, rest, rest)
+    before, after = pieces.pose_before[rows], pieces.pose_after[rows]
+    way = after[:, : run.d] - before[:, : run.d]
+    turn = (after - before)[:, 2:] if run.d == 2 else _rotation_vector(before[:, 3:], after[:, 3:])
+    return Path(
+        pieces.begin[run.owner[rows]],
+        run.length[rows],
+        before,
+        np.concatenate([way, turn], axis=1),
+        pieces.twist_before[rows],
+        pieces.twist_after[rows],
+    )
+
+
+def _rotation_vector(q: Array, p: Array) -> Array:
+    """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
+    # p times the conjugate of q
+    scalar = (p * q).sum(axis=1)
+    vector = -p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
+    vector *= np.where(scalar < 0.0, -1.0, 1.0)[:, None]
+    sine = np.linalg.norm(vector, axis=1)
+    angle = 2.0 * np.arctan2(sine, np.abs(scalar))
+    return np.asarray(vector * np.where(sine > 1e-12, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
+
+
+def _pose_at(path: Path, k: Indices, t: Array) -> Array:
+    """Poses (s, P) on intervals k after the time t (s,) of each, by cubic Hermite polynomials."""
+    d = 2 if path.pose.shape[1] == 3 else 3
+    length = path.length[k]
+    s = np.clip(t / np.where(length > 0.0, length, 1.0), 0.0, 1.0)[:, None]
+    whole, late = s * s * (3.0 - 2.0 * s), length[:, None] * s
+    moved = whole * path.way[k] + late * (1.0 - s) ** 2 * path.first[k] + late * s * (s - 1.0) * path.last[k]
+    place = path.pose[k][:, :d] + moved[:, :d]
+    if d == 2:
+        return np.concatenate([place, path.pose[k][:, 2:] + moved[:, 2:]], axis=1)
+    angle = np.linalg.norm(moved[:, 3:], axis=1, keepdims=True)
+    half = 0.5 * np.sinc(0.5 * angle / np.pi) * moved[:, 3:]
+    scalar, (w, v) = np.cos(0.5 * angle), (path.pose[k][:, 3:4], path.pose[k][:, 4:])
+    q = [scalar * w - (half * v).sum(axis=1, keepdims=True), scalar * v + w * half + np.cross(half, v)]
+    return np.concatenate([place, *q], axis=1)
+
+
+def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> tuple[float, float]:
+    """Least gap of two bodies over the run, and at its start [m]; only what could have been missed is looked into.
+
+    Over an interval h a gap cannot fall by more than the bound L of its rate times the time, so that it stays above
+    (g_0 + g_1 - L h)/2. Where that is above the deepest found, nothing is missed; else the interval is halved.
+    """
+    shapes = run.model.bodies[i].shape, run.model.bodies[j].shape
+    times = np.unique(np.concatenate([one.begin, other.begin, [one.begin[-1] + one.length[-1]]]))
+    k, m = (np.clip(np.searchsorted(p.begin, times, "right") - 1, 0, len(p.begin) - 1) for p in (one, other))
+
+    def gaps(t: Array, k: Indices, m: Indices) -> Array:
+        pose_i, pose_j = _pose_at(one, k, t - one.begin[k]), _pose_at(other, m, t - other.begin[m])
+        return _distinct(shapes[0], pose_i, shapes[1], pose_j).gap
+
+    rate = _closing(run, i, j, one, other, k[:-1], m[:-1])
+    near = _near(run, i, j, one, other, times, k, m, rate)
+    if not near.any():
+        return np.inf, np.inf
+    begin, end, k, m, rate = times[:-1][near], times[1:][near], k[:-1][near], m[:-1][near], rate[near]
+    first, last = gaps(begin, k, m), gaps(end, k, m)
+    start = float(first[0]) if begin[0] == times[0] else np.inf
+    least = min(float(first.min()), float(last.min()))
+    tolerance = 1e-7 * min(run.extent[i], run.extent[j])
+    for _ in range(HALVINGS):
+        open_ = 0.5 * (first + last - rate * (end - begin)) < min(least, 0.0) - tolerance
+        if not open_.any():
+            break
+        begin, end, k, m, rate, first, last = (x[open_] for x in (begin, end, k, m, rate, first, last))
+        middle = 0.5 * (begin + end)
+        between = gaps(middle, k, m)
+        least = min(least, float(between.min()))
+        begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
+        first, last = np.concatenate([first, between]), np.concatenate([between, last])
+        k, m, rate = (np.concatenate([x, x]) for x in (k, m, rate))
+    return least, start
+
+
+def _closing(run: Run, i: int, j: int, one: Path, other: Path, k: Indices, m: Indices) -> Array:
+    """Bound of the rate at which the gap of two bodies falls on intervals k of one and m of the other [m/s]."""
+    d = run.d
+    starts, ends = one.first[k] - other.first[m], one.last[k] - other.last[m]
+    speed = np.zeros(len(k))
+    for relative in (starts, ends):
+        straight = np.linalg.norm(relative[:, :d], axis=1)
+        for a in (i, j):
+            shape = run.model.bodies[a].shape
+            fixed = run.model.bodies[a].motion == "fixed"
+            if isinstance(shape, HalfSpace) and fixed:  # only what goes along its normal closes
+                pose = np.array(run.model.bodies[a].pose, dtype=float)
+                straight = np.abs(relative[:, :d] @ (rotation(pose) @ np.array(shape.normal)))
+        speed = np.maximum(speed, straight)
+    for a, path, at in ((i, one, k), (j, other, m)):
+        arm = run.reach[a]
+        if not np.isfinite(arm):
+            centre = (other if a == i else one).pose[m if a == i else k][:, :d]
+            arm = np.linalg.norm(centre - path.pose[at][:, :d], axis=1) + run.reach[j if a == i else i]
+        spin = np.maximum(np.linalg.norm(path.first[at][:, d:], axis=1), np.linalg.norm(path.last[at][:, d:], axis=1))
+        with np.errstate(invalid="ignore"):
+            speed = speed + np.where(spin > 0.0, arm * spin, 0.0)
+    return speed
+
+
+def _near(run: Run, i: int, j: int, one: Path, other: Path, times: Array, k: Indices, m: Indices, rate: Array) -> Any:
+    """Intervals (t - 1,) in which the balls about two bodies could touch; all of them for half-spaces."""
+    if not np.isfinite(run.reach[i] + run.reach[j]):
+        return np.ones(len(times) - 1, bool)
+    places = [_pose_at(p, at, times - p.begin[at])[:, : run.d] for p, at in ((one, k), (other, m))]
+    apart = np.linalg.norm(places[0] - places[1], axis=1) - run.reach[i] - run.reach[j]
+    change = rate * np.diff(times)
+    return np.minimum(apart[:-1], apart[1:]) <= change

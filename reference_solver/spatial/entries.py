@@ -1,0 +1,100 @@
+"""Pieces of a spatial run as entries of the journal."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
+from reference_solver.pieces import CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
+from reference_solver.planar.state import Options
+from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
+from reference_solver.spatial.vector import add, cross, row, times_transposed
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.lasting import Lasting
+
+
+@inner_kernel
+def enter_points(journal: Journal, manifolds: Manifolds, hit: bool) -> None:
+    """Enter all points with the impulses of impacts, or else of the force phase; poses as the piece began."""
+    for m in range(len(manifolds)):
+        a, b = manifolds.body_a[m], manifolds.body_b[m]
+        for p in range(manifolds.points[m]):
+            k = next_contact(journal, a, b, manifolds.feature[m, p])
+            if k < 0:
+                continue
+            local = row(manifolds.hit[m], p, 0) if hit else row(manifolds.impulse[m], p, 0)
+            impulse = times_transposed(manifolds.frame, m, local)
+            point = add(row(journal.pose, b, 0), row(manifolds.arm_b[m], p, 0))
+            moment = cross(point, impulse)
+            for d in range(3):
+                journal.wrench[k, d] = point[d]
+                journal.wrench[k, 3 + d] = manifolds.frame[m, 2, d]
+                journal.wrench[k, 6 + d] = impulse[d]
+                journal.wrench[k, 9 + d] = moment[d]
+
+
+@inner_kernel
+def enter_moments(journal: Journal, manifolds: Manifolds, lasting: Lasting, first: int) -> None:
+    """Moments of lasting contacts, whose levers turned within the piece; ``first``: row of the first point."""
+    before = 0
+    for m in range(len(manifolds)):
+        for k in range(lasting.size[LASTING]):
+            entry = first + before + lasting.row[k] % POINTS
+            if lasting.row[k] // POINTS == m and entry < len(journal.name):
+                for d in range(3):
+                    journal.wrench[entry, 6 + d] = lasting.impulse[k, d]
+                    journal.wrench[entry, 9 + d] = lasting.moment[k, d]
+        before += manifolds.points[m]
+
+
+@inner_kernel
+def struck(bodies: Bodies) -> bool:
+    """Whether impacts changed a velocity."""
+    for i in range(len(bodies)):
+        for k in range(6):
+            if bodies.before[i, k] != bodies.first[i, k]:
+                return True
+    return False
+
+
+@inner_kernel
+def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, length: float) -> None:
+    """Enter a located sub-step of ``length`` from the poses kept: its impacts, if any, then its force phase."""
+    journal = sub.journal
+    if not is_kept(journal):
+        return
+    begin = options.dt - sub.clock[LEFT]
+    if struck(bodies):
+        open_piece(journal, begin, 0.0, IMPACT, FROZEN)
+        enter_bodies(journal, journal.pose, bodies.first)
+        enter_points(journal, manifolds, True)
+    curved = False
+    for i in range(len(bodies)):
+        curved = curved or bodies.curved[i] != 0
+    keep_state(journal, journal.pose, bodies.first)
+    scheme = FIXED if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    open_piece(journal, begin, length, FORCES, scheme)
+    enter_bodies(journal, bodies.pose, bodies.twist)
+    first = journal.used[CONTACTS]
+    enter_points(journal, manifolds, False)
+    if curved:
+        enter_moments(journal, manifolds, sub.lasting, first)
+    keep_state(journal, bodies.pose, bodies.twist)
+
+
+@inner_kernel
+def enter_release(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, length: float) -> None:
+    """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
+    if is_kept(sub.journal):
+        open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
+        enter_bodies(sub.journal, bodies.pose, bodies.twist)
+        enter_points(sub.journal, manifolds, False)
+
+
+@inner_kernel
+def enter_fixed_step(journal: Journal, bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
+    """Enter a step at fixed dt, from what was kept before it."""
+    if is_kept(journal):
+        open_piece(journal, 0.0, options.dt, FORCES, FIXED)
+        enter_bodies(journal, bodies.pose, bodies.twist)
+        enter_points(journal, manifolds, False)

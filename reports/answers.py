@@ -1,0 +1,259 @@
+"""The short answers: which engine to use for a scene, what is wrong with whom, and what cures it.
+
+One line per engine and scene that fails, in words: "mujoco/default bounce: rebounds at 0.105 whatever e is asked;
+tuned cures it". Everything is read off the judged rows at the profiles' own iteration counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from reports.findings import severity
+from reports.matrix import UNJUDGED
+from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
+
+Plain = Mapping[str, Any]
+#: (scene, dimension, engine, profile) -> cost [s of CPU per simulated s] of the cheapest step that passes.
+Costs = Mapping[tuple[str, int, str, str], float]
+#: Of kinds of metric that fail nearly as often as the worst one, the first that its scene states is shown.
+CLEAR = 0.8
+#: Values that differ by less than this share of what the truth spans are one value.
+SAME = 0.05
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one engine and profile gets wrong in one scene."""
+
+    engine: str
+    profile: str
+    scene: str
+    failing: int
+    judged: int
+    wrong: str
+    cure: str
+
+    @property
+    def line(self) -> str:
+        """One line for people."""
+        return f"{self.engine}/{self.profile} {self.scene}: {self.wrong}; {self.cure}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready)."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest to it."""
+
+    scene: str
+    good: tuple[str, ...]
+    nearest: str
+
+    @property
+    def line(self) -> str:
+        """``mujoco/tuned (0.2 ms/s), reference/reference``."""
+        return ", ".join(self.good) if self.good else f"nobody passes every row; nearest is {self.nearest}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready)."""
+        return asdict(self)
+
+
+def configured(rows: Iterable[Plain]) -> list[Plain]:
+    """Judged rows at the profile's own iteration count."""
+    return [row for row in rows if row["iterations"] is None and mark_of(row) not in UNJUDGED]
+
+
+def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
+    """One choice per scene, in the order of the rows."""
+    groups = _by_profile(rows)
+    dimensions: dict[str, set[int]] = defaultdict(set)
+    for row in rows:
+        dimensions[row["scene"]].add(row["dimension"])
+    found = []
+    for scene in dimensions:
+        own = {key[1:]: group for key, group in groups.items() if key[0] == scene}
+        good = [key for key, group in own.items() if not _failing(group)]
+        price = {key: _price(costs or {}, scene, key) for key in good}
+        good.sort(key=lambda key: price[key])
+        names = [_named(key, own[key], dimensions[scene], price[key]) for key in good]
+        shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
+        near = min(shares, key=lambda key: shares[key], default=None)
+        nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
+        found.append(Choice(scene, tuple(names), nearest))
+    return found
+
+
+def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
+    """Cost in the plane, else in space; what was not timed stands last."""
+    known = [costs[scene, d, *key] for d in (2, 3) if (scene, d, *key) in costs]
+    return known[0] if known else math.inf
+
+
+def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float) -> str:
+    """``chipmunk/tuned (2-D only, 1.2 ms/s)``."""
+    own = {row["dimension"] for row in rows}
+    notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
+    if math.isfinite(price):
+        notes.append(f"{1e3 * price:.2g} ms/s")
+    return "/".join(key) + (f" ({', '.join(notes)})" if notes else "")
+
+
+def answers(rows: Sequence[Plain]) -> list[Answer]:
+    """What each engine as shipped gets wrong, scene by scene; of other profiles, what they make worse than that."""
+    groups, found = _by_profile(rows), []
+    pairs = dict.fromkeys((key[1], key[0]) for key in sorted(groups, key=lambda key: _position(rows, key)))
+    for engine, scene in pairs:
+        own = {key[2]: group for key, group in groups.items() if (key[0], key[1]) == (scene, engine)}
+        shipped, *others = own
+        wrong = [shipped] if _failing(own[shipped]) else [name for name in others if _failing(own[name])]
+        for profile in wrong:
+            group = own[profile]
+            text = _wrong(group, _failing(group))
+            found.append(
+                Answer(engine, profile, scene, len(_failing(group)), len(group), text, _cure(own, profile))
+            )  # fmt: skip
+    return found
+
+
+def _position(rows: Sequence[Plain], key: tuple[str, str, str]) -> tuple[int, int]:
+    """Engines, then scenes, in the order of the rows."""
+    engines = list(dict.fromkeys(row["engine"] for row in rows))
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    return engines.index(key[1]), scenes.index(key[0])
+
+
+def _by_profile(rows: Iterable[Plain]) -> dict[tuple[str, str, str], list[Plain]]:
+    """Rows by scene, engine, profile."""
+    groups: dict[tuple[str, str, str], list[Plain]] = defaultdict(list)
+    for row in configured(rows):
+        groups[row["scene"], row["engine"], row["profile"]].append(row)
+    return groups
+
+
+def _failing(rows: Iterable[Plain]) -> list[Plain]:
+    return [row for row in rows if mark_of(row) != "pass"]
+
+
+def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
+    """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
+    others = {name: group for name, group in own.items() if name != profile}
+    good = [name for name, group in others.items() if not _failing(group)]
+    if good:
+        return f"{' or '.join(good)} cures it"
+    share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
+    best = min(share, key=lambda name: share[name], default=None)
+    if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):
+        return "no other profile does better"
+    failing = _failing(others[best])
+    return f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
+
+
+# ---- in words ----
+
+#: What is smaller than this share of the truth is nothing, in words.
+NOTHING = 1e-6
+SILENT = "does not rebound"
+#: What a value of a metric means, in words; {value} carries the unit.
+SPOKEN: dict[str, str] = {
+    "rebound_ratio": "rebounds at {value}",
+    "apex": "rebounds at {value}",
+    "creep": "creeps at {value} where it should stick",
+    "acceleration": "slides with {value}",
+    "threshold": "lets go at {value} of the friction limit",
+    "settle_time": "settles after {value}",
+    "drift": "drifts sideways by {value}",
+    "penetration": "overlaps by {value}",
+    "interface_impulse": "carries {value} of the weight above an interface",
+    "kinetic_energy": "keeps {value} of motion",
+    "impulse_scatter": "shakes: loads scatter by {value}",
+    "rest_time": "rests after {value}",
+}
+
+
+def _rebound(row: Plain) -> Plain:
+    """First apex as the coefficient of restitution that it shows: h_1 = e^2 h_0."""
+    height = row["params"]["height"]
+    value, truth = (math.sqrt(max(row[name], 0.0) / height) for name in ("value", "truth"))
+    return {**row, "value": value, "truth": truth, "unit": "1"}
+
+
+#: Metrics that people know by another number; only the rows named here are shown so.
+SEEN_AS: dict[tuple[str, str], Callable[[Plain], Plain]] = {("bounce", "apex[1]"): _rebound}
+
+
+def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
+    """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
+    lost = [row for row in failing if row["value"] is None]
+    if lost:
+        return f"{len(lost)} of {len(rows)} rows have no answer ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
+    kinds: dict[str, list[Plain]] = defaultdict(list)
+    for row in failing:
+        kinds[row["metric"].partition("[")[0]].append(row)
+    total: dict[str, int] = defaultdict(int)
+    for row in rows:
+        total[row["metric"].partition("[")[0]] += 1
+    share = {name: len(kinds[name]) / rows_of_it for name, rows_of_it in total.items()}
+    kind = next(name for name, part in share.items() if part >= CLEAR * max(share.values()))
+    members = [row for row in rows if row["metric"].partition("[")[0] == kind and row["value"] is not None]
+    known_as = f"{kind}[1]"
+    view = SEEN_AS.get((rows[0]["scene"], known_as))
+    if view is not None and any(row["metric"] == known_as for row in kinds[kind]):
+        members = [view(row) for row in members if row["metric"] == known_as]
+    return _constant(kind, members) or _worst(kind, [row for row in members if mark_of(row) != "pass"])
+
+
+def _constant(kind: str, rows: Sequence[Plain]) -> str:
+    """``rebounds at 0.105 whatever e is asked``: one value where the truth follows a parameter; empty if it is not."""
+    values, truths = [row["value"] for row in rows], [row["truth"] for row in rows]
+    if None in truths or max(truths) == min(truths):
+        return ""
+    if max(values) - min(values) > SAME * (max(truths) - min(truths)):
+        return ""
+    asked = [name for name in rows[0]["params"] if _follows(rows, name)]
+    low, high = (number(value, 3) for value in (min(values), max(values)))
+    spread = rows[0]["unit"] if rows[0]["unit"] != "1" else ""
+    value = f"{low if low == high else f'{low} to {high}'} {spread}".strip()
+    return f"{spoken(kind, value)} whatever {' and '.join(asked)} is asked"
+
+
+def spoken(kind: str, value: str) -> str:
+    """What a value of a kind of metric means, in words."""
+    if value == "0" and kind in ("rebound_ratio", "apex"):
+        return SILENT
+    return SPOKEN.get(kind, kind + " {value}").format(value=value)
+
+
+def _digits(row: Plain) -> int:
+    """Fewest digits, at least three, that tell a wrong value from the truth."""
+    value, truth = row["value"], row["truth"]
+    if value is None or truth is None:
+        return 3
+    return next((n for n in range(3, 17) if number(value, n) != number(truth, n)), 17)
+
+
+def _follows(rows: Sequence[Plain], name: str) -> bool:
+    """Whether the truth changes with this parameter while all others stay."""
+    seen: dict[str, set[float]] = defaultdict(set)
+    for row in rows:
+        rest = repr(sorted((k, v) for k, v in row["params"].items() if k not in (name, "duration")))
+        seen[rest].add(round(row["truth"], 9))
+    return any(len(truths) > 1 for truths in seen.values())
+
+
+def _worst(kind: str, rows: Sequence[Plain]) -> str:
+    """The worst row in words, with the truth beside it unless that is that nothing happens."""
+    row = max(rows, key=severity)
+    nothing = bool(row["truth"]) and abs(row["value"]) < NOTHING * abs(row["truth"])
+    value = "0" if nothing else measured(row, _digits(row))
+    text = "never settles" if value == NEVER else spoken(kind, value)
+    if row["truth"] and text != SILENT:
+        text += f" instead of {quantity(row['truth'], row['unit'], _digits(row))}"
+    where = params_text(row["slot"]["params"])
+    return text + (f" ({where})" if where else "")

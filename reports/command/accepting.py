@@ -1,0 +1,170 @@
+"""``accept``: shows what listing a run would change, family by family, and asks for the reason of each."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from adapters import registry
+from reports.command.group import AS_JSON, OUT, main
+from reports.progress import run_plan
+from reports.wording import number
+from validation.acceptance import Change, Proposal, accepted, propose, slots_to_move
+from validation.cells import Observation, prepare
+from validation.findings import Family, FindingsError, files
+from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
+from validation.rows import Row, rows_of
+from validation.store import SCATTER_TITLE, Store
+
+#: Refused rows that are printed; the rest is counted.
+SHOWN = 12
+
+
+@main.command()
+@click.argument("run", default="latest")
+@click.option("--engine", required=True, metavar="E", help="Whose findings to write.")
+@click.option("--family", "families", multiple=True, metavar="ID", help="Accept this family (repeat for more).")
+@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes; 0: one per core.")
+@AS_JSON
+@OUT
+def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
+    """List rows of RUN that do not pass as findings, each with its value and band, each family with its reason.
+
+    Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
+    every family that would change. Those named by --family are accepted; for the others a terminal is asked, and
+    without one nothing is written for them. Rows that a deviation law covers and misses, rows whose receipts do not
+    hold and rows of reference/reference are refused; what did not run stays as it is listed.
+
+    Exits with 1 if a row is refused or a family that changed is not accepted. Read the diff before you commit it: a
+    finding is listed to be shown, not to be hidden.
+    """
+    registry.find(engine)
+    console = Console(stderr=True)
+    proposal = propose(_rows_with_scatter(out, run, engine, jobs, console), engine, findings_of(engine))
+    unknown = set(families) - {change.family.id for change in proposal.changes}
+    if unknown:
+        raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such family of {engine} in {FAMILIES}")
+    changed = [change for change in proposal.changes if change.asks]
+    console.print(_table(engine, proposal.changes))
+    chosen, written = _decide(changed, families, console)
+    folder = files.folder_of(engine) or files.OURS / engine
+    add_families(folder, written)
+    members = accepted(_with_reasons(proposal, written), chosen)
+    write_members(folder, members)
+    left = [change.family.id for change in changed if change.family.id not in chosen]
+    listed = sorted({m.family.id for m in members.values()})
+    if as_json:
+        said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
+        click.echo(json.dumps({**said, "refused": len(proposal.refused), "not_accepted": left}, indent=1))
+    else:
+        click.echo(f"{engine}: {len(members)} rows of {len(listed)} families listed in {folder / MEMBERS}")
+    _show_refused(proposal.refused)
+    if left:
+        click.echo(f"not accepted: {', '.join(left)}", err=True)
+    sys.exit(1 if left or proposal.refused else 0)
+
+
+def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Console) -> list[Row]:
+    """Rows of the engine with their scatter, which is measured here where the store does not have it."""
+    store = Store(out, create=False, write=True)
+    try:
+        chosen = store.run(run)
+        own = [o for o in store.observations(chosen) if o.slot.engine == engine]
+        if not all(map(_is_of_this_code, own)):
+            raise FindingsError(
+                f"run: {chosen.id} was made by other code or another release of {engine} than is installed now; "
+                "run it again"
+            )
+        title = f"{SCATTER_TITLE}{chosen.id}"
+        for earlier in (run for run in store.runs() if run.title == title):
+            own += filter(_is_of_this_code, store.observations(earlier))
+        moves = slots_to_move(rows_of(chosen.id, own), engine)
+        if moves:
+            console.print(f"{len(moves)} cells with moved starts, for the scatter of what fails")
+            own += store.observations(run_plan(store, title, moves, console, jobs))
+        return rows_of(chosen.id, own)
+    finally:
+        store.close()
+
+
+def _is_of_this_code(observation: Observation) -> bool:
+    """What is listed must be what this code and this release of the engine do."""
+    return observation.cell == prepare(observation.slot).cell.key()
+
+
+def _table(engine: str, changes: Sequence[Change]) -> Table:
+    table = Table(title=f"Findings of {engine}: rows per family", title_justify="left")
+    for name in ("family", "listed", "new", "drifted", "gone", "why"):
+        table.add_column(name, justify="right" if name in ("listed", "new", "drifted", "gone") else "left")
+    for change in changes:
+        listed = len(change.same) + len(change.drifted) + len(change.gone)
+        counts = (listed, len(change.new), len(change.drifted), len(change.gone))
+        table.add_row(change.family.id, *map(str, counts), change.family.reason or "nobody has said why yet")
+    return table
+
+
+def _decide(changed: Sequence[Change], named: Sequence[str], console: Console) -> tuple[set[str], list[Family]]:
+    """Ids of the families that are accepted, and those among them that got their reason just now."""
+    chosen, written = set(named), []
+    for change in changed:
+        if change.family.id in chosen and change.is_draft:
+            raise FindingsError(f"family: {change.family.id} has no reason; write it into {FAMILIES} first")
+        if change.family.id in chosen or not _on_a_terminal():
+            continue
+        console.print(_details(change), markup=False, highlight=False)
+        if not change.is_draft:
+            if click.confirm(f"{change.family.id}: is this still why: {change.family.reason}?", err=True):
+                chosen.add(change.family.id)
+            continue
+        reason = click.prompt("why do they fail (empty: leave them new)", default="", show_default=False, err=True)
+        source = click.prompt("where is that documented, read or measured", err=True) if reason.strip() else ""
+        if reason.strip() and source.strip():
+            written.append(replace(change.family, reason=reason.strip(), source=source.strip()))
+            chosen.add(change.family.id)
+    return chosen, written
+
+
+def _on_a_terminal() -> bool:
+    return sys.stdin.isatty()
+
+
+def _details(change: Change) -> str:
+    """What is new, drifted and gone in a family, kind of metric by kind."""
+    lines = [f"family {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
+    for name, entries in (("new", change.new), ("drifted", change.drifted), ("gone", change.gone)):
+        kinds = Counter(f"{key[0]} {key[6].partition('[')[0]}" for key in entries)
+        lines += [f"  {name}: {count} x {kind}" for kind, count in kinds.items()]
+    for key, (old, now) in list(change.drifted.items())[:3]:
+        lines.append(f"  {' '.join(filter(None, key))}: {number(old.value, 6)} -> {number(now.value, 6)}")
+    for key, now in list(change.new.items())[:3]:
+        lines.append(f"  {' '.join(filter(None, key))}: {number(now.value, 6)}")
+    return "\n".join(lines)
+
+
+def _with_reasons(proposal: Proposal, written: Sequence[Family]) -> Proposal:
+    """The proposal with drafts replaced by the families that they became."""
+    became = {family.id: family for family in written}
+    changes = []
+    for change in proposal.changes:
+        family = became.get(change.family.id)
+        new = {key: replace(found, family=family) for key, found in change.new.items()} if family else change.new
+        changes.append(replace(change, family=family or change.family, new=new))
+    return replace(proposal, changes=tuple(changes))
+
+
+def _show_refused(refused: Sequence[tuple[Row, str]]) -> None:
+    for why, count in Counter(why for _, why in refused).items():
+        click.echo(f"refused: {count} rows: {why}", err=True)
+    for row, _ in refused[:SHOWN]:
+        where = f"{row.engine}/{row.profile} {row.scene} {row.dimension}-D"
+        click.echo(f"  {where} {row.slot['params']} {row.metric} {number(row.value, 6)}", err=True)
+    if len(refused) > SHOWN:
+        click.echo(f"  and {len(refused) - SHOWN} more", err=True)

@@ -1,0 +1,65 @@
+"""Files that a call names: refused before anything runs, not after all of it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from adapters.scene import SceneError
+
+
+class _File(click.ParamType):
+    """Name of a file that will be written; what ends in a slash names a folder."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value).endswith(("/", os.sep)):
+            field = param.name if param else "file"
+            raise SceneError(f"{field}: {value} is a folder, not a file")
+        return Path(value)
+
+
+FILE = _File()
+
+
+def writable(path: Path, field: str) -> Path:
+    """Return ``path`` if a file can be written there.
+
+    Raises
+    ------
+    SceneError
+        Naming ``field``, if it is a folder, if its folder is not there, or if it may not be written.
+    """
+    if path.is_dir():
+        raise SceneError(f"{field}: {path} is a folder, not a file")
+    folder = nearest(path.parent)
+    if field != "output" and folder != path.parent:
+        raise SceneError(f"{field}: there is no folder {path.parent}")
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        raise SceneError(f"{field}: {path} may not be written")
+    return path
+
+
+def folder(path: Path, field: str = "out") -> Path:
+    """Return ``path`` if it is a folder, or one can be made there.
+
+    Raises
+    ------
+    SceneError
+        Naming ``field``, if there is a file of that name, or no folder may be made.
+    """
+    if path.exists() and not path.is_dir():
+        raise SceneError(f"{field}: {path} is a file, not a folder")
+    there = nearest(path)
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        raise SceneError(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
+    return path
+
+
+def nearest(path: Path) -> Path:
+    """The first of ``path`` and its parents that exists."""
+    return next((p for p in (path, *path.absolute().parents) if p.exists()), path)

@@ -1,0 +1,259 @@
+"""``show``, ``findings``, ``explain``: what a run in the store says, from the first look down to one row."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from adapters.scene import SceneError
+from reports import speed
+from reports.answers import Costs, answers, choices
+from reports.command.completion import engine_names, row_ids, scene_names
+from reports.command.group import AS_JSON, OUT, main
+from reports.cures import Change, changes, pasteable
+from reports.findings import ALARMING, Family, families, grouped, severity
+from reports.matrix import matrix_of
+from reports.summary import show as show_summary
+from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from validation.bench import reading
+from validation.cells import Observation
+from validation.rows import rows_of
+from validation.store import Store
+
+Plain = Mapping[str, Any]
+#: How far off a row is, for those that have no tolerance in units of which to say it.
+NO_RATIO = "-"
+
+
+def load(out: Path, run: str) -> tuple[list[Plain], list[Observation], Costs]:
+    """Judged rows of a run, its observations, and what the last bench in the same store says of costs.
+
+    Raises
+    ------
+    StoreError
+        If the folder has no results or no such run.
+    """
+    store = Store(out, create=False)
+    try:
+        chosen = store.run(run)
+        observations = store.observations(chosen)
+        rows: list[Plain] = [row.as_dict() for row in rows_of(chosen.id, observations)]
+        timed = reading.bench_runs(store)
+        return rows, observations, speed.cheapest_passing(store, timed[-1]) if timed else {}
+    finally:
+        store.close()
+
+
+@main.command()
+@click.argument("run", default="latest")
+@AS_JSON
+@OUT
+def show(run: str, as_json: bool, out: Path) -> None:
+    """Show RUN (the latest by default) as `run` did at its end: matrix, short answers, where the details are."""
+    rows, _, costs = load(out, run)
+    if as_json:
+        click.echo(json.dumps(_as_plain(rows, costs), indent=1))
+        return
+    console = Console()
+    show_summary(rows, console, costs)
+    report = out / "report.html"
+    if report.is_file():
+        console.print(Text(f"  report: {report}"), soft_wrap=True)
+
+
+def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
+    found = matrix_of(rows)
+    fields = [
+        {"scene": scene, "dimension": dimension, "engine": engine, "profile": profile, "swept": swept,
+         "mark": field.mark, "judged": field.judged, "missed": field.missed}
+        for swept, every in ((False, found.fields), (True, found.swept))
+        for ((scene, dimension), (engine, profile)), field in every.items()
+    ]  # fmt: skip
+    return {
+        "matrix": fields,
+        "choices": [choice.as_dict() for choice in choices(rows, costs)],
+        "answers": [answer.as_dict() for answer in answers(rows)],
+    }
+
+
+@main.command()
+@click.argument("run", default="latest")
+@click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
+@click.option("--scene", multiple=True, metavar="S", shell_complete=scene_names, help="Only this scene.")
+@click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
+@click.option("--new", is_flag=True, help="Only what makes `run` exit with 1: new, drifted, INVALID, crashed.")
+@click.option("--all", "every", is_flag=True, help="Every row, not the worst of each family.")
+@AS_JSON
+@OUT
+def findings(run: str, every: bool, as_json: bool, out: Path, new: bool, **wanted: Sequence[str]) -> None:
+    """List the rows of RUN (the latest by default) that do not pass, by family, the most serious first.
+
+    A family is one engine, profile, scene, kind of metric and standing; it is shown by its worst row.
+    """
+    rows, _, _ = load(out, run)
+    rows = [row for row in rows if all(row[name] in chosen for name, chosen in wanted.items() if chosen)]
+    if new:
+        rows = [row for row in rows if mark_of(row) in ALARMING]
+    if every:
+        chosen = [row for _, group in grouped(rows) for row in group]
+        if as_json:
+            click.echo(json.dumps([{**row, "id": row_id(row)} for row in chosen], indent=1))
+        else:
+            _print_rows(chosen, Console())
+        return
+    found = families(rows)
+    if as_json:
+        click.echo(json.dumps([family.as_dict() for family in found], indent=1))
+        return
+    _print_families(found, Console())
+
+
+def _grid(*headings: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    return table
+
+
+def _print_families(found: Sequence[Family], console: Console) -> None:
+    if not found:
+        console.print("no such row fails")
+        return
+    for mark in dict.fromkeys(family.mark for family in found):
+        own = [family for family in found if family.mark == mark]
+        console.print()
+        count = sum(len(family.rows) for family in own)
+        console.print(Text(f"{LABELS[mark]}: {count} rows in {len(own)} families", style="bold"))
+        table = _grid("id", "engine, scene", "worst row", "rows")
+        table.columns[0].no_wrap = True
+        for family in own:
+            who = f"{family.engine}/{family.profile} {family.scene}"
+            table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
+        console.print(table, highlight=False)
+    console.print()
+    console.print(Text("crosscheck explain ID says everything about a row; --all lists every row."), style="dim")
+
+
+def _worst(row: Plain) -> str:
+    if row["value"] is None:
+        return f"{row['dimension']}-D {row['metric']}: {row['reason']}"
+    asked = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
+    where = " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), asked) if text)
+    truth = quantity(row["truth"], row["unit"])
+    return f"{row['metric']} {measured(row)} instead of {truth}, {_ratio(row)} tolerances off ({where})"
+
+
+def _ratio(row: Plain) -> str:
+    return number(severity(row), 3) if row["error"] is not None and row["tolerance"] else NO_RATIO
+
+
+def _print_rows(rows: Sequence[Plain], console: Console) -> None:
+    table = _grid("id", "standing", "engine, scene", "row")
+    for row in rows:
+        who = f"{row['engine']}/{row['profile']} {row['scene']}"
+        table.add_row(row_id(row), LABELS[mark_of(row)], who, _worst(row))
+    console.print(table, highlight=False)
+
+
+@main.command()
+@click.argument("row", shell_complete=row_ids)
+@click.option("--run", default="latest", show_default=True, help="Which run.")
+@AS_JSON
+@OUT
+def explain(row: str, run: str, as_json: bool, out: Path) -> None:
+    """Say everything about one ROW: what was asked and measured, the truth, the tolerance and why, what cures it.
+
+    ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
+    row there.
+    """
+    rows, observations, _ = load(out, run)
+    found = find_row(rows, row)
+    better, paste, differing = _cure(rows, observations, found)
+    if as_json:
+        plain = [{"name": c.name, "before": c.before, "after": c.after, "because": c.because} for c in differing]
+        cure = {"profile": better, "changes": plain, "paste": paste}
+        click.echo(
+            json.dumps({**found, "id": row_id(found), "command": reproduce(found["slot"]), "cure": cure}, indent=1)
+        )
+        return
+    _print_explanation(found, better, paste, differing, Console())
+
+
+def find_row(rows: Sequence[Plain], name: str) -> Plain:
+    """Return the row that ``name`` means.
+
+    Raises
+    ------
+    SceneError
+        If there is none, or ids of several rows begin so.
+    """
+    if "/" in name:
+        parts = name.split("/", 3)
+        keys = ("engine", "profile", "scene")
+        fits = [row for row in rows if all(row[k] == part for k, part in zip(keys, parts, strict=False))]
+        if len(parts) > 3:
+            fits = [row for row in fits if parts[3] in (row["metric"], row["metric"].partition("[")[0])]
+        if not fits:
+            raise SceneError(f"row: this run has no row {name!r}; crosscheck findings lists what fails")
+        return max(fits, key=severity)
+    fits = [row for row in rows if row_id(row).startswith(name)]
+    if len(fits) != 1:
+        many = f"{len(fits)} rows begin" if fits else "no row of this run begins"
+        raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
+    return fits[0]
+
+
+def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, list[Change]]:
+    """A profile of the same engine that passes this very row, its settings to paste, and what it changes."""
+    if mark_of(row) == "pass":
+        return "", "", []
+    same = ("engine", "scene", "dimension", "params", "dt", "metric")
+    good = [
+        other["profile"] for other in rows
+        if other["physics"] == "pass" and other["iterations"] is None and all(other[n] == row[n] for n in same)
+    ]  # fmt: skip
+    if not good or good[0] == row["profile"]:
+        return "", "", []
+    where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], good[0])
+    return good[0], pasteable(*where), changes(*where)
+
+
+def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[Change], console: Console) -> None:
+    iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
+    asked = f"{row['scene']} {row['dimension']}-D, {params_text(row['params'])}"
+    table = _grid("", "")
+    table.show_header = False
+    table.columns[0].no_wrap = True
+    off = f" = {_ratio(row)} tolerances" if severity(row) else ""
+    lines = [
+        ("row", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
+        ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
+        ("asked", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
+        (
+            "measured",
+            f"{row['metric']} = {measured(row, 8)}" if row["value"] is not None else f"no value: {row['reason']}",
+        ),
+        ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
+        ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
+        ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
+        ("standing", row["reason"] or "-"),
+    ]
+    if better:
+        text = "; ".join(f"{c.name} {c.before} -> {c.after} ({c.because})" for c in differing)
+        lines.append(("cure", f"profile {better} passes this row. It differs in: {text}."))
+        lines.append(("", "Which of these matters was not measured here: they are the profiles' difference."))
+    lines.append(("again", reproduce(row["slot"])))
+    for name, text in lines:
+        table.add_row(Text(name, style="bold"), Text(text))
+    console.print(table)
+    if paste:
+        console.print()
+        console.print(Text("to paste:", style="bold"))
+        console.print(Text(paste), soft_wrap=True)

@@ -1,0 +1,34 @@
+"""Exit statuses of the command: one table, which the README shows and a test compares.
+
+Where several hold, the first in this order counts: the call, the results, the verdicts, completeness.
+"""
+
+from __future__ import annotations
+
+#: Everything that was asked for ran, and nothing of it is alarming.
+FINE = 0
+#: A verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a check that does not hold.
+ALARM = 1
+#: The call is wrong: an unknown name, a value out of range, a scene file that is not valid. Nothing has run.
+WRONG_CALL = 2
+#: Results could not be kept, read or written: a full or read-only disk, a store of a later version, a damaged file.
+RESULTS = 3
+#: Not all of what was asked for ran: a named engine is missing, cells were left, the machine allows too little.
+INCOMPLETE = 4
+#: Ctrl-C; what finished is kept, the same command resumes.
+INTERRUPTED = 130
+
+#: Status -> what it says, as the README has it.
+MEANING = {
+    FINE: "everything asked for ran, nothing is alarming",
+    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check",
+    WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
+    RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
+    INCOMPLETE: "not everything asked for ran: named engine missing, cells left after time-outs, too little memory",
+    INTERRUPTED: "interrupted; what finished is kept, the same command resumes",
+}
+
+
+def verdict(alarming: bool, complete: bool = True) -> int:
+    """Status of a command that ran: an alarm counts before what is missing."""
+    return ALARM if alarming else FINE if complete else INCOMPLETE

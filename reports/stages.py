@@ -1,0 +1,52 @@
+"""Stages of a long command on stderr: what is being done, how long it will take, how long it took."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from validation.cells import Slot
+from validation.warming import Warming
+
+
+def clock(seconds: float) -> str:
+    """``8 s``, ``3 min 05 s``."""
+    whole = round(seconds)
+    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60:02d} s"
+
+
+def say(console: Console, text: str) -> None:
+    """One line, never broken and never read as markup."""
+    console.print(Text(text), soft_wrap=True)
+
+
+@contextmanager
+def stage(console: Console, name: str) -> Iterator[None]:
+    """Say how long the block took, unless it fails."""
+    started = time.monotonic()
+    yield
+    say(console, f"{name}: {clock(time.monotonic() - started)}")
+
+
+def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> None:
+    """Compile what the engines of these cells compile at their first steps; no clock and no limit runs yet."""
+    warming = Warming(slots)
+    if not len(warming):
+        return
+    jobs = jobs or os.cpu_count() or 1
+    expected = clock(warming.estimate(jobs))
+    say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores")
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with (
+        stage(console, "compiled"),
+        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
+    ):
+        task = progress.add_task(f"compiling, about {expected}", total=len(warming))
+        for done in warming.run(jobs):
+            progress.update(task, advance=1, description=f"compiled {done}; about {expected} in all")

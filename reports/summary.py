@@ -1,0 +1,98 @@
+"""What the terminal says of a run: the matrix first, then the short answers, then where the details are.
+
+alarms (if any) -> matrix -> which engine for which scene -> what is wrong and what cures it -> where to look
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from reports.answers import Costs, answers, choices
+from reports.findings import alarms, families, refusals
+from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, versions_of
+
+Plain = Mapping[str, Any]
+#: Families of alarms that are named one by one; `crosscheck findings --new` names all.
+MOST_ALARMS = 6
+
+
+def show(rows: Sequence[Plain], console: Console, costs: Costs | None = None, files: Iterable[Path] = ()) -> None:
+    """Print everything about a run that a first look wants, fit to the width of ``console``."""
+    matrix = matrix_of(rows)
+    for table in tables_of(matrix, versions_of(rows), console.width):
+        console.print(table)
+    console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
+    for line in sweeps_of(matrix):
+        console.print(_folded(line, console, ""), style="dim")
+    for line in refusals(rows):
+        console.print(_folded(line, console, ""))
+    _alarms(rows, console)
+    _choices(rows, console, costs)
+    _answers(rows, console)
+    _where(rows, console, files)
+
+
+def _heading(text: str, console: Console) -> None:
+    console.print()
+    console.print(Text(text, style="bold"))
+
+
+def _folded(text: str, console: Console, indent: str = "  ") -> Text:
+    """Text in lines of the console's width; later lines stand in by four more."""
+    later = indent + "    "
+    folded = textwrap.fill(
+        text, console.width, initial_indent=indent, subsequent_indent=later, break_on_hyphens=False,
+        break_long_words=False,
+    )  # fmt: skip
+    return Text(folded)
+
+
+def _alarms(rows: Sequence[Plain], console: Console) -> None:
+    found = alarms(rows)
+    if not found:
+        return
+    total = sum(len(family.rows) for family in found)
+    _heading(f"Needs attention: {total} row{'s' if total > 1 else ''} that nobody knew (exit status 1)", console)
+    for family in found[:MOST_ALARMS]:
+        console.print(_folded(family.line, console))
+    if len(found) > MOST_ALARMS:
+        console.print(_folded(f"... {len(found) - MOST_ALARMS} more families: crosscheck findings --new", console))
+
+
+def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> None:
+    order = ", cheapest first" if costs else ""
+    _heading(f"Which engine for what (passes every row of the scene{order})", console)
+    found = choices(rows, costs)
+    wide = max((len(choice.scene) for choice in found), default=0)
+    for choice in found:
+        console.print(_folded(f"{choice.scene:<{wide}}  {choice.line}", console))
+
+
+def _answers(rows: Sequence[Plain], console: Console) -> None:
+    found = answers(rows)
+    _heading("What is wrong, and what cures it" if found else "Every row passes", console)
+    for answer in found:
+        console.print(_folded(answer.line, console))
+
+
+def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> None:
+    found = families(rows)
+    failing = sum(len(family.rows) for family in found)
+    _heading("Where the details are", console)
+    engine = found[0].engine if found else "NAME"
+    for command, what in (
+        ("crosscheck findings", f"{failing} rows that fail, in {len(found)} families"),
+        (f"crosscheck findings --engine {engine}", "the same of one engine; --scene, --new"),
+        ("crosscheck explain ID", "one row: why, and what cures it"),
+        ("crosscheck report --open", "one page about all of it"),
+    ):
+        console.print(Text(f"  {command:<38}{what}"))
+    written = [str(path) for path in files]
+    if written:
+        console.print(_folded(f"{len(rows)} rows written: {', '.join(written)}", console), soft_wrap=True)

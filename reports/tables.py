@@ -1,0 +1,156 @@
+"""``list``, ``describe`` and ``doctor`` as tables for the terminal, fit to its width."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from reports.cures import setting_text
+from reports.wording import number, quantity
+
+Plain = Mapping[str, Any]
+#: Columns of each listing: heading and field.
+LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
+    "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
+    "engines": (("engine", "name"), ("version", "version"), ("profiles", "profiles"), ("status", "status")),
+    "checks": (("check", "name"), ("truth", "truth"), ("tolerance", "bound"), ("because", "because")),
+    "runs": (("run", "id"), ("date", "date"), ("what", "title"), ("finished", "finished")),
+}
+
+
+def grid(*headings: str) -> Table:
+    """A table without frames; the first column keeps its words whole."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 2, 0, 0))
+    for k, heading in enumerate(headings):
+        table.add_column(heading, no_wrap=k == 0, overflow="fold")
+    return table
+
+
+def _heading(text: str, console: Console) -> None:
+    console.print()
+    console.print(Text(text, style="bold"))
+
+
+def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
+    """Print a listing of scenes, engines, checks or runs."""
+    columns = LISTINGS[what]
+    table = grid(*(heading for heading, _ in columns))
+    for entry in entries:
+        table.add_row(*(Text(_field(entry, name)) for _, name in columns))
+    console.print(table)
+    for entry in entries:
+        if entry.get("reason"):
+            console.print(Text(f"{entry['name']}: {entry['reason']}"))
+
+
+def _field(entry: Plain, name: str) -> str:
+    value = entry.get(name)
+    if name in ("truth", "bound"):
+        return quantity(value, entry["unit"], 3)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return setting_text(value) if value is not None else "-"
+
+
+def described(data: Plain, console: Console) -> None:
+    """Print everything about a scene or an engine."""
+    if data["kind"] == "scene":
+        _scene(data, console)
+    else:
+        _engine(data, console)
+
+
+def _scene(data: Plain, console: Console) -> None:
+    console.print(Text(f"{data['name']}, version {data['version']}: {data['title']}", style="bold"))
+    console.print(Text(data["figure"].rstrip()), soft_wrap=True)
+    _heading("Parameters", console)
+    table = grid("name", "default", "range", "what")
+    for p in data["parameters"]:
+        left = "(" if p["positive"] else "["
+        table.add_row(
+            p["name"], quantity(p["default"], p["unit"]), f"{left}{p['low']:g}, {p['high']:g}]", Text(p["because"])
+        )
+    console.print(table)
+    _heading("Checks at the defaults, step 1/240 s", console)
+    table = grid("metric", "truth", "tolerance", "because")
+    last = ""
+    for check in data["checks_at_defaults"]:
+        truth, bound = (quantity(check[name], check["unit"]) for name in ("truth", "bound"))
+        because = f"{check['because']} ({check['source']})"
+        table.add_row(Text(check["metric"]), truth, bound, Text("as above" if because == last else because))
+        last = because
+    console.print(table)
+    _heading("What it needs of an engine", console)
+    _pairs(data["needs"], console)
+
+
+def _engine(data: Plain, console: Console) -> None:
+    title = f": {data['title']}" if "title" in data else ""
+    console.print(Text(f"{data['name']} {data['version']}{title}, {data['status']}", style="bold"))
+    if data["status"] != "installed":
+        console.print(Text(data["reason"]))
+        return
+    facts = {name: data[name] for name in ("package", "dimensions", "customary_dt")}
+    _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
+    for profile, scenes in data["profiles"].items():
+        _heading(f"Profile {profile}", console)
+        console.print(_settings(scenes))
+    _heading("Habits, and what the adapter does about them", console)
+    table = grid("habit", "what we do", "source")
+    table.columns[0].no_wrap = False
+    for quirk in data["quirks"]:
+        table.add_row(*(Text(quirk[name]) for name in ("what", "what_we_do", "source")))
+    console.print(table)
+    for version, why in data["known_bad_versions"].items():
+        console.print(Text(f"version {version} is known to be bad: {why}"))
+
+
+def _settings(scenes: Mapping[str, Sequence[Plain]]) -> Table:
+    """One line per setting and value; names the scenes where a value is not the same in all."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for scene, settings in scenes.items():
+        for s in settings:
+            found.setdefault((s["name"], setting_text(s["value"]), s["because"]), []).append(scene)
+    table = grid("setting", "value", "in", "because")
+    for (name, value, because), where in found.items():
+        everywhere = len(where) == len(scenes)
+        table.add_row(name, Text(value), "" if everywhere else ", ".join(where), Text(because))
+    return table
+
+
+def _pairs(data: Plain, console: Console) -> None:
+    table = Table.grid(padding=(0, 2, 0, 0))
+    for name, value in data.items():
+        text = number(value) if isinstance(value, float) else setting_text(value)
+        table.add_row(Text(str(name)), Text(text))
+    console.print(table)
+
+
+def health(data: Plain, console: Console) -> None:
+    """Print what ``doctor`` found."""
+    machine = data["machine"]
+    _pairs({**machine, "commit": data["commit"] or "-", "executable": data["executable"]}, console)
+    console.print()
+    table = grid("engine", "version", "status")
+    for engine in data["engines"]:
+        table.add_row(engine["name"], engine["version"] or "-", Text(engine["reason"] or engine["status"]))
+    console.print(table)
+    console.print()
+    table = grid("package", "where it lies")
+    for name, folder in data["packages"].items():
+        table.add_row(name, Text(folder))
+    cache = data["kernel_cache"]
+    table.add_row("compiled kernels", Text(f"{cache['folder'] or 'no folder is writable: compiled in every process'}"))
+    console.print(table)
+    console.print()
+    problems = data["problems"]
+    console.print(Text("no problem found" if not problems else f"{len(problems)} problem(s)", style="bold"))
+    for problem in problems:
+        console.print(Text(f"  {problem}"))

@@ -1,0 +1,108 @@
+"""``accept``: shows families, asks for the reason of each, and cannot be talked into what must not be listed."""
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import accepting, main
+from validation.findings import files
+
+FAMILY = """
+[[family]]
+id = "starved"
+profiles = ["default"]
+scene = "stack"
+metrics = ["drift", "penetration", "settle_time", "kinetic_energy", "impulse_scatter", "interface_impulse"]
+reason = "four sweeps do not solve a column of ten"
+source = "its manual"
+releases = ">=7.3,<7.4"
+"""
+CELL = ["run", "stack", "--param", "n=10", "--iterations", "1", "--engine", "chipmunk", "--profile", "default",
+        "--dim", "2", "--jobs", "1"]  # fmt: skip
+
+
+def call(*arguments, **kwargs):
+    return CliRunner().invoke(main, [str(a) for a in arguments], **kwargs)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """One starved column, and its scatter from moved starts."""
+    folder = tmp_path_factory.mktemp("accept")
+    call(*CELL, "--out", folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(files, "OURS", folder)
+        result = call("accept", "--engine", "chipmunk", "--jobs", 1, "--out", folder)
+    assert "4 cells with moved starts" in result.stderr, result.output
+    return folder
+
+
+@pytest.fixture
+def findings(tmp_path, monkeypatch):
+    """A folder of findings to write to."""
+    monkeypatch.setattr(files, "OURS", tmp_path)
+    files.findings_of.cache_clear()
+    yield tmp_path / "chipmunk"
+    files.findings_of.cache_clear()
+
+
+def accept(out, *arguments, **kwargs):
+    return call("accept", "--engine", "chipmunk", "--out", out, *arguments, **kwargs)
+
+
+def members(findings):
+    return (findings / files.MEMBERS).read_text().splitlines()[1:] if findings.exists() else []
+
+
+def test_without_a_terminal_nothing_is_listed_that_was_not_named(out, findings):
+    findings.mkdir()
+    (findings / files.FAMILIES).write_text(FAMILY)
+    result = accept(out)
+    assert result.exit_code == 1
+    assert "not accepted: starved" in result.stderr
+    assert members(findings) == []
+
+
+def test_a_named_family_is_listed_with_values_and_bands_and_the_run_is_quiet_then(out, findings):
+    findings.mkdir()
+    (findings / files.FAMILIES).write_text(FAMILY)
+    result = accept(out, "--family", "starved")
+    assert result.exit_code == 0, result.output
+    listed = members(findings)
+    assert len(listed) > 5
+    assert all(line.startswith("starved,default,2,n=10,1/240,1,") for line in listed)
+    assert call(*CELL, "--out", out).exit_code == 0
+    again = accept(out, "--family", "starved")
+    assert members(findings) == listed, again.output
+
+
+def test_a_terminal_is_asked_for_the_reason_of_every_family(out, findings, monkeypatch):
+    monkeypatch.setattr(accepting, "_on_a_terminal", lambda: True)
+    result = accept(out, input="one sweep is not enough\nits manual\n" + "\n" * 10)
+    assert result.exit_code == 1  # the others got no reason
+    (family,) = files.findings_of("chipmunk").families.values()
+    assert (family.reason, family.source) == ("one sweep is not enough", "its manual")
+    assert family.profiles == ("default",) and family.scene == "stack" and len(family.metrics) == 1
+    listed = files.findings_of("chipmunk").members
+    assert {key[6].partition("[")[0] for key in listed} == set(family.metrics)
+    # Asked again about a family that has not changed since, it does not ask.
+    assert "is this still why" not in accept(out, input="\n" * 10).stderr
+
+
+def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
+    result = accept(out, "--family", "default-stack-drift")
+    assert result.exit_code == 2
+    assert "has no reason" in result.stderr
+    assert members(findings) == []
+
+
+def test_an_unknown_family_is_a_wrong_call(out, findings):
+    result = accept(out, "--family", "unheard-of")
+    assert result.exit_code == 2
+    assert "no such family" in result.stderr
+
+
+def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):
+    monkeypatch.setattr("validation.cells.adapter_hash", lambda engine: "other")
+    result = accept(out)
+    assert result.exit_code == 2
+    assert "was made by other code" in result.stderr

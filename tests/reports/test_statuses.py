@@ -1,0 +1,105 @@
+"""Exit statuses: one table, in the README as in the code, and each one reached by what it says."""
+
+import json
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main, statuses
+from validation.store import FILE, VERSION
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ["run", "impact", "--param", "v=6", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--jobs", "1"]
+
+
+def call(*arguments, **kwargs):
+    return CliRunner().invoke(main, [str(a) for a in arguments], **kwargs)
+
+
+def one_line(result):
+    assert "Traceback" not in result.output
+    lines = [line for line in result.stderr.splitlines() if line.startswith("crosscheck:")]
+    assert len(lines) == 1, result.output
+    return lines[0]
+
+
+def test_the_readme_has_the_table_of_the_code():
+    rows = dict(re.findall(r"^\| (\d+) \| (.+?) \|$", (ROOT / "README.md").read_text(), re.MULTILINE))
+    assert {int(status): meaning for status, meaning in rows.items()} == statuses.MEANING
+
+
+def test_a_healthy_run_is_fine_and_a_crash_is_an_alarm(plugins, tmp_path):
+    assert call(*SMALL, "--out", tmp_path / "a").exit_code == statuses.FINE
+    crash = call("run", "impact", "--param", "v=6", "--dim", 2, "--engine", "evil", "--profile", "raise", "--out",
+                 tmp_path / "b")  # fmt: skip
+    assert crash.exit_code == statuses.ALARM
+
+
+@pytest.mark.parametrize("seconds", ["nan", "inf", "0", "-1", "1e9", "soon"])
+def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
+    result = call(*SMALL, "--timeout", seconds, "--out", tmp_path / "out")
+    assert result.exit_code == statuses.WRONG_CALL
+    assert "seconds" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_that_are_not_there_are_a_wrong_call(tmp_path):
+    result = call("report", "--out", tmp_path)
+    assert result.exit_code == statuses.WRONG_CALL
+    assert "there are no results" in one_line(result)
+
+
+@pytest.mark.parametrize("command", [["report"], ["list", "runs"], ["compare", "latest", "latest"], SMALL])
+def test_a_store_of_a_later_version_is_said_in_one_line(tmp_path, command):
+    with sqlite3.connect(tmp_path / FILE) as database:
+        database.execute(f"PRAGMA user_version = {VERSION + 1}")
+    result = call(*command, "--out", tmp_path)
+    assert result.exit_code == statuses.RESULTS
+    assert f"version {VERSION + 1}" in one_line(result)
+
+
+def test_a_named_engine_that_is_missing_is_said_and_has_a_status(plugins, tmp_path):
+    result = call("run", "impact", "--param", "v=6", "--dim", 2, "--engine", "broken", "--out", tmp_path)
+    assert result.exit_code == statuses.INCOMPLETE, result.output
+    assert "broken was named, but did not run" in result.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full on this system")
+@pytest.mark.parametrize("arguments", [["list", "scenes"], ["describe", "bounce", "--json"], ["--help"]])
+def test_a_full_stdout_is_said_in_one_line(arguments):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "reports.command", *arguments], stdout=full,
+                              stderr=subprocess.PIPE, text=True, cwd=ROOT)  # fmt: skip
+    assert done.returncode == statuses.RESULTS
+    assert done.stderr.startswith("crosscheck:") and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):
+    good = {"scene": "impact", "engine": "chipmunk", "profile": "tuned", "dt": "1/240", "params": {"v": 6.0}}
+    wrong = ["{", "[1]", "7", json.dumps(good | {"engine": "chipmonk"}), json.dumps(good | {"dt": "nan"}),
+             json.dumps(good | {"scene": 7}), json.dumps(good | {"params": {"v": "fast"}}), "[" * 100000,
+             json.dumps(good | {"dimension": "two"}), json.dumps(good | {"profile": "tunned"})]  # fmt: skip
+    text = "\n".join([wrong[0], json.dumps(good), *wrong[1:]]) + "\n\n"
+    result = call("run-cell", "--batch", input=text)
+    assert result.exit_code == statuses.WRONG_CALL
+    answers = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [a["outcome"] for a in answers if "outcome" in a] == ["ok"]
+    assert {a["line"] for a in answers if "error" in a} == {1, *range(3, len(wrong) + 2)}
+    assert all("\n" not in a["error"] for a in answers if "error" in a)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no ulimit on Windows")
+def test_a_shell_that_allows_too_little_memory_is_told_so_and_stores_no_crashes(tmp_path):
+    command = [sys.executable, "-m", "reports.command", *SMALL, "--out", str(tmp_path)]
+    script = 'ulimit -v "$0" && exec "$@"'
+    done = subprocess.run(["bash", "-c", script, str(2**20), *command], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == statuses.INCOMPLETE, done.stderr
+    assert "ulimit -v" in done.stderr and "Traceback" not in done.stderr
+    enough = subprocess.run(["bash", "-c", script, str(3 * 2**20), *command], cwd=ROOT, capture_output=True, text=True)
+    assert enough.returncode == statuses.FINE, enough.stderr

@@ -1,0 +1,228 @@
+"""The terminal answers first: matrix, which engine for what, what is wrong and what cures it, then where to look."""
+
+import io
+import json
+import re
+from itertools import product
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from reports.answers import answers, choices
+from reports.command import main
+from reports.matrix import matrix_of, sweeps_of
+from reports.summary import show
+from reports.wording import measured, quantity
+from validation.cells import Slot
+from validation.execution import execute
+from validation.store import Store
+
+PROFILES = {"reference": ("classical", "reference"), "chipmunk": ("default", "tuned"),
+            "bullet": ("default", "tuned", "one"), "mujoco": ("default", "tuned")}  # fmt: skip
+SCENES = ("impact", "bounce", "stack", "incline")
+METRIC = {"impact": "rebound_ratio", "bounce": "apex[1]", "stack": "settle_time", "incline": "creep"}
+
+
+def row(scene, dimension, engine, profile, mark="pass", value=0.8, truth=0.8, iterations=None, reason="", **params):
+    """A judged row as a run gives it; ``mark`` is pass, a standing of a FAIL, or unsupported."""
+    params = params or {"e": 0.8, "height": 1.0}
+    refused = mark == "unsupported"
+    slot = {"scene": scene, "params": params, "dimension": dimension, "engine": engine, "profile": profile,
+            "dt": 1 / 240, "iterations": iterations, "ulp": 0}  # fmt: skip
+    return {
+        "scene": scene, "dimension": dimension, "engine": engine, "profile": profile, "iterations": iterations,
+        "engine_version": "1.0+abc", "metric": METRIC[scene], "unit": "1", "value": None if refused else value,
+        "truth": truth, "error": None if refused else value - truth, "tolerance": 1e-3, "because": "so",
+        "outcome": "unsupported" if refused else "ok", "reason": reason, "dt": 1 / 240, "source": "law",
+        "physics": None if refused else "pass" if mark == "pass" else "fail",
+        "standing": "known" if refused else None if mark == "pass" else mark, "params": params, "slot": slot,
+    }  # fmt: skip
+
+
+def quick_suite():
+    """Rows of the shape of the quick suite, both dimensions telling different stories everywhere they can."""
+    rows = []
+    for scene, dimension, engine in product(SCENES, (2, 3), PROFILES):
+        for profile in PROFILES[engine]:
+            refused = engine == "chipmunk" and dimension == 3
+            mark = "unsupported" if refused else "known" if profile == PROFILES[engine][0] else "pass"
+            rows += [row(scene, dimension, engine, profile, mark, 0.5) for _ in range(140 + dimension)]
+    return rows
+
+
+def shown(rows, width, **more):
+    stream = io.StringIO()
+    show(rows, Console(file=stream, width=width), **more)
+    return stream.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_the_matrix_of_the_whole_quick_suite_stands_in_the_first_thirty_lines(width):
+    lines = shown(quick_suite(), width)
+    assert max(map(len, lines)) <= width
+    head = lines[:30]
+    assert head[0].split() == ["engine,", "profile", *SCENES]
+    for engine, profiles in PROFILES.items():
+        assert any(line.startswith(f"{engine} 1.0") and "abc" not in line for line in head)
+        for profile in profiles:
+            assert any(line.startswith(f"  {profile}") for line in head)
+    assert any(line.startswith("  every profile 3-D") for line in head)  # chipmunk is planar, and it is said
+    assert ("FAIL known 142/142" in "\n".join(head)) == (width >= 100)
+    assert "known 142/142" in "\n".join(head)
+
+
+def test_scenes_that_do_not_fit_make_a_further_table():
+    lines = shown(quick_suite(), 60)
+    heads = [line.split() for line in lines if line.startswith("engine, profile")]
+    assert len(heads) > 1 and [name for head in heads for name in head[2:]] == list(SCENES)
+    assert max(map(len, lines)) <= 60
+
+
+def test_a_sweep_over_iterations_is_counted_apart_from_the_profile():
+    rows = [row("stack", 2, "bullet", "tuned", "known" if k < 3 else "pass", n=k) for k in range(9)]
+    rows += [row("stack", 2, "bullet", "tuned", "known", iterations=count, n=10) for count in (1, 4)]
+    found = matrix_of(rows)
+    own, swept = found.fields[("stack", 2), ("bullet", "tuned")], found.swept[("stack", 2), ("bullet", "tuned")]
+    assert (own.missed, own.judged, swept.missed, swept.judged) == (3, 9, 2, 2)
+    (line,) = sweeps_of(found)
+    assert line == "stack at 1, 4 iterations instead of the profile's own, FAIL: bullet/tuned 2/2."
+    assert "known 3/9" in "\n".join(shown(rows, 80))
+
+
+def test_an_answer_that_never_changes_is_told_in_one_clause_with_its_cure():
+    rows = [row("impact", 3, "mujoco", "default", "explained", 0.1 + 0.001 * e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
+    rows += [row("impact", 3, "mujoco", "tuned", "pass", e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
+    (answer,) = answers(rows)
+    assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101 whatever e is asked; tuned cures it"
+
+
+def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
+    rows = [row("bounce", 2, "bullet", "default", "known", 0.25, 0.64, e=0.8, height=1.0)]
+    (answer,) = answers(rows)
+    assert answer.wrong == "rebounds at 0.5 instead of 0.8 (e=0.8 height=1)"
+    assert answer.cure == "no other profile does better"
+
+
+def test_what_is_nearer_is_no_cure():
+    rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
+    rows += [
+        row("incline", 2, "bullet", "tuned", "known" if r > 0.8 else "pass", 0.01, 0.0, ratio=r) for r in (0.5, 0.9)
+    ]
+    (answer,) = answers(rows)
+    assert answer.cure.startswith("tuned is nearer, 1 of 2 rows FAIL: creeps at 0.01")
+
+
+def test_a_time_that_the_end_cut_off_is_never_shown_as_a_time():
+    cut = row("stack", 2, "bullet", "default", "known", 5.0, 0.0, n=10) | {
+        "unit": "s", "reason": "never settled: still moving at the end of the run"}  # fmt: skip
+    assert measured(cut) == "never settled"
+    (answer,) = answers([cut])
+    assert answer.wrong == "never settles (n=10)"
+
+
+def test_a_ratio_has_no_unit_and_everything_else_has_one():
+    assert quantity(0.102934, "1", 6) == "0.102934"
+    assert quantity(5.4, "N s") == "5.4 N s"
+    assert quantity(None, "m") == "-"
+
+
+def test_who_passes_is_named_by_cost_and_by_the_dimensions_it_knows():
+    rows = [row("stack", d, e, "tuned") for d, e in ((2, "mujoco"), (3, "mujoco"), (2, "chipmunk"))]
+    rows += [row("stack", 2, "bullet", "tuned", "known", 0.1)]
+    costs = {("stack", 2, "mujoco", "tuned"): 2e-3, ("stack", 2, "chipmunk", "tuned"): 1e-3}
+    (choice,) = choices(rows, costs)
+    assert choice.line == "chipmunk/tuned (2-D only, 1 ms/s), mujoco/tuned (2 ms/s)"
+    (choice,) = choices([row("stack", 2, "bullet", "tuned", "known", 0.1)])
+    assert choice.line == "nobody passes every row; nearest is bullet/tuned (1 of 1 rows FAIL)"
+
+
+def test_later_apexes_that_fail_alone_are_told_as_they_are():
+    late = row("bounce", 2, "bullet", "one", "known", 0.5, 0.4) | {"metric": "apex[2]"}
+    (answer,) = answers([row("bounce", 2, "bullet", "one"), late])
+    assert "0.5" in answer.wrong and "0.4" in answer.wrong
+
+
+def test_alarms_stand_before_the_answers():
+    lines = shown([*quick_suite(), row("stack", 2, "mujoco", "tuned", "new", 0.1)], 80)
+    alarm = next(k for k, line in enumerate(lines) if line.startswith("Needs attention: 1 row"))
+    assert alarm < next(k for k, line in enumerate(lines) if line.startswith("Which engine"))
+    assert "NEW 1/143" in "\n".join(lines[:30])
+
+
+# ---- a real run ----
+
+
+@pytest.fixture(scope="module")
+def two_engines(tmp_path_factory):
+    """A store with real cells, and what the terminal shows of it."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("pymunk")
+    out = tmp_path_factory.mktemp("two")
+    who = [("mujoco", "default"), ("mujoco", "tuned"), ("chipmunk", "default"), ("chipmunk", "tuned")]
+    cells = [("bounce", {"e": e}) for e in (0.5, 0.95)] + [("bounce", {}), ("stack", {"n": 2.0})]
+    slots = [Slot(scene, tuple(p.items()), 2, *name, 1 / 240) for name in who for scene, p in cells]
+    store = Store(out)
+    run, _ = store.start("quick", slots)
+    for slot in slots:
+        store.add(run, execute(slot))
+    store.finish(run)
+    store.close()
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["show", "--out", str(out)])
+    assert result.exit_code == 0, result.stderr
+    return out, result.stdout
+
+
+def test_a_run_says_which_engine_to_use_for_stacks_how_wrong_the_bounce_is_and_the_cure(two_engines):
+    _, text = two_engines
+    lines = text.splitlines()
+    head, rest = lines[:30], " ".join(" ".join(lines).split())
+    assert any(line.startswith("mujoco 4") for line in head) and any("bounce" in line for line in head)
+    assert re.search(r"stack +.*mujoco/tuned", "\n".join(lines))
+    assert re.search(r"mujoco/default bounce: [^;]*rebound[^;]* whatever e is asked; tuned cures it", rest)
+    assert "crosscheck explain ID" in text
+
+
+def test_show_speaks_json(two_engines):
+    out, _ = two_engines
+    plain = json.loads(CliRunner().invoke(main, ["show", "--json", "--out", str(out)]).stdout)
+    assert {c["scene"] for c in plain["choices"]} == {"bounce", "stack"}
+    assert [a for a in plain["answers"] if (a["engine"], a["scene"]) == ("mujoco", "bounce")]
+
+
+def call(*arguments):
+    return CliRunner(env={"COLUMNS": "100"}).invoke(main, [str(a) for a in arguments])
+
+
+def test_findings_lists_every_failing_row_once_and_filters(two_engines):
+    out, _ = two_engines
+    rows = json.loads(call("findings", "--all", "--json", "--out", out).stdout)
+    every = json.loads(call("findings", "--json", "--out", out).stdout)
+    assert sum(family["count"] for family in every) == len(rows) > 0
+    assert sorted(id for family in every for id in family["rows"]) == sorted(row["id"] for row in rows)
+    some = json.loads(call("findings", "--engine", "mujoco", "--scene", "bounce", "--json", "--out", out).stdout)
+    assert 0 < len(some) < len(every) and {(f["engine"], f["scene"]) for f in some} == {("mujoco", "bounce")}
+    marks = ("crashed", "timed_out", "invalid", "new", "drifted")
+    new = json.loads(call("findings", "--new", "--json", "--out", out).stdout)
+    assert [f["mark"] for f in new] == [f["mark"] for f in every if f["mark"] in marks]
+    text = call("findings", "--out", out).stdout
+    assert every[0]["worst"]["metric"].partition("[")[0] in text and max(map(len, text.splitlines())) <= 100
+
+
+def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_engines):
+    out, _ = two_engines
+    text = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout
+    for word in ("measured", "truth", "tolerance", "standing", "cure", "profile tuned passes", "crosscheck run bounce"):
+        assert word in text
+    assert "<option " in text and "solref=" in text
+    plain = json.loads(call("explain", "mujoco/default/bounce/apex", "--json", "--out", out).stdout)
+    assert plain["cure"]["profile"] == "tuned" and {c["name"] for c in plain["cure"]["changes"]} >= {"solref"}
+    again = json.loads(call("explain", plain["id"], "--json", "--out", out).stdout)
+    assert again["id"] == plain["id"] and again["value"] == plain["value"]
+
+
+@pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])
+def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
+    out, _ = two_engines
+    result = call("explain", name, "--out", out)
+    assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1 and "row:" in result.stderr

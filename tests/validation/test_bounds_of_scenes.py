@@ -1,0 +1,88 @@
+"""Bounds that were too wide: what each owes, shown on motions that are right and on the fault it is there to see."""
+
+import numpy as np
+import pytest
+
+from adapters.trajectory import Trajectory
+from validation.scenes import CATALOGUE
+
+DTS = (1 / 60, 1 / 240, 1 / 1000)
+
+
+def reflected(scene, dt, scheme, restitute_gravity=False):
+    """Independent scalar stepper of a bouncing ball at e = 1: heights and velocities of a whole run.
+
+    ``scheme`` orders one step: velocity first, position first, or the mid-point rule. The impact takes the velocity
+    that the step began with; a wrong engine (``restitute_gravity``) takes the one after gravity.
+    """
+    e, g, y, v = scene.params["e"], scene.params["g"], scene.params["height"], 0.0
+    rows = [(y, v)]
+    while len(rows) <= scene.duration / dt:
+        old = v
+        if scheme == "position first":
+            y += v * dt
+        free = v - g * dt
+        hit = y <= 0.0 and v < 0.0
+        v = -e * (free if restitute_gravity else v) if hit else free
+        if scheme == "velocity first":
+            y += v * dt
+        if scheme == "mid-point":
+            y += 0.5 * (old + v) * dt
+        rows.append((y, v))
+    states = np.array(rows)
+    pose, twist = np.zeros((len(rows), 2, 3)), np.zeros((len(rows), 2, 3))
+    pose[:, 1, 1], twist[:, 1, 1] = states[:, 0] + 0.5, states[:, 1]
+    return Trajectory(np.arange(len(rows)) * dt, pose, twist, None, dt, "completed")
+
+
+def judged(scene, trajectory, metric):
+    """Value and bound of one check."""
+    canonical = CATALOGUE[scene.name]
+    (check,) = (check for check in canonical.checks(scene, trajectory.dt) if check.metric == metric)
+    return canonical.measure(scene, trajectory)[metric][0], check.bound
+
+
+@pytest.mark.parametrize("scheme", ["velocity first", "position first", "mid-point"])
+@pytest.mark.parametrize("dt", DTS)
+def test_no_order_of_a_step_owes_growth_at_e_1_however_late_an_impact_is_found(scheme, dt):
+    for height in np.linspace(1.0, 1.1, 7):
+        scene = CATALOGUE["bounce"].scene(2, {"e": 1.0, "height": float(height)})
+        growth, bound = judged(scene, reflected(scene, dt, scheme), "apex_growth")
+        assert growth <= bound, height
+
+
+@pytest.mark.parametrize("scheme", ["velocity first", "position first", "mid-point"])
+@pytest.mark.parametrize("dt", DTS)
+def test_an_engine_that_restitutes_gravity_s_own_step_is_seen_to_grow(dt, scheme):
+    """Each rebound is g dt too fast, |v| dt of height: as much as a late impact used to be forgiven."""
+    scene = CATALOGUE["bounce"].scene(2, {"e": 1.0})
+    growth, bound = judged(scene, reflected(scene, dt, scheme, restitute_gravity=True), "apex_growth")
+    assert growth > 0.5 * np.sqrt(2.0 * 9.81) * dt > 10.0 * bound
+
+
+def sunk(n, overlap, which):
+    """A column at rest whose interface ``which`` (from below, 1 based) overlaps by ``overlap`` [m]."""
+    scene = CATALOGUE["stack"].scene(2, {"n": n})
+    pose = np.tile([body.pose for body in scene.bodies], (10, 1, 1))
+    pose[1:, which:, 1] -= overlap
+    return scene, pose
+
+
+@pytest.mark.parametrize("dt", DTS)
+@pytest.mark.parametrize(("n", "which"), [(1, 1), (10, 1), (10, 7), (20, 20)])
+def test_one_interface_owes_one_step_of_fall_however_high_the_column(n, which, dt):
+    for share, passes in ((0.99, True), (1.01, False), (0.99 * n, n == 1)):
+        scene, pose = sunk(n, share * 9.81 * dt * dt, which)
+        twist = np.zeros_like(pose)
+        depth, bound = judged(scene, Trajectory(np.arange(10) * dt, pose, twist, None, dt, "completed"), "penetration")
+        assert (depth <= bound) is passes, share
+
+
+@pytest.mark.parametrize("dt", DTS)
+def test_a_whole_column_that_is_found_one_step_late_passes(dt):
+    """All contacts are missing in the first step: everything falls together, only the lowest interface overlaps."""
+    scene, pose = sunk(10, 9.81 * dt * dt, 1)
+    depth, bound = judged(
+        scene, Trajectory(np.arange(10) * dt, pose, np.zeros_like(pose), None, dt, "completed"), "penetration"
+    )
+    assert 0.999 * bound < depth <= bound

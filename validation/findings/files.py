@@ -1,0 +1,224 @@
+"""Files of findings: ``families.toml`` (reasons) and ``members.csv`` (rows) in one folder per engine.
+
+Ours are the folders beside this file. The package of another engine names its folder by an entry point, whose value
+is ``package:folder.inside.it``; nothing of that package is imported for it::
+
+    [project.entry-points."contact_crosscheck.findings"]
+    myengine = "mypackage:findings"
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from packaging.specifiers import InvalidSpecifier, SpecifierSet
+
+from validation.findings import NEVER_LISTED, Family, Finding, Findings, FindingsError, Key, Unsupported
+
+GROUP = "contact_crosscheck.findings"
+FAMILIES, MEMBERS = "families.toml", "members.csv"
+COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
+#: What stands in the column ``value`` of a cell that ended in numbers that are none.
+DIVERGED = "diverged"
+#: Folders of the engines of this project.
+OURS = Path(__file__).resolve().parent
+
+
+@cache
+def findings_of(engine: str) -> Findings | None:
+    """All that is known about ``engine``; None if nobody has written findings for it.
+
+    Raises
+    ------
+    FindingsError
+        If its files are wrong, or if there are two folders for one engine.
+    """
+    folder = folder_of(engine)
+    return None if folder is None else read(engine, folder)
+
+
+def folder_of(engine: str) -> Path | None:
+    """Folder with the findings of ``engine``, ours or that of its entry point; None if there is none."""
+    found = [OURS / engine] if (OURS / engine).is_dir() else []
+    found += [_folder(entry) for entry in entry_points(group=GROUP) if entry.name == engine]
+    if len(found) > 1:
+        raise FindingsError(f"findings of {engine}: stand in {' and in '.join(map(str, found))}; one of them must go")
+    return found[0] if found else None
+
+
+def _folder(entry: EntryPoint) -> Path:
+    """Folder that an entry point names; its top-level package is located, not imported."""
+    package, _, inside = entry.value.partition(":")
+    spec = find_spec(package) if package.isidentifier() else None
+    places = [Path(place, *inside.split(".")) for place in (spec.submodule_search_locations or ())] if spec else []
+    folder = next((place for place in places if place.is_dir()), None)
+    if folder is None or not inside:
+        raise FindingsError(
+            f"entry point {GROUP}.{entry.name}: {entry.value!r} is not a folder of an installed package "
+            "(mypackage:folder.inside.it)"
+        )
+    return folder
+
+
+def read(engine: str, folder: Path) -> Findings:
+    """Read and check the findings of ``engine`` in ``folder``.
+
+    Raises
+    ------
+    FindingsError
+        Naming file and entry of what is missing, unknown, doubled or not covered by its family.
+    """
+    path = folder / FAMILIES
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FindingsError(f"{path}: {error}") from None
+    families: dict[str, Family] = {}
+    for entry in data.get("family", []):
+        family = _family(engine, path, entry)
+        if family.id in families:
+            raise FindingsError(f"{path}: family {family.id} stands twice")
+        families[family.id] = family
+    unsupported = tuple(_unsupported(path, entry) for entry in data.get("unsupported", []))
+    return Findings(engine, families, unsupported, _members(engine, folder / MEMBERS, families))
+
+
+def _fields(path: Path, kind: str, entry: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """Check that exactly ``names`` are there, that lists are tuples of words, and that nothing is empty."""
+    label = f"{path}: {kind} {entry.get('id', '?')}"
+    for name in entry:
+        if name not in names:
+            raise FindingsError(f"{label}: {name} is no field; there are {', '.join(names)}")
+    out: dict[str, Any] = {}
+    for name in names:
+        value = entry.get(name)
+        if name in ("profiles", "metrics"):
+            if not isinstance(value, list) or not value or not all(isinstance(word, str) for word in value):
+                raise FindingsError(f"{label}: {name} must be a list of names")
+            value = tuple(value)
+        elif name == "dimension":
+            value = 0 if value is None else value
+            if value not in (0, 2, 3):
+                raise FindingsError(f"{label}: dimension must be 2 or 3, or missing for both")
+        elif not isinstance(value, str) or not value.strip():
+            raise FindingsError(f"{label}: {name} is missing")
+        out[name] = value
+    return out
+
+
+def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
+    fields = _fields(path, "family", entry, ("id", "profiles", "scene", "metrics", "reason", "source", "releases"))
+    family, label = Family(**fields), f"{path}: family {entry['id']}"
+    if "*" in family.profiles and "*" in family.metrics:
+        raise FindingsError(f"{label}: a reason for every profile and every metric is none; name one of them")
+    if "*" in family.scene:
+        raise FindingsError(f"{label}: scene must be the name of one scene")
+    for profile in family.profiles:
+        if (engine, profile) in NEVER_LISTED:
+            raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
+    try:
+        SpecifierSet(family.releases)
+    except InvalidSpecifier:
+        raise FindingsError(f"{label}: releases {family.releases!r} is no version specifier such as >=1.2,<2") from None
+    return family
+
+
+def _unsupported(path: Path, entry: Mapping[str, Any]) -> Unsupported:
+    return Unsupported(
+        **_fields(path, "unsupported", entry, ("id", "profiles", "scene", "dimension", "reason", "source"))
+    )
+
+
+def _members(engine: str, path: Path, families: Mapping[str, Family]) -> dict[Key, Finding]:
+    if not path.exists():
+        return {}
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FindingsError(f"{path}: {error}") from None
+    if not rows or tuple(rows[0]) != COLUMNS:
+        raise FindingsError(f"{path}: the first line must be {','.join(COLUMNS)}")
+    members: dict[Key, Finding] = {}
+    for number, row in enumerate(rows[1:], start=2):
+        label = f"{path}:{number}"
+        if len(row) != len(COLUMNS):
+            raise FindingsError(f"{label}: has {len(row)} fields, not {len(COLUMNS)}")
+        key, finding = _member(engine, label, row, families)
+        if key in members:
+            raise FindingsError(f"{label}: {' '.join(key)} stands twice")
+        members[key] = finding
+    return members
+
+
+def _member(engine: str, label: str, row: list[str], families: Mapping[str, Family]) -> tuple[Key, Finding]:
+    name, profile, dimension, params, dt, iterations, metric, value, band = row
+    family = families.get(name)
+    if family is None:
+        raise FindingsError(f"{label}: there is no family {name!r}")
+    key = (profile, family.scene, dimension, params, dt, iterations, metric)
+    if not family.covers(key):
+        raise FindingsError(f"{label}: family {name} does not speak about {profile} {metric}")
+    if (engine, profile) in NEVER_LISTED:
+        raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
+    if value in ("", DIVERGED):
+        return key, Finding(family, None, diverged=value == DIVERGED)
+    try:
+        found, width = float(value), float(band)
+    except ValueError:
+        raise FindingsError(f"{label}: value {value!r} and band {band!r} must be numbers") from None
+    if not (math.isfinite(found) and math.isfinite(width) and width > 0.0):
+        raise FindingsError(f"{label}: value {value} and band {band} must be finite, the band above 0")
+    return key, Finding(family, found, width)
+
+
+def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
+    """Write all members, sorted by family and row; values to a tenth of their band."""
+    lines = sorted(_line(key, finding) for key, finding in members.items())
+    with (folder / MEMBERS).open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(lines)
+    findings_of.cache_clear()
+
+
+def _line(key: Key, finding: Finding) -> tuple[str, ...]:
+    profile, _scene, *cell = key
+    value, band = DIVERGED if finding.diverged else "", ""
+    if finding.value is not None:
+        value, band = _digits(finding.value, finding.band), f"{finding.band:.1e}"
+    return (finding.family.id, profile, *cell, value, band)
+
+
+def _digits(value: float, band: float) -> str:
+    """Shortest decimal of ``value`` whose rounding is below a twentieth of ``band``."""
+    return next(text for text in (f"{value:.{n}g}" for n in range(1, 18)) if abs(float(text) - value) <= 0.05 * band)
+
+
+def add_families(folder: Path, families: Iterable[Family]) -> None:
+    """Append families to the file of reasons, which people write and read."""
+    text = "".join(_entry(family) for family in families)
+    if text:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / FAMILIES).open("a", encoding="utf-8") as stream:
+            stream.write(text)
+        findings_of.cache_clear()
+
+
+def _entry(family: Family) -> str:
+    names = ("id", "profiles", "scene", "metrics", "reason", "source", "releases")
+    lines = [f"{name} = {_toml(getattr(family, name))}" for name in names]
+    return "\n".join(["", "[[family]]", *lines, ""])
+
+
+def _toml(value: str | tuple[str, ...]) -> str:
+    """A string or a list of strings; TOML's basic strings are JSON's but for DEL."""
+    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False).replace("\x7f", "\\u007f")

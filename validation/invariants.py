@@ -1,0 +1,171 @@
+"""What holds in any scene, judged without a closed form: contacts add no energy, bodies do not pass into each other.
+
+Both are measured against the motion itself, and bounded by what one step of the scene's loads can do:
+
+    energy      grows by no more than what a step order shows of a conserved energy, at the speed of that sample
+    overlap     is no deeper than one step of the pair's own approach: a contact is found at most one step late
+
+so that neither a long run nor a fast one widens a bound. A body that sinks slowly is seen after two steps of fall.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
+from adapters.trajectory import Trajectory
+from validation import metrics
+from validation.canonical import Check, Measured
+from validation.tolerances import ROUND_OFF
+
+
+def checks(scene: Scene, dt: float) -> list[Check]:
+    """Both checks; energy is left out where a prescribed body may feed it in."""
+    energy = Check(
+        "energy_growth",
+        "J",
+        0.0,
+        energy_bound(scene, dt),
+        "a step order shows a conserved energy with half a step of its loads' work (taken off at each sample's own "
+        "speed): left is the work of a load over the step that it starts in, F^2 dt^2/m, and round-off",
+        "contacts only take energy (e <= 1)",
+    )
+    depth = Check(
+        "penetration",
+        "m",
+        0.0,
+        overlap_bound(scene, dt),
+        "a contact is found one step late at most: beyond one step of the pair's approach (taken off) only what the "
+        "loads add in that step, (a_1 + a_2) dt^2, and round-off",
+        "bodies are impenetrable",
+    )
+    driven = any(body.motion == "prescribed" for body in scene.bodies)
+    return [depth] if driven else [energy, depth]
+
+
+# ---- energy --------------------------------------------------------------------------------------------------------
+
+
+def _load(scene: Scene, body: Body) -> Array:
+    """Constant load on a body, m g + F, (d,) [N]."""
+    return body.mass * np.array(scene.gravity) + np.array(body.force)
+
+
+def _least_moment(body: Body) -> float:
+    return min(body.inertia) if isinstance(body.inertia, tuple) else body.inertia
+
+
+def mechanical_energy(scene: Scene, trajectory: Trajectory) -> Array:
+    """Kinetic plus potential energy in gravity and constant loads, (s,) [J].
+
+    Work of constant torques is added up over the samples by the trapezoid rule, exact for a constant acceleration.
+    """
+    energy = metrics.kinetic_energy(scene, trajectory)
+    d = scene.dimension
+    for i in metrics.free_bodies(scene):
+        body = scene.bodies[i]
+        energy = energy - (trajectory.pose[:, i, :d] - trajectory.pose[0, i, :d]) @ _load(scene, body)
+        if any(body.torque):
+            power = trajectory.twist[:, i, d:] @ np.array(body.torque)
+            steps = np.diff(trajectory.t) * 0.5 * (power[1:] + power[:-1])
+            energy = energy - np.concatenate([[0.0], np.cumsum(steps)])
+    return energy
+
+
+def energy_growth(scene: Scene, trajectory: Trajectory) -> Measured:
+    """Largest growth of the mechanical energy since the start, less half a step of the loads' power [J].
+
+    Semi-implicit steps conserve the energy with potentials taken half a step of the present velocity away, and a
+    mid-point step the plain one: what is sampled differs by at most ``|L . v| dt/2``, now and at the start. Round-off
+    of the energies that are compared is taken off as well, sample by sample.
+    """
+    d = scene.dimension
+    energy = mechanical_energy(scene, trajectory)
+    ripple = ROUND_OFF * metrics.kinetic_energy(scene, trajectory)
+    for i in metrics.free_bodies(scene):
+        body = scene.bodies[i]
+        power = np.abs(trajectory.twist[:, i, :d] @ _load(scene, body))
+        power = power + np.abs(trajectory.twist[:, i, d:] @ np.array(body.torque))
+        path = np.linalg.norm(trajectory.pose[:, i, :d] - trajectory.pose[0, i, :d], axis=1)
+        ripple += 0.5 * trajectory.dt * (power + power[0])
+        ripple += ROUND_OFF * float(np.linalg.norm(_load(scene, body))) * path
+    return max(0.0, float((energy - energy[0] - ripple).max())), ""
+
+
+def energy_bound(scene: Scene, dt: float) -> float:
+    """Work of every load over the motion of the step that it starts in, and round-off of the energies at play [J]."""
+    free = [body for body in scene.bodies if body.motion == "free"]
+    bound, scale = 0.0, 0.0
+    for body in free:
+        load, torque = float(np.linalg.norm(_load(scene, body))), math.hypot(*body.torque)
+        speed, spin = math.hypot(*body.twist[: scene.dimension]), math.hypot(*body.twist[scene.dimension :])
+        moment = body.inertia if isinstance(body.inertia, float | int) else max(body.inertia)
+        bound += (load * load / body.mass + torque * torque / _least_moment(body)) * dt * dt
+        # Energies that are subtracted: at the start, and what the place's distance from the origin rounds.
+        place = math.hypot(*body.pose[: scene.dimension])
+        scale += 0.5 * body.mass * speed**2 + 0.5 * moment * spin**2 + load * place
+        # A body that rests without load still has a size, known to round-off, of which a step makes a speed.
+        scale += 0.5 * body.mass * ROUND_OFF * (metrics.reach(body.shape) / dt) ** 2
+    return bound + ROUND_OFF * scale
+
+
+# ---- overlap -------------------------------------------------------------------------------------------------------
+
+
+def deepest(scene: Scene, trajectory: Trajectory) -> tuple[Measured, Measured]:
+    """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m]."""
+    beyond, depth = 0.0, 0.0
+    for (i, j), overlap in metrics.overlaps(scene, trajectory).items():
+        depth = max(depth, float(overlap.max()))
+        granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j))
+        beyond = max(beyond, float((overlap - granted).max()))
+    return (beyond, ""), (depth, "")
+
+
+def _granted(overlap: Array, step: Array) -> Array:
+    """Depth that each sample of an overlap may have, (s,) [m]: the longest step since the sample before it began.
+
+    An overlap that a scene starts with is its author's.
+    """
+    granted = np.zeros(len(overlap))
+    longest = start = 0.0
+    for k in range(len(overlap)):
+        if overlap[k] <= 0.0:
+            longest, start = float(step[k]), 0.0
+            continue
+        if k == 0:
+            start = float(overlap[0])
+        longest = max(longest, float(step[k]))
+        granted[k] = start + longest
+    return granted
+
+
+def approach(scene: Scene, trajectory: Trajectory, i: int, j: int) -> Array:
+    """Upper bound of the speed with which two bodies' surfaces may close, (s,) [m/s]: centres and spin.
+
+    Against a half-space only motion along its normal closes; round bodies turn within their own outline.
+    """
+    d = scene.dimension
+    linear = trajectory.twist[:, j, :d] - trajectory.twist[:, i, :d]
+    faces = [b.shape for b in (scene.bodies[i], scene.bodies[j]) if isinstance(b.shape, HalfSpace)]
+    speed = np.abs(linear @ np.array(faces[0].normal)) if faces else np.linalg.norm(linear, axis=1)
+    for k in (i, j):
+        shape = scene.bodies[k].shape
+        if isinstance(shape, Box):
+            speed = speed + metrics.reach(shape) * np.linalg.norm(trajectory.twist[:, k, d:], axis=1)
+    return np.asarray(speed)
+
+
+def overlap_bound(scene: Scene, dt: float) -> float:
+    """What the loads of the two bodies that they move most add to an overlap in one step, and round-off [m]."""
+    pulls = []
+    for body in scene.bodies:
+        if body.motion == "free":
+            load, torque = float(np.linalg.norm(_load(scene, body))), math.hypot(*body.torque)
+            turning = 0.0 if isinstance(body.shape, Disc | Sphere) else metrics.reach(body.shape) / _least_moment(body)
+            pulls.append(load / body.mass + torque * turning)
+    place = max(math.hypot(*body.pose[: scene.dimension]) + metrics.reach(body.shape) for body in scene.bodies)
+    return sum(sorted(pulls)[-2:]) * dt * dt + ROUND_OFF * place

@@ -1,0 +1,89 @@
+"""Quantities of one body that a scene file shows and may state: place, angle, velocity, force of its contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Scene
+from adapters.trajectory import Trajectory
+from reference_solver.certification.geometry import rotation
+from validation.canonical import Measured
+from validation.metrics import UNAVAILABLE
+from validation.scene_format import parts_of
+
+#: Forces are means over this much time at the end [s], or over the last half of a shorter run.
+WINDOW = 1.0
+_AXES = "xyz"
+
+
+def unit(quantity: str) -> str:
+    """Unit of ``ball.vx`` and its like."""
+    what = parts_of(quantity)[2]
+    if what == "angle":
+        return "rad"
+    if what == "omega" or what.startswith("w"):
+        return "rad/s"
+    return {"v": "m/s", "f": "N"}.get(what[0], "m")
+
+
+def force_window(scene: Scene) -> float:
+    """Time at the end over which forces are averaged [s]."""
+    return min(WINDOW, 0.5 * scene.duration)
+
+
+def quantity(scene: Scene, trajectory: Trajectory, name: str, at: float | None = None) -> Measured:
+    """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None; forces are means over `force_window`."""
+    partner, body, what = parts_of(name)
+    if what.startswith("f"):
+        return _force(scene, trajectory, scene.index(body), partner, "fxfyfz".index(what) // 2)
+    values = _history(trajectory, scene.index(body), what)
+    return float(np.interp(trajectory.t[-1] if at is None else at, trajectory.t, values)), ""
+
+
+def _history(trajectory: Trajectory, body: int, what: str) -> Array:
+    """Samples of one coordinate of one body, (s,)."""
+    d = trajectory.dimension
+    pose, twist = trajectory.pose[:, body], trajectory.twist[:, body]
+    if what == "angle":
+        return _turned(pose)
+    if what == "omega":
+        return twist[:, 2]
+    if what.startswith("v"):
+        return twist[:, _axis(what[1], d)]
+    if what.startswith("w"):
+        return twist[:, 3 + _AXES.index(what[1])]
+    return pose[:, _axis(what, d)]
+
+
+def _axis(letter: str, dimension: int) -> int:
+    assert letter in _AXES[:dimension]
+    return _AXES.index(letter)
+
+
+def _turned(pose: Array) -> Array:
+    """Angle since the start [rad]: all turns in the plane; in space that of the rotation, from 0 to pi."""
+    if pose.shape[1] == 3:
+        return np.unwrap(pose[:, 2]) - pose[0, 2]
+    turn = rotation(pose)
+    relative = turn @ turn[0].T
+    sine = np.stack([relative[:, 2, 1] - relative[:, 1, 2], relative[:, 0, 2] - relative[:, 2, 0]], -1)
+    sine = np.linalg.norm(np.column_stack([sine, relative[:, 1, 0] - relative[:, 0, 1]]), axis=1)
+    return np.asarray(np.arctan2(0.5 * sine, 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)))
+
+
+def _force(scene: Scene, trajectory: Trajectory, body: int, partner: str | None, axis: int) -> Measured:
+    """Mean force of the contacts on ``body`` over the end of the run [N]."""
+    contacts = trajectory.contacts
+    if contacts is None or len(contacts.step) == 0:
+        return None, "contacts were not recorded"
+    others = range(len(scene.bodies)) if partner is None else [scene.index(partner)]
+    late = trajectory.t[contacts.step] > trajectory.t[-1] - force_window(scene) + 0.5 * trajectory.dt
+    total = np.zeros(int(late.sum()))
+    for other in others:
+        if other != body:
+            sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
+            total += sign * contacts.impulse_between(other, body)[late, axis]
+    if np.isnan(total).any():
+        return None, UNAVAILABLE
+    return float(total.sum() / (len(total) * trajectory.dt)), ""

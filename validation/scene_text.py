@@ -1,0 +1,78 @@
+"""Text of a scene file: read within limits, and parsed into plain data.
+
+What is wrong is one line that names the file, whatever is found at its place: a pipe, a device, a file of gigabytes,
+nesting without end, an integer of thousands of digits.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from adapters.plain import one_line
+from adapters.scene import SceneError
+
+#: Largest file that is read [bytes]: some 5000 bodies, parsed in about a second.
+MOST_BYTES = 2**20
+#: Most bodies: every pair that can meet is measured at every sample, and 1000 bodies have half a million pairs.
+MOST_BODIES = 1000
+#: Wrong fields that are named before the rest is counted.
+MOST_ERRORS = 10
+
+
+def read_text(path: Path) -> str:
+    """Text of a scene file.
+
+    Raises
+    ------
+    SceneError
+        One line, if it is not a regular file, too large, unreadable or not UTF-8.
+    """
+    shown = one_line(path)
+    try:
+        if not path.is_file():  # opening a pipe would wait for whoever writes to it
+            reason = "it is not a regular file" if path.exists() else "there is no such file"
+            raise SceneError(f"scene: cannot read {shown}: {reason}")
+        with path.open("rb") as stream:
+            data = stream.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        raise SceneError(f"scene: cannot read {shown}: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > MOST_BYTES:
+        raise SceneError(f"scene: {shown} is larger than {MOST_BYTES // 2**20} MiB, the most that is read")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SceneError(f"scene: {shown} is not valid {path.suffix[1:].upper()}: {one_line(error)}") from None
+
+
+def parsed(text: str, path: Path) -> Any:
+    """Plain data in the text of the scene file that lies, or lay, at ``path``.
+
+    Raises
+    ------
+    SceneError
+        One line, if it is not valid TOML or JSON, or has more bodies than can be run.
+    """
+    kind, shown = path.suffix[1:].upper(), one_line(path)
+    try:
+        data = tomllib.loads(text) if kind == "TOML" else json.loads(text)
+    except RecursionError:
+        raise SceneError(f"scene: {shown} is not valid {kind}: it is nested too deep") from None
+    except ValueError as error:  # syntax, or an integer of thousands of digits
+        raise SceneError(f"scene: {shown} is not valid {kind}: {one_line(error)}") from None
+    bodies = data.get("bodies") if isinstance(data, dict) else None
+    if isinstance(bodies, list) and len(bodies) > MOST_BODIES:
+        raise SceneError(f"{shown}: bodies: {len(bodies)} are more than the {MOST_BODIES} that a scene file may have")
+    return data
+
+
+def said(errors: ValidationError) -> str:
+    """All fields that are wrong, in one line; of many the first few."""
+    found = errors.errors(include_url=False, include_context=False, include_input=False)
+    fields = [".".join(map(str, e["loc"])) or "file" for e in found]
+    told = "; ".join(one_line(f"{name}: {e['msg']}") for name, e in zip(fields[:MOST_ERRORS], found, strict=False))
+    return told if len(found) <= MOST_ERRORS else f"{told}; and {len(found) - MOST_ERRORS} more"

@@ -1,0 +1,72 @@
+"""The worker's side: one cell after the other, each answered in plain data whatever its engine does."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from adapters import registry
+from adapters.foreign import said_by
+from validation import posed
+from validation.cells import Observation, Outcome, Slot, slot_from_dict
+from validation.workers import state
+
+READY = b"ready"
+
+
+def serve(connection: Connection) -> None:
+    """Run what is asked until the other end closes."""
+    from validation.execution import perform  # noqa: F401  (loaded before the first cell's clock starts)
+
+    registry.load_engines_here()
+    connection.send_bytes(READY)
+    while True:
+        try:
+            job = json.loads(connection.recv_bytes())
+        except EOFError:
+            return
+        connection.send_bytes(json.dumps(_answer(job)).encode())
+
+
+def _answer(job: Mapping[str, Any]) -> dict[str, Any]:
+    slot, recording, changed, unwritten = slot_from_dict(job["slot"]), None, "", None
+    try:
+        posed.remember(job["scenes"])
+        found = registry.find(slot.engine)
+        before = state.taken()
+        try:
+            observation, recording = _cell(slot, job)
+        finally:
+            _flush()
+            changed = state.changed(before)
+        if found.engine is None and job["installed"]:
+            reason = f"it can be loaded elsewhere, but not in its worker: {found.reason}"
+            observation = replace(observation, outcome=Outcome.CRASHED, reason=reason)
+    except OSError as error:  # what an engine raises is an outcome by now: this is the file that was to be kept
+        unwritten = [error.errno or 0, error.strerror or said_by(error), str(error.filename or job["keep"])]
+        observation = Observation(slot, "", 0, "", Outcome.CRASHED, said_by(error))
+    except BaseException as error:  # an exit or an interrupt that an engine raises is a crash of its cell
+        observation = Observation(slot, "", 0, "", Outcome.CRASHED, said_by(error))
+        changed = changed or "what was raised"
+    return {"observation": observation.as_dict(), "recording": recording, "changed": changed, "unwritten": unwritten}
+
+
+def _cell(slot: Slot, job: Mapping[str, Any]) -> tuple[Observation, str | None]:
+    from validation.execution import perform
+
+    keep = Path(job["keep"]) if job["keep"] else None
+    observation, recording = perform(slot, keep, job["record"])
+    return observation, base64.b64encode(recording.to_bytes()).decode() if recording else None
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed by an engine; the state says so
+            stream.flush()

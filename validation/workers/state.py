@@ -1,0 +1,160 @@
+"""What all cells of a process share, and whether a cell has changed it.
+
+An engine may set the rounding mode, close the streams, lower a limit, move to another folder, install a signal handler
+or replace a function of somebody else's module. Its own answer then is what it is; the next cell must not feel it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import locale
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+#: Modules whose functions and classes are watched besides our own: what measuring and judging computes with.
+WATCHED = ("builtins", "math", "random", "time", "json", "os", "sys", "copy", "dataclasses", "numpy", "numpy.linalg")
+OURS = ("adapters", "validation")
+#: Files that may stay open beyond those there were: engines keep caches and libraries open.
+SPARE_FILES = 64
+
+
+@dataclass(frozen=True)
+class State:
+    """One look at the process: plain facts by name, and what the names of watched modules and classes stood for."""
+
+    facts: Mapping[str, Any]
+    names: Mapping[str, tuple[Mapping[str, Any], dict[str, Any]]]
+
+
+def taken() -> State:
+    """Look at this process now."""
+    return State({name: look() for name, look in _FACTS.items()}, _names())
+
+
+def changed(before: State) -> str:
+    """What differs from ``before``, in a few words; empty if nothing does."""
+    found = [name for name, look in _FACTS.items() if not _same(name, before.facts[name], look())]
+    for place, (now, then) in before.names.items():
+        replaced = [name for name, value in then.items() if now.get(name) is not value]
+        found += [f"{place}.{name}" for name in replaced[:3]]
+    return ", ".join(found[:8])
+
+
+def _same(name: str, before: Any, now: Any) -> bool:
+    if name == "open files":
+        return bool(now <= before + SPARE_FILES)
+    return bool(before == now)
+
+
+def _rounding() -> tuple[Any, ...]:
+    """Rounding, denormals and traps of both floating-point units, by what arithmetic does and what C says."""
+    one, tiny = np.array([1.0, -1.0]), np.array([2.2250738585072014e-308])
+    ulp = np.array([1.1e-16])
+    long = np.longdouble(1.0) + np.longdouble(1e-19)
+    numbers = (*(one + ulp), *(one - ulp), float((tiny * 0.5)[0]) != 0.0, float((tiny * 0.5 * 2.0)[0]) == tiny[0], long)
+    said = tuple(getattr(_C, name)() for name in ("fegetround", "fegetexcept") if hasattr(_C, name))
+    return numbers + said + tuple(sorted(np.geterr().items()))
+
+
+def _libm() -> Any:
+    try:
+        return ctypes.CDLL("libm.so.6" if sys.platform == "linux" else None)
+    except (OSError, TypeError):
+        return None
+
+
+_C = _libm()
+
+
+def _streams() -> tuple[Any, ...]:
+    return (*(_file(number) for number in (0, 1, 2)), sys.stdin, sys.stdout, sys.stderr)
+
+
+def _file(number: int) -> tuple[int, ...] | None:
+    try:
+        found = os.fstat(number)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_mode
+
+
+def _open_files() -> int:
+    try:
+        return len(os.listdir("/proc/self/fd"))
+    except OSError:
+        return 0
+
+
+def _limits() -> tuple[Any, ...]:
+    if sys.platform == "win32":
+        return ()
+    import resource
+
+    kinds = sorted(name for name in dir(resource) if name.startswith("RLIMIT_"))
+    return tuple(resource.getrlimit(getattr(resource, name)) for name in kinds)
+
+
+def _folder() -> str | None:
+    try:
+        return os.getcwd()
+    except OSError:
+        return None
+
+
+def _mask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _handlers() -> tuple[Any, ...]:
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ()) if hasattr(signal, "pthread_sigmask") else set()
+    timers = signal.getitimer(signal.ITIMER_REAL)[1] if hasattr(signal, "getitimer") else 0.0
+    return (*(signal.getsignal(number) for number in sorted(signal.valid_signals())), frozenset(blocked), timers)
+
+
+def _interpreter() -> tuple[Any, ...]:
+    return sys.getrecursionlimit(), gc.isenabled(), sys.gettrace(), sys.getprofile(), tuple(sys.path), sys.excepthook
+
+
+def _locale() -> str:
+    return locale.setlocale(locale.LC_ALL)
+
+
+_FACTS: dict[str, Callable[[], Any]] = {
+    "floating point": _rounding,
+    "streams": _streams,
+    "open files": _open_files,
+    "limits": _limits,
+    "environment": lambda: dict(os.environ),
+    "folder": _folder,
+    "file mode mask": _mask,
+    "signal handlers": _handlers,
+    "interpreter": _interpreter,
+    "locale": _locale,
+}
+
+
+def _names() -> dict[str, tuple[Mapping[str, Any], dict[str, Any]]]:
+    """Functions, classes and modules by place: the live names there, and what they stand for now."""
+    found: dict[str, tuple[Mapping[str, Any], dict[str, Any]]] = {}
+    for name, module in list(sys.modules.items()):
+        if module is None or not (name in WATCHED or name.partition(".")[0] in OURS):
+            continue
+        found[name] = vars(module), _fixed(vars(module))
+        for cls in vars(module).copy().values():
+            if isinstance(cls, type) and getattr(cls, "__module__", "") == name and name not in WATCHED:
+                found[f"{name}.{cls.__name__}"] = vars(cls), _fixed(vars(cls))
+    return found
+
+
+def _fixed(names: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in dict(names).items() if callable(value) or isinstance(value, ModuleType)}
