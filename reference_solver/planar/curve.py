@@ -30,13 +30,14 @@ from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
 from reference_solver.planar.slide import FAR, go_back, keep
-from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Pairs, Rows, SubStep
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping import phase
 from reference_solver.stepping.clock import LEFT, OUTCOME
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import OPEN, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
+from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Repetitions of a phase to make it end at an impact; each squares what the one before missed it by.

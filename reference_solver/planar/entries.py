@@ -8,10 +8,11 @@ from reference_solver.model import Array
 from reference_solver.pieces import BODIES, CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
 from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
 from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
-from reference_solver.planar.state import Bodies, Options, Rows, SubStep
+from reference_solver.planar.state import Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

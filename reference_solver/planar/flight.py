@@ -8,13 +8,12 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import bound_bodies
 from reference_solver.planar.columns import COS, EXTENT, GAP, MOTION, PN, REACH, SIN, SPEED, A, B
 from reference_solver.planar.kinematics import normal_velocity
-from reference_solver.planar.state import CONTACTS, FIXED, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FIXED, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.options import Options
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
 AT_REST = 1e-14
-#: A gap drifts if its rate is more than this share of the contact's reference speed. What drifts less, by round-off or
-#: the least disturbance, leaves a gap that the next sub-step closes.
-DRIFT = 1e-6
 
 
 @inner_kernel

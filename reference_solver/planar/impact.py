@@ -35,27 +35,22 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
 from reference_solver.planar.manifolds import row_key
-from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.rows import measure_speed, prepare_masses
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
 from reference_solver.stepping.clock import HELD, LEFT
-from reference_solver.stepping.noise import UNSOLVED
+from reference_solver.stepping.impacts import (
+    BOUNCES,
+    LANDED,
+    NO_IMPACT,
+    OPEN_ENDED,
+    REBOUNDED,
+    RELEASED,
+    SERIES_ENDS,
+    STRUCK,
+)
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NOISE, ROUND_OFF, UNSOLVED
+from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
-
-#: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
-#: residual is 1e-13 of it: neither an approach, nor a parting, nor a slip.
-NOISE = 1e-11
-#: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
-#: the time of impact.
-LATE = 1e-15
-
-#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
-#: sub-step and released there.
-OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned (spatial), impacts no faster than what loads do in a
-#: step with e = 0, such with e > 0, faster ones.
-NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
-#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
-BOUNCES = 32
 
 
 @inner_kernel

@@ -32,7 +32,6 @@ from reference_solver.planar.state import (
     REMEMBERED,
     Bodies,
     Ledger,
-    Options,
     Pairs,
     Rows,
     SubStep,
@@ -50,6 +49,7 @@ from reference_solver.stepping.islands import (
     root,
 )
 from reference_solver.stepping.lasting import BODIES
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import Paths
 from reference_solver.tally import OPENED
 

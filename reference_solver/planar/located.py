@@ -34,17 +34,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import (
-    LANDED,
-    NO_IMPACT,
-    NOISE,
-    REBOUNDED,
-    collide_now,
-    end_series,
-    keep_loaded,
-    keep_touching,
-    release,
-)
+from reference_solver.planar.impact import collide_now, end_series, keep_loaded, keep_touching, release
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
@@ -52,18 +42,7 @@ from reference_solver.planar.manifolds import detect, row_key
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import measure_speed
 from reference_solver.planar.slide import go_back, keep, press_until_stick
-from reference_solver.planar.state import (
-    BLOCK,
-    CONTACTS,
-    FREE,
-    REMEMBERED,
-    Bodies,
-    Ledger,
-    Options,
-    Pairs,
-    Rows,
-    SubStep,
-)
+from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.clock import (
@@ -78,15 +57,11 @@ from reference_solver.stepping.clock import (
     open_step,
     weigh_event,
 )
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.noise import NOISE, NOTHING_LEFT, SHORT
+from reference_solver.stepping.options import BLOCK, Options
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
-
-#: What is left of a step below this share of it is nothing.
-NOTHING_LEFT = 1e-14
-#: A sub-step shorter than this share of a step tells nothing about forces.
-SHORT = 1e-3
-#: Passes that mark ending series of rebounds; each marks at least one row more.
-SERIES_PASSES = 4
 
 
 @inner_kernel

@@ -10,7 +10,6 @@ from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
     FEATURES,
-    FIXED_STEP,
     KEPT,
     MANIFOLDS,
     MOST_BODIES,
@@ -18,14 +17,11 @@ from reference_solver.planar.state import (
     REMEMBERED,
     Bodies,
     Indices,
-    Options,
     Pairs,
     Rows,
 )
-
-#: A gap below this fraction of the smaller half width is touching. Far above round-off, far below what a body
-#: moves in a step.
-TOUCHING = 1e-9
+from reference_solver.stepping.noise import TOUCHING
+from reference_solver.stepping.options import FIXED_STEP, Options
 
 
 @inner_kernel

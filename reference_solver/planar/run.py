@@ -9,7 +9,8 @@ from reference_solver.model import Array
 from reference_solver.planar.islands import step_world
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import copy_ledger
-from reference_solver.planar.state import Bodies, Buffer, Ledger, Options, Pairs, Rows, SubStep, World
+from reference_solver.planar.state import Bodies, Buffer, Ledger, Pairs, Rows, SubStep, World
+from reference_solver.stepping.options import Options
 
 
 @kernel

@@ -25,28 +25,20 @@ from reference_solver.planar.columns import (
     TANGENT_MASS,
     TARGET,
 )
-from reference_solver.planar.impact import NOISE, doubt, gap_noise
+from reference_solver.planar.impact import doubt, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.rows import measure_speed, warm_start
-from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.noise import NOISE
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES
 from reference_solver.tally import SWEEPS
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
 #: it carries no impulse.
 FAR = 1e3
-#: Solves in search of the end of a slide; where contacts keep their modes the second is exact.
-STICK_SOLVES = 30
-#: Share of the end told by a row that stuck which is tried next, to be on the slipping side of it.
-SHORTER = 0.9
-#: Friction below this share of its limit sticks.
-STUCK = 1.0 - 1e-9
-#: Relative accuracy of that instant: some ten units in the last place.
-SAME_TIME = 1e-14
-#: A length at which a row sticks is the end of its slide if one shorter by no more than this share, at which it still
-#: slipped, told it: such a step converges quadratically, and what is left of its error is the square.
-CLOSE = 1e-6
 
 
 @inner_kernel
@@ -87,17 +79,6 @@ def press(
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
         doubt(bodies, rows, tally)
-
-
-@inner_kernel
-def closing_speed(gap: float, parts: float, length: float, left: float) -> float:
-    """Target of a spatial contact that closes its gap within ``left`` [m/s], of which this sub-step has ``length``.
-
-    A lasting contact parts with ``parts`` because its normal has turned. Loads take that back in all of what is left:
-    in a part of it they can take a part, and one that had to be closed at once would lose its load.
-    """
-    share = length / left
-    return (1.0 - share) * max(parts, 0.0) - share * (gap / left)
 
 
 @inner_kernel

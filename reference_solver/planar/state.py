@@ -46,7 +46,6 @@ from reference_solver.planar.columns import (
     VERTICES,
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
-from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
@@ -59,9 +58,6 @@ Indices = NDArray[np.int64]
 #: Shape codes; a pair of different shapes is handled in this order.
 HALF_SPACE, DISC, BOX, CAPSULE, POLYGON = 0, 1, 2, 3, 4
 FIXED, FREE, PRESCRIBED = 0, 1, 2
-SCALAR, BLOCK = 0, 1
-FIXED_STEP, LOCATED = 0, 1
-NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 #: Features per pair: bound of the feature numbers in core_core.py (edge on edge, then vertex on vertex), to pack
 #: (a, b, feature) into one key.
@@ -151,28 +147,6 @@ class Ledger(NamedTuple):
     used: Indices  # (1,): number of contacts
     integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-
-
-class Options(NamedTuple):
-    """Numbers and flags of `Settings` and `Needs`."""
-
-    dt: float
-    iterations: int
-    residual: float  # < 0: exactly `iterations` sweeps
-    max_sweeps: int
-    relaxation: float  # <= 0: estimated
-    correction: int
-    beta: float
-    slop: float
-    margin: float
-    warm_starting: int
-    solver: int
-    direct: int
-    rotation: int
-    friction: int
-    restitution: int
-    broadphase: int
-    scheme: int
 
 
 class Buffer(NamedTuple):
@@ -315,31 +289,3 @@ def grown(rows: Rows) -> Rows:
     bigger.past_key[: len(rows.past_key)] = rows.past_key
     bigger.past_impulse[: len(rows.past_impulse)] = rows.past_impulse
     return bigger
-
-
-def uses_direct(settings: Settings) -> bool:
-    """Whether the direct solver may be called, and needs room."""
-    return settings.direct and settings.solver == "block" and settings.residual is not None
-
-
-def options(settings: Settings, needs: Needs) -> Options:
-    """Return settings and needs as plain numbers."""
-    return Options(
-        dt=float(settings.dt),
-        iterations=settings.iterations,
-        residual=-1.0 if settings.residual is None else float(settings.residual),
-        max_sweeps=settings.max_sweeps,
-        relaxation=0.0 if settings.relaxation is None else float(settings.relaxation),
-        correction={"none": NO_CORRECTION, "split": SPLIT, "baumgarte": BAUMGARTE}[settings.position_correction],
-        beta=float(settings.beta),
-        slop=float(settings.slop),
-        margin=float(settings.margin),
-        warm_starting=int(settings.warm_starting),
-        solver={"scalar": SCALAR, "block": BLOCK}[settings.solver],
-        direct=int(uses_direct(settings)),
-        rotation=int(needs.rotation),
-        friction=int(needs.friction),
-        restitution=int(needs.restitution),
-        broadphase=int(needs.broadphase),
-        scheme={"fixed": FIXED_STEP, "located": LOCATED}[settings.scheme],
-    )

@@ -11,8 +11,9 @@ from reference_solver.planar.flight import bound_flight, place, put_back
 from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.rows import prepare_masses
-from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, Rows, SubStep
 from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
 

@@ -17,8 +17,6 @@ from reference_solver.planar.run import run_located
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
-    FIXED_STEP,
-    LOCATED,
     Buffer,
     allocate_bodies,
     allocate_ledger,
@@ -27,14 +25,13 @@ from reference_solver.planar.state import (
     allocate_sub_step,
     allocate_world,
     grown,
-    options,
-    uses_direct,
 )
 from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.stepping.lasting import allocate_lasting
+from reference_solver.stepping.options import FIXED_STEP, LOCATED, options, uses_direct
 from reference_solver.tally import new_tally
 
 

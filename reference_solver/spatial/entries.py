@@ -5,12 +5,12 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.pieces import CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
-from reference_solver.planar.state import Options
 from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import add, cross, row, times_transposed
 from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.lasting import CONTACTS as LASTING
 from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

@@ -11,9 +11,6 @@ from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
-from reference_solver.planar.impact import LANDED, NO_IMPACT, REBOUNDED
-from reference_solver.planar.located import NOTHING_LEFT, SERIES_PASSES, SHORT
-from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import open_solve, point_work
 from reference_solver.spatial.entries import enter_release, enter_sub_step
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
@@ -40,7 +37,9 @@ from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.stepping.clock import EVENTS, HELD, LEFT, OUTCOME, REBOUND, count_event, open_step, weigh_event
-from reference_solver.stepping.noise import EVENT_BUDGET
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.noise import EVENT_BUDGET, NOTHING_LEFT, SHORT
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import (
     CONTACT_WORK,

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel, kernel
-from reference_solver.planar.state import Options
 from reference_solver.spatial.state import FIXED, FREE, Bodies
 from reference_solver.spatial.vector import (
     Quaternion,
@@ -28,6 +27,7 @@ from reference_solver.spatial.vector import (
     times,
     times_transposed,
 )
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.flight import DRIFT
-from reference_solver.planar.state import Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
 from reference_solver.spatial.flight import path_bound, place_at, reach_of
 from reference_solver.spatial.impact import carries
@@ -17,6 +15,8 @@ from reference_solver.spatial.state import CANDIDATES, FIXED, FREE, HALF_SPACE, 
 from reference_solver.spatial.time_of_impact import return_of_corners, strikes_hard, time_of_impact
 from reference_solver.spatial.vector import add_scaled, row, sub
 from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.options import Options
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
 AT_REST = 1e-14

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
-from reference_solver.planar.impact import NOISE
-from reference_solver.planar.state import Options
 from reference_solver.spatial.features import follow, name_features
 from reference_solver.spatial.impact import carries, copy_twists
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
@@ -21,7 +19,8 @@ from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub
 from reference_solver.stepping.clock import HELD, OUTCOME
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
-from reference_solver.stepping.noise import FROZEN
+from reference_solver.stepping.noise import FROZEN, NOISE
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.phase import FAILED, begin_phase, find_phase, go_back, step_phase, write_path
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK, SWEEPS, WORST_SWEEPS
 

@@ -7,9 +7,6 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.impact import NOISE
-from reference_solver.planar.slide import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
-from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.impact import clear_point, copy_twists, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
@@ -19,6 +16,9 @@ from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
+from reference_solver.stepping.noise import NOISE
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
 from reference_solver.tally import RESIDUAL, UNCONVERGED
 
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.

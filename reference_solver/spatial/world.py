@@ -10,7 +10,6 @@ from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
-from reference_solver.planar.state import LOCATED, options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.located import copy_ledger, run_located
@@ -30,6 +29,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.options import LOCATED, options, uses_direct
 from reference_solver.tally import new_tally
 
 
