@@ -70,6 +70,7 @@ from reference_solver.stepping.clock import (
     CONFINED,
     ESCAPED,
     HELD,
+    JAMMED,
     LEFT,
     OUTCOME,
     REBOUND,
@@ -77,6 +78,7 @@ from reference_solver.stepping.clock import (
     count_event,
     open_step,
     weigh_event,
+    weigh_jam,
 )
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
@@ -124,6 +126,15 @@ def located_step(
 
 
 @inner_kernel
+def free_bodies(bodies: Bodies) -> int:
+    """Number of bodies that forces move."""
+    count = 0
+    for i in range(len(bodies.kind)):
+        count += 1 if bodies.kind[i, MOTION] == FREE else 0
+    return count
+
+
+@inner_kernel
 def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
     """Whether any free body's path until ``end`` may leave the bounds given for the step."""
     for i in range(len(bodies.kind)):
@@ -164,6 +175,9 @@ def sub_step(
     keep_touching(bodies, pairs, rows, sub)
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
+    if sub.clock[LEFT] == options.dt:
+        free = free_bodies(bodies)
+        weigh_jam(sub.clock, (1 + options.friction) * rows.counts[CONTACTS], 3 * free, free)
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
@@ -173,7 +187,8 @@ def sub_step(
     begin_flight(bodies, rows, sub, length)
     curved, frozen = 0.0, sub.clock[HELD] > 0.0
     if not frozen and turns(bodies, rows, sub, length):
-        curved = curve(bodies, rows, sub, tally)
+        if sub.clock[JAMMED] == 0.0:
+            curved = curve(bodies, rows, sub, tally)
         frozen = curved == 0.0
     sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
     length = curved if curved > 0.0 else length
