@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test lint setup publish clean
+.PHONY: run test lint setup publish tune clean
 
 setup: $(STAMP)
 
@@ -46,6 +46,11 @@ publish: $(STAMP)
 	mkdir -p reports/published
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
+
+# Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
+tune: $(STAMP)
+	@test -n "$(ENGINE)" || { echo "which engine? make tune ENGINE=bullet"; exit 2; }
+	$(BIN)/crosscheck tune $(ENGINE) --jobs 2
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

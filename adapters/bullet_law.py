@@ -91,7 +91,7 @@ class ContactLaw:
 #: Profiles of `adapters.bullet`, by path and settings.
 DEFAULT = ContactLaw()
 REST = ContactLaw(False, 0.0, threshold=1e-4, solved_gap=0.0, split_depth=0.04, largest_speed=math.inf)
-IMPACT = replace(REST, slop=1e-6, split_depth=0.0)
+IMPACT = replace(REST, erp=0.0, slop=1e-6, split_depth=0.0)
 ONE = replace(REST, erp=0.01)
 
 

@@ -12,6 +12,8 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
+from adapters.engine import Engine, Setting
+from adapters.foreign import checked_settings
 from adapters.needs import needs
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
@@ -85,6 +87,8 @@ class Slot:
         None: the profile's own count.
     ulp
         Units in the last place by which the start height is moved (measures the noise floor).
+    switched
+        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.switching`).
     """
 
     scene: str
@@ -95,10 +99,11 @@ class Slot:
     dt: float
     iterations: int | None = None
     ulp: int = 0
+    switched: tuple[tuple[str, Any], ...] = ()
 
     def key(self) -> str:
         """Sixteen hex digits that identify the slot."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(_said(asdict(self)), sort_keys=True).encode()).hexdigest()[:16]
 
     def params_text(self) -> str:
         """``e=0.8 height=1.03``."""
@@ -110,7 +115,13 @@ class Slot:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that `slot_from_dict` reads back."""
-        return {**asdict(self), "params": dict(self.params)}
+        data = _said({**asdict(self), "params": dict(self.params)})
+        return data | {"switched": dict(self.switched)} if self.switched else data
+
+
+def _said(data: dict[str, Any]) -> dict[str, Any]:
+    """A slot without experiment has no field of it: what was stored and hashed before there were any stays equal."""
+    return data if data["switched"] else {name: value for name, value in data.items() if name != "switched"}
 
 
 def slot_from_dict(data: Mapping[str, Any]) -> Slot:
@@ -144,7 +155,16 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
         raise SceneError(f"slot.dimension: {dimension!r} must be 2 or 3")
     if not _is_whole(ulp) or abs(ulp) > MOST_ULPS:
         raise SceneError(f"slot.ulp: {ulp!r} must be a whole number in [-{MOST_ULPS}, {MOST_ULPS}]")
-    return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp)
+    switched = data.get("switched", {})
+    if not isinstance(switched, Mapping):
+        raise SceneError(f"slot.switched: {switched!r} is not a table of settings")
+    pairs = tuple(sorted((str(name), _as_set(value)) for name, value in switched.items()))
+    return Slot(data["scene"], params, dimension, data["engine"], data["profile"], dt, iterations, ulp, pairs)
+
+
+def _as_set(value: Any) -> Any:
+    """A setting's value as it was before JSON made lists of tuples."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)
@@ -160,7 +180,8 @@ class Cell:
 
     def key(self) -> str:
         """Sixteen hex digits that identify the cell."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+        data = asdict(self) | {"slot": _said(asdict(self.slot))}
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -234,12 +255,26 @@ def prepare(slot: Slot) -> Prepared:
     found = find(slot.engine)
     settings: list[Any] = []
     if found.engine is not None:
-        settings = found.engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
+        settings = settings_of(found.engine, slot, scene)
     text = json.dumps([(s.name, s.value) for s in settings], sort_keys=True, default=str)
     settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
     version = ".".join(platform.python_version_tuple()[:2])
     cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)
     return Prepared(canonical, scene, cell)
+
+
+def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
+    """Settings that a slot runs with: its profile's for the scene, with those that are switched replaced or added.
+
+    Raises
+    ------
+    EngineError
+        For an unknown profile, or an iteration count that the profile does not have.
+    """
+    own = checked_settings(engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
+    switched = {name: Setting(name, value, "switched for an experiment") for name, value in slot.switched}
+    kept = [switched.pop(setting.name, setting) for setting in own]
+    return [*kept, *switched.values()]
 
 
 def check_size(scene: Scene, dt: float) -> None:

@@ -12,16 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, EngineError
-from adapters.foreign import checked_refusal, checked_settings, said_by
+from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
 from adapters.plain import one_line, plain
 from adapters.receipts import Receipt, receipts
 from adapters.registry import find
 from adapters.scene import SceneError
-from adapters.stepping import posed_for, run, step_count
-from adapters.trajectory import Sampling, Trajectory
+from adapters.stepping import posed_for, run
+from adapters.trajectory import Trajectory
 from validation.canonical import Measured
-from validation.cells import Observation, Outcome, Prepared, Slot, prepare
+from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
+from validation.certification import fully_certified
 from validation.posed import resolve
 from validation.tracks import Recording, record
 
@@ -81,40 +82,31 @@ def _observe(
 ) -> tuple[Observation, Trajectory | None]:
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
-    settings = checked_settings(engine.settings(slot.profile, wanted, slot.dt, slot.iterations))
+    settings = settings_of(engine, slot, scene)
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
-        slips = receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # What a profile declares holds for its own settings; an experiment with others is about what they change.
+        slips = () if slot.switched else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
             sampling = replace(sampling, contacts_from=0.0)
         trajectory = run(engine, scene, slot.dt, values, sampling)
-        return _measured(engine, blank, prepared, slips, trajectory, sampling), trajectory
+        trajectory = fully_certified(engine, prepared, slot, values, trajectory)
+        return _measured(blank, prepared, slips, trajectory), trajectory
     except BaseException as error:
         return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
 
 
-def _measured(
-    engine: Engine,
-    blank: Observation,
-    prepared: Prepared,
-    slips: Sequence[Receipt],
-    trajectory: Trajectory,
-    sampling: Sampling,
-) -> Observation:
+def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], trajectory: Trajectory) -> Observation:
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
     if trajectory.finish == "diverged":
         return replace(measured, outcome=Outcome.DIVERGED, reason=one_line(trajectory.reason))
     metrics = prepared.canonical.measure(prepared.scene, trajectory)
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
-    try:
-        measured = _certified(engine, prepared, measured, trajectory, sampling)
-    except Exception as error:
-        return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {said_by(error)}")
-    if measured.certificate.get("certified") is False:
-        reasons = one_line("; ".join(map(str, measured.certificate.get("reasons", ()))))
+    if trajectory.certificate.get("certified") is False:
+        reasons = one_line("; ".join(map(str, trajectory.certificate.get("reasons", ()))))
         return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
     broken = [slip for slip in slips if not slip.holds]
     if broken:
@@ -122,44 +114,6 @@ def _measured(
         reason = f"receipt {worst.quantity}: measured {worst.measured:.6g}, declared {worst.declared:.6g}"
         return replace(measured, outcome=Outcome.INVALID, reason=f"{reason} +- {worst.band:.2g}")
     return measured
-
-
-def _certified(
-    engine: Engine, prepared: Prepared, measured: Observation, trajectory: Trajectory, sampling: Sampling
-) -> Observation:
-    """Enter the full certificate of an engine that has one, and how far its finite step puts each metric off.
-
-    The error of a metric is twice its difference to that of a run at half the step, at the same times: at least the
-    error for the step, whatever the order. Runs moved by units in the last place are not judged and not certified.
-    """
-    slot, scene = measured.slot, prepared.scene
-    if slot.ulp or "certified" not in trajectory.certificate:
-        return measured
-    values = {setting["name"]: setting["value"] for setting in measured.settings}
-    steps = step_count(scene.duration, slot.dt)
-    full = engine.certify(scene, slot.dt, values, steps, trajectory.pose[-1])
-    if full is None:
-        return measured
-    whole = replace(scene, duration=steps * slot.dt)
-    if sampling.contacts_from is None:  # the same samples: what a metric owes to their spacing is no error of the run
-        finer = run(engine, whole, 0.5 * slot.dt, values, replace(sampling, stride=2 * sampling.stride))
-        finer = replace(finer, dt=slot.dt)
-    else:  # impulses are those of a step, and metrics know of which
-        finer = run(engine, whole, 0.5 * slot.dt, values, sampling)
-    found = {name: _finite(*seen) for name, seen in prepared.canonical.measure(scene, finer).items()}
-    errors = {name: _error(value, found[name][0]) for name, (value, _) in measured.metrics.items()}
-    light = trajectory.certificate
-    reasons = [*light.get("reasons", ()), *(reason for reason in full["reasons"] if reason not in light["reasons"])]
-    certified = bool(light["certified"] and full["holds"])
-    entries = {"certified": certified, "reasons": reasons, "full": full, "metric_errors": errors}
-    return replace(measured, certificate={**light, **entries})
-
-
-def _error(value: float | None, finer: float | None) -> float | None:
-    """Error of a metric for the step; none where neither run has it, infinite (null) where only one has."""
-    if value is None or finer is None:
-        return 0.0 if value is finer else None
-    return 2.0 * abs(value - finer)
 
 
 def _finite(value: float | None, reason: str) -> Measured:

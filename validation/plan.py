@@ -137,7 +137,7 @@ REPRESENTATIVE: dict[str, Mapping[str, float]] = {
 
 def in_quick_suite(slot: Slot) -> bool:
     """Whether the quick suite runs this slot: its FAILs are listed row by row."""
-    if slot.dt != QUICK_DT or slot.ulp or slot.scene not in CATALOGUE:
+    if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
         return False
     canonical = CATALOGUE[slot.scene]
     return any(

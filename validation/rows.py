@@ -171,7 +171,7 @@ def _certificate(observation: Observation, check: Check) -> str:
         return ""
     if "full" not in found:
         return "light"
-    error = found["metric_errors"].get(check.metric)
+    error = found.get("metric_errors", {}).get(check.metric)
     return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
 
 

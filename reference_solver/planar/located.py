@@ -49,6 +49,7 @@ from reference_solver.stepping.clock import (
     CONFINED,
     ESCAPED,
     HELD,
+    JAMMED,
     LEFT,
     OUTCOME,
     REBOUND,
@@ -56,6 +57,7 @@ from reference_solver.stepping.clock import (
     count_event,
     open_step,
     weigh_event,
+    weigh_jam,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
 from reference_solver.stepping.noise import NOISE, NOTHING_LEFT, SHORT
@@ -99,6 +101,15 @@ def located_step(
 
 
 @inner_kernel
+def free_bodies(bodies: Bodies) -> int:
+    """Number of bodies that forces move."""
+    count = 0
+    for i in range(len(bodies.kind)):
+        count += 1 if bodies.kind[i, MOTION] == FREE else 0
+    return count
+
+
+@inner_kernel
 def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
     """Whether any free body's path until ``end`` may leave the bounds given for the step."""
     for i in range(len(bodies.kind)):
@@ -139,6 +150,9 @@ def sub_step(
     keep_touching(bodies, pairs, rows, sub)
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
+    if sub.clock[LEFT] == options.dt:
+        free = free_bodies(bodies)
+        weigh_jam(sub.clock, (1 + options.friction) * rows.counts[CONTACTS], 3 * free, free)
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
@@ -148,7 +162,8 @@ def sub_step(
     begin_flight(bodies, rows, sub, length)
     curved, frozen = 0.0, sub.clock[HELD] > 0.0
     if not frozen and turns(bodies, rows, sub, length):
-        curved = curve(bodies, rows, sub, tally)
+        if sub.clock[JAMMED] == 0.0:
+            curved = curve(bodies, rows, sub, tally)
         frozen = curved == 0.0
     sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
     length = curved if curved > 0.0 else length

@@ -13,10 +13,14 @@ from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD
 LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
 #: 1 where bodies may not leave their bounds in the step, and 1 where one has.
 CONFINED, ESCAPED = 7, 8
-CLOCK_SIZE = 9
+#: 1 where the island is jammed at the start of its step.
+JAMMED = 9
+CLOCK_SIZE = 10
 
 #: Soft events located in a step, and one more per body.
 MOST_SOFT = 16
+#: Free bodies from which on an island may be jammed, and soft events that are located in a step of one that is.
+JAM_BODIES, JAM_PATIENCE = 4, 2
 #: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
 REBOUND = 0.25
 
@@ -30,7 +34,17 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
     """
     clock[LEFT] = dt
     clock[PATIENCE] = MOST_SOFT + bodies
-    clock[EVENTS] = clock[SOFT] = clock[HELD] = 0.0
+    clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = 0.0
+
+
+@kernel
+def weigh_jam(clock: Array, rows: int, freedoms: int, bodies: int) -> None:
+    """Decide at the start of a step whether the island is jammed: its contacts have more rows than it has freedoms.
+
+    Then whatever moves in it moves what it touches, and events have no end; few of them are located.
+    """
+    if bodies >= JAM_BODIES and rows > freedoms:
+        clock[JAMMED], clock[PATIENCE] = 1.0, JAM_PATIENCE
 
 
 @kernel

@@ -17,7 +17,7 @@ SIZES = 4
 #: Modes of a contact. OPEN: it parts. STICK: its tangents are held. SLIP: friction mu times the load against the slip.
 OPEN, STICK, SLIP = 0, 1, 2
 #: Rows of the dense matrix of a phase; islands with more rows are stepped by the impulse-level scheme.
-MOST_ROWS = 96
+MOST_ROWS = 64
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
 #: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a feature.

@@ -26,7 +26,7 @@ from reference_solver.stepping.noise import FORCE_NOISE, NOISE
 #: Revisions of all modes before sweeps are asked for others to begin with.
 REVISIONS = 16
 #: Times that they are asked, each time for four times as many sweeps as the time before.
-ATTEMPTS = 6
+ATTEMPTS = 4
 FIRST_SWEEPS = 16
 #: Friction that reaches this share of its limit in sweeps slips.
 AT_LIMIT = 1.0 - 1e-9

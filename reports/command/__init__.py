@@ -3,7 +3,18 @@
 One module per group of subcommands; importing it registers them.
 """
 
-from reports.command import accepting, benching, certifying, comparing, inspecting, reporting, running, showing
+from reports.command import accepting, benching, certifying, comparing, inspecting, reporting, running, showing, tuning
 from reports.command.group import main
 
-__all__ = ["accepting", "benching", "certifying", "comparing", "inspecting", "main", "reporting", "running", "showing"]
+__all__ = [
+    "accepting",
+    "benching",
+    "certifying",
+    "comparing",
+    "inspecting",
+    "main",
+    "reporting",
+    "running",
+    "showing",
+    "tuning",
+]

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from importlib import import_module
+from itertools import groupby
 from typing import Any
 
 import click
@@ -20,6 +21,7 @@ from rich.table import Table
 
 from reference_solver.certification import Gate
 from reference_solver.certification.orders import PHASES, RATES, orders
+from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, trials
 from reports.command.group import AS_JSON, main
 from reports.wording import number
 
@@ -36,6 +38,7 @@ PARTS = (
     "turning_in_space",
     "metamorphic",
     "hard_cases",
+    "self_test",
 )
 #: Processes side by side; the parts are of such lengths that more would wait for the longest.
 WORKERS = 2
@@ -46,7 +49,10 @@ WIDTH = 150
 @main.command()
 @AS_JSON
 @click.option("--order", is_flag=True, help="Show how errors fall with the step instead: fitted orders.")
-def certify(as_json: bool, order: bool) -> None:
+@click.option(
+    "--self-test", is_flag=True, help="Plant corruptions one at a time instead: does the certificate see them?"
+)
+def certify(as_json: bool, order: bool, self_test: bool) -> None:
     """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold."""
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -54,6 +60,8 @@ def certify(as_json: bool, order: bool) -> None:
     if order:
         show_orders(console, as_json)
         return
+    if self_test:
+        sys.exit(show_self_test(console, as_json))
     found = side_by_side(measured, PARTS, console)
     gates = [gate for part in PARTS for gate in found[part]]
     if as_json:
@@ -77,6 +85,34 @@ def show_orders(console: Console, as_json: bool) -> None:
         slope = "round-off" if row.order is None else f"{row.order:.2f}"
         table.add_row(escape(row.case), row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
     console.print(table)
+
+
+def show_self_test(console: Console, as_json: bool) -> int:
+    """Print which planted corruptions are seen, at which size; 1 if too few are at the size that is judged, else 0."""
+    with console.status("planting corruptions"):
+        made = list(trials())
+    if as_json:
+        rows = [(trial.corruption, trial.size, trial.seen) for trial in made]
+        plain = [
+            {"family": c.family, "corruption": c.name, "scene": c.scene, "size": size, "caught": bool(seen), "by": seen}
+            for c, size, seen in rows
+        ]
+        click.echo(json.dumps(plain, indent=1))
+    table = Table(title="Planted corruptions: caught by", title_justify="left")
+    for heading in ("family", "what is corrupted", "scene", *(f"{size:g}" for size in SIZES), "where missed"):
+        table.add_column(heading)
+    for corruption, group in groupby(made, lambda trial: trial.corruption):
+        seen = [trial.seen[0] if trial.seen else "MISSED" for trial in group]
+        why = corruption.missed if "MISSED" in seen else ""
+        table.add_row(corruption.family, escape(corruption.name), corruption.scene, *seen, why)
+    console.print(table)
+    judged = [trial for trial in made if trial.size == JUDGED]
+    caught = sum(bool(trial.seen) for trial in judged)
+    console.print(f"{caught} of {len(judged)} caught at size {JUDGED:g}, {PROMISED:.0%} promised")
+    for trial in judged:
+        if not trial.seen:
+            console.print(f"missed: {trial.corruption.name}, {trial.corruption.scene}: {trial.corruption.missed}")
+    return 0 if caught >= PROMISED * len(judged) else 1
 
 
 def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: Console) -> dict[str, Any]:

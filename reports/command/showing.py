@@ -17,6 +17,7 @@ from reports import speed
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, pasteable
 from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
@@ -90,13 +91,21 @@ def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
 @click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
 @click.option("--new", is_flag=True, help="Only what makes `run` exit with 1: new, drifted, INVALID, crashed.")
 @click.option("--all", "every", is_flag=True, help="Every row, not the worst of each family.")
+@click.option("--prove", metavar="ID", help="Run the experiments beside the reason ID (or 'all'); needs no RUN.")
 @AS_JSON
 @OUT
-def findings(run: str, every: bool, as_json: bool, out: Path, new: bool, **wanted: Sequence[str]) -> None:
+def findings(
+    run: str, every: bool, as_json: bool, out: Path, new: bool, prove: str | None, **wanted: Sequence[str]
+) -> None:
     """List the rows of RUN (the latest by default) that do not pass, by family, the most serious first.
 
-    A family is one engine, profile, scene, kind of metric and standing; it is shown by its worst row.
+    A family is one engine, profile, scene, kind of metric and standing; it is shown by its worst row. With --prove,
+    the mechanism that a reason names is switched off on rows that fail because of it: they must pass, and must go on
+    failing with what else might be blamed. Exits with 1 if an experiment does not show what it says.
     """
+    if prove:
+        prove_and_show(prove, wanted["engine"], as_json)
+        return
     rows, _, _ = load(out, run)
     rows = [row for row in rows if all(row[name] in chosen for name, chosen in wanted.items() if chosen)]
     if new:

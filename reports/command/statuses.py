@@ -21,7 +21,8 @@ INTERRUPTED = 130
 #: Status -> what it says, as the README has it.
 MEANING = {
     FINE: "everything asked for ran, nothing is alarming",
-    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check",
+    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check; "
+    "a reason refuted; a better setting found",
     WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
     RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
     INCOMPLETE: "not everything asked for ran: named engine missing, cells left after time-outs, too little memory",

@@ -22,6 +22,8 @@ ENGINE = ChipmunkEngine()
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
 PROFILES = ("default", "tuned")
 DT = 1.0 / 240.0
+#: Depth at which the tuned profile lets touching bodies start [m].
+START = 0.3 * 9.81 * DT**2
 EPS = np.finfo(float).eps
 
 
@@ -60,7 +62,7 @@ def test_tuned_follows_the_needs_and_gives_a_reason_for_each_number() -> None:
     resting = make(FLOOR, unit_box("box", 0.0, 0.5), mu=0.5, gravity=(0.0, -9.81))
     hitting = make(FLOOR, Body("ball", Disc(0.1), pose=(0.0, 1.0, 0.0)), e=0.5)
     rest, impact = ({s.name: s for s in ENGINE.settings("tuned", needs(x), DT)} for x in (resting, hitting))
-    assert (rest["collision_slop"].value, rest["start_overlap"].value) == (1e-3, 5e-4)
+    assert (rest["collision_slop"].value, rest["start_overlap"].value) == (1e-3, pytest.approx(START))
     assert (impact["collision_slop"].value, impact["start_overlap"].value) == (2e-4, 0.0)
     assert (rest["collision_bias"].value, impact["collision_bias"].value) == (0.0017970074436457143, 1.0)
     assert all(s["iterations"].value == 30 and s["collision_persistence"].value == 1 for s in (rest, impact))
@@ -306,13 +308,12 @@ def column(n: int, duration: float = 1.0) -> Scene:
     return make(FLOOR, *boxes, mu=0.5, gravity=(0.0, -9.81), T=duration)
 
 
-def test_the_tuned_column_starts_half_a_slop_deep_at_every_interface_and_says_so() -> None:
+def test_the_tuned_column_starts_inside_the_slop_at_every_interface_and_says_so() -> None:
     trajectory = drive(column(5), "tuned")
-    expected = [0.5 + i - (i + 1) * 5e-4 for i in range(5)]
+    expected = [0.5 + i - (i + 1) * START for i in range(5)]
     assert np.allclose(trajectory.pose[0, 1:, 1], expected, rtol=0.0, atol=1e-9)
-    assert (
-        len(trajectory.initial_change) == 1 and "5 touching pairs start 0.0005 m deep" in trajectory.initial_change[0]
-    )
+    (said,) = trajectory.initial_change
+    assert f"5 touching pairs start {START:.3g} m deep" in said
     assert drive(column(5)).initial_change == ()
 
 
@@ -323,7 +324,7 @@ def test_the_tuned_column_carries_its_weight_from_the_start() -> None:
     # Thirty sweeps and warm starting leave 1e-13 within the first second (fact sheet: 1e-14 at ten sweeps, 5 s).
     assert np.abs(load - 1.0).max() < 1e-9
     gap = trajectory.contacts.rows.gap[-10:]
-    assert np.all((gap > -6e-4) & (gap < -4e-4))
+    assert np.all((gap > -1.2 * START) & (gap < -0.8 * START))
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.3, -0.8])
@@ -332,13 +333,13 @@ def test_a_box_on_an_incline_sinks_along_the_floors_normal(theta: float) -> None
     floor = Body("floor", HalfSpace((float(n[0]), float(n[1])), 0.0), motion="fixed")
     box = unit_box("box", *map(float, 0.5 * n), theta)
     trajectory = drive(make(floor, box, mu=2.0, gravity=(0.0, -9.81), T=DT), "tuned")
-    assert np.allclose(trajectory.pose[0, 1, :2], (0.5 - 5e-4) * n, rtol=0.0, atol=1e-9)
+    assert np.allclose(trajectory.pose[0, 1, :2], (0.5 - START) * n, rtol=0.0, atol=1e-9)
 
 
 def test_two_supports_and_a_bridge_all_get_their_overlap() -> None:
     bodies = (FLOOR, unit_box("l", -0.6, 0.5), unit_box("r", 0.6, 0.5), unit_box("top", 0.0, 1.5))
     start = drive(make(*bodies, mu=0.5, gravity=(0.0, -9.81), T=DT), "tuned").pose[0]
-    assert np.allclose(start[1:, 1], [0.5 - 5e-4, 0.5 - 5e-4, 1.5 - 1e-3], rtol=0.0, atol=1e-9)
+    assert np.allclose(start[1:, 1], [0.5 - START, 0.5 - START, 1.5 - 2.0 * START], rtol=0.0, atol=1e-9)
     assert np.allclose(start[1:, 0], [-0.6, 0.6, 0.0], rtol=0.0, atol=1e-9)
 
 
@@ -347,8 +348,8 @@ def test_discs_touching_along_a_slope_sink_along_their_own_normals() -> None:
     lower = Body("lower", Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0))
     upper = Body("upper", Disc(0.5), 1.0, 0.125, (float(n[0]), 0.5 + float(n[1]), 0.0))
     start = drive(make(FLOOR, lower, upper, mu=0.5, gravity=(0.0, -9.81), T=DT), "tuned").pose[0]
-    assert start[1, 1] == pytest.approx(0.4995, abs=1e-9)
-    assert np.linalg.norm(start[2, :2] - start[1, :2]) == pytest.approx(1.0 - 5e-4, abs=1e-6)
+    assert start[1, 1] == pytest.approx(0.5 - START, abs=1e-9)
+    assert np.linalg.norm(start[2, :2] - start[1, :2]) == pytest.approx(1.0 - START, abs=1e-6)
 
 
 def test_a_box_that_exactly_fits_between_walls_stays_as_posed_and_says_so() -> None:

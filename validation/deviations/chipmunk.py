@@ -8,8 +8,7 @@ A bouncing ball follows a scalar recurrence (heights above the contact position,
     v  <-  v - g dt
     if y <= 0:  v <- max(v, -u)                   one contact is solved exactly by any number of sweeps
 
-so its apexes are known to round-off although they scatter by v dt about e^(2n) h0. A column stands where its start
-put it: Chipmunk has no spring, overlap within the slop is never corrected.
+so its apexes are known to round-off although they scatter by v dt about e^(2n) h0.
 """
 
 from __future__ import annotations
@@ -96,17 +95,6 @@ def bounce_law(profile: str, metric: str) -> Law:
     return law
 
 
-def start_overlap_law(scene: Scene, dt: float) -> tuple[float, float] | None:
-    """Deepest overlap of the tuned column: half the slop it starts with.
-
-    The band is g dt^2, the motion that the engine-blind tolerance grants any interface, here about that start.
-    """
-    start = {s.name: s.value for s in tuned_profile(needs(scene), dt)}["start_overlap"]
-    if scene.dimension != 2 or start == 0.0:
-        return None
-    return start, math.hypot(*scene.gravity) * dt * dt
-
-
 def touching_start_law(scene: Scene, dt: float) -> tuple[float, float] | None:
     """Deepest overlap of a single box that starts exactly touching, with the shipped ten sweeps.
 
@@ -150,14 +138,6 @@ def _deviation(profiles: tuple[str, ...], scene: str, metric: str, law: Law, bec
 
 DEVIATIONS: tuple[Deviation, ...] = (
     *_bounce_laws(),
-    _deviation(
-        ("tuned",),
-        "stack",
-        "penetration",
-        start_overlap_law,
-        "starts half a slop deep as declared, and overlap within the slop is never corrected",
-        "cpArbiter.c:379; start overlap of the tuned profile",
-    ),
     _deviation(
         ("default",),
         "stack",

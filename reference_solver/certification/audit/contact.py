@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.space import normal_turns
 from reference_solver.model import Array
 
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
@@ -42,7 +43,10 @@ def _laws(run: Run) -> Iterator[float]:
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
     yield _worst(-pressed, scale)
-    yield _worst(held_back - mu * pressed.clip(min=0.0), scale)
+    # Where rows turn within a piece its impulse is a mean over normals, of which the first is known: a turn by an angle
+    # adds that share of the normal impulse to the friction, and of the friction to the normal impulse.
+    leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * normal_turns(run)
+    yield _worst(held_back - mu * pressed.clip(min=0.0) - leaning, scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
     # allowed after an impact is -e u-; a soft rebound may be held instead, and is then counted.
@@ -69,7 +73,7 @@ def _laws(run: Run) -> Iterator[float]:
     wanted *= np.where(size > limit, limit / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
     # Where the direction of a slip turns within a piece, its friction is a mean of directions.
     first, last = (x - (x * n).sum(axis=1)[:, None] * n for x in (before, after))
-    turned = np.where(frozen, 0.0, limit * _angle(first, last))
+    turned = np.where(frozen, 0.0, limit * _angle(first, last)) + leaning
     yield _worst(np.linalg.norm(along - wanted, axis=1) - turned, scale)
 
     about = cross(pieces.point, pieces.impulse)

@@ -185,6 +185,20 @@ class Run:
         places = np.abs(self.pieces.pose_before[:, : self.d]) if len(self.pieces.body) else np.zeros((1, 1))
         return float(places.max() * 1e-3)
 
+    def prescribed_pose(self, i: int, t: Array) -> Array:
+        """Poses (s, P) of a body that is not free at times t (s,): its start moved by its constant twist."""
+        body, d = self.model.bodies[i], self.d
+        start, twist = np.array(body.pose, dtype=float), twist_of(body)
+        place = start[:d] + t[:, None] * twist[:d]
+        if d == 2:
+            return np.column_stack([place, start[2] + t * twist[2]])
+        spin = float(np.linalg.norm(twist[3:]))
+        axis = twist[3:] / spin if spin > 0.0 else np.zeros(3)
+        c, s = np.cos(0.5 * spin * t)[:, None], np.sin(0.5 * spin * t)[:, None]
+        w, v = start[3], start[4:]
+        vector = c * v + s * (w * axis + np.cross(axis, v))
+        return np.concatenate([place, c * w - s * (axis @ v), vector], axis=1)
+
     def velocity_at(self, row: Indices, body: Indices, point: Array, after: bool) -> Array:
         """Velocities (c, d) of ``point`` on the bodies of ``row``; a body that the piece does not hold is at rest."""
         twist = self.pieces.twist_after if after else self.pieces.twist_before

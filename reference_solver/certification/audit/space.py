@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit.run import Indices, Run
-from reference_solver.certification.geometry import Nearest, nearest, rotation
+from reference_solver.certification.audit.run import Indices, Run, twist_of
+from reference_solver.certification.geometry import Nearest, gap, nearest, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Halvings of an interval in which two bodies might have met: sixteen parts of it.
@@ -75,6 +75,40 @@ def _touching(run: Run) -> tuple[float, float, float]:
     return max(worst[0], 0.0), max(worst[1], 0.0), max(worst[2], 0.0)
 
 
+def normal_turns(run: Run) -> Array:
+    """By how much (c,) the normal of each contact turns within its piece [rad]; 0 where rows stood still.
+
+    From its start to its end by the geometry; in between it leaves the chord by up to an eighth of what its rate
+    changes, times the length: rates are spins, and of round bodies that pass each other their speed over their
+    distance.
+    """
+    pieces = run.pieces
+    found = np.zeros(len(pieces.body_a))
+    turning = ~run.is_frozen[run.contact_owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    for pair in np.unique(pairs[turning]):
+        rows = np.flatnonzero(turning & (pairs == pair))
+        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+        ends = (_pose(run, i, run.side[k][rows], late=True) for k, i in enumerate((a, b)))
+        end_a, end_b = ends
+        last = nearest(run.model.bodies[a].shape, end_a, run.model.bodies[b].shape, end_b).normal
+        chord = np.linalg.norm(last - pieces.normal[rows], axis=1)
+        changes = [_changes(run, run.side[k][rows]) for k in range(2)]
+        apart = np.linalg.norm(end_a[:, : run.d] - end_b[:, : run.d], axis=1)
+        passing = np.linalg.norm(changes[0][:, : run.d] - changes[1][:, : run.d], axis=1)
+        spins = sum(np.linalg.norm(change[:, run.d :], axis=1) for change in changes)
+        bulge = (
+            0.125 * pieces.length[run.contact_owner[rows]] * (spins + passing / np.where(apart > 0.0, apart, run.size))
+        )
+        found[rows] = chord + bulge
+    return found
+
+
+def _changes(run: Run, rows: Indices) -> Array:
+    """Change of twist (s, 3 | 6) of bodies in their pieces; none where a piece does not hold one."""
+    return np.where((rows >= 0)[:, None], run.pieces.twist_after[rows] - run.pieces.twist_before[rows], 0.0)
+
+
 def _distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Nearest:
     """As `nearest`, asked once where poses (s, P) repeat those before: what rests costs nothing."""
     both = np.concatenate([pose_a, pose_b], axis=1)
@@ -85,10 +119,10 @@ def _distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Neare
     return Nearest(*(field[which] for field in found))
 
 
-def _pose(run: Run, i: int, rows: Indices) -> Array:
-    """Poses (s, P) of body i at the start of the pieces of ``rows``; the model's where a piece does not hold it."""
+def _pose(run: Run, i: int, rows: Indices, late: bool = False) -> Array:
+    """Poses (s, P) of body i as the pieces of ``rows`` begin, or end; the model's where a piece does not hold it."""
     own = np.array(run.model.bodies[i].pose, dtype=float)
-    return np.where((rows >= 0)[:, None], run.pieces.pose_before[rows], own)
+    return np.where((rows >= 0)[:, None], (run.pieces.pose_after if late else run.pieces.pose_before)[rows], own)
 
 
 def _placed(point: Array, d: int) -> Array:
@@ -135,9 +169,11 @@ def _overlaps(run: Run, start: Array) -> tuple[float, float]:
         for j in np.flatnonzero(meets):
             if j <= i or not (run.free[i] or run.free[j]):
                 continue
-            deep, begin = _pair(run, i, int(j), paths[i], paths[int(j)])
             size = min(run.extent[i], run.extent[j])
-            worst, first = max(worst, -deep / size), max(first, -begin / size)
+            begin = gap(run.model.bodies[i].shape, start[i], run.model.bodies[int(j)].shape, start[int(j)])
+            deep = min(begin, _pair(run, i, int(j), paths[i], paths[int(j)]))
+            # What is no number stays none, and is within no limit.
+            worst, first = float(np.maximum(worst, -deep / size)), float(np.maximum(first, -begin / size))
     return worst, first
 
 
@@ -158,14 +194,19 @@ def _bulge(path: Path, d: int) -> Array:
 
 
 def _path(run: Run, i: int, start: Array) -> Path:
-    """Motion of body i; of one that no piece holds, rest."""
+    """Motion of body i: of a free one by its pieces, of others as prescribed, step by step."""
     pieces = run.pieces
     rows = np.flatnonzero((pieces.body == i) & run.is_forces[run.owner])
     v = 3 if run.d == 2 else 6
-    if not len(rows):
-        whole = float((pieces.step.max() + 1) * run.dt) if len(pieces) else run.dt
-        rest = np.zeros((1, v))
-        return Path(np.zeros(1), np.array([whole]), start[i][None], rest, rest, rest)
+    if not run.free[i] or not len(rows):
+        twist = twist_of(run.model.bodies[i])
+        steps = int(pieces.step.max()) + 1 if len(pieces) else 1
+        count = steps if twist.any() else 1
+        length: Array = np.full(count, steps * run.dt / count)
+        begin: Array = np.arange(count, dtype=np.float64) * length
+        twists = np.tile(twist, (count, 1))
+        poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
+        return Path(begin, length, poses, np.zeros((count, v)) + length[:, None] * twists, twists, twists)
     before, after = pieces.pose_before[rows], pieces.pose_after[rows]
     way = after[:, : run.d] - before[:, : run.d]
     turn = (after - before)[:, 2:] if run.d == 2 else _rotation_vector(before[:, 3:], after[:, 3:])
@@ -207,8 +248,8 @@ def _pose_at(path: Path, k: Indices, t: Array) -> Array:
     return np.concatenate([place, *q], axis=1)
 
 
-def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> tuple[float, float]:
-    """Least gap of two bodies over the run, and at its start [m]; only what could have been missed is looked into.
+def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
+    """Least gap of two bodies over the run [m]; only what could have been missed is looked into.
 
     Over an interval h a gap cannot fall by more than the bound L of its rate times the time, so that it stays above
     (g_0 + g_1 - L h)/2. Where that is above the deepest found, nothing is missed; else the interval is halved.
@@ -224,10 +265,9 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> tuple[float, floa
     rate = _closing(run, i, j, one, other, k[:-1], m[:-1])
     near = _near(run, i, j, one, other, times, k, m, rate)
     if not near.any():
-        return np.inf, np.inf
+        return np.inf
     begin, end, k, m, rate = times[:-1][near], times[1:][near], k[:-1][near], m[:-1][near], rate[near]
     first, last = gaps(begin, k, m), gaps(end, k, m)
-    start = float(first[0]) if begin[0] == times[0] else np.inf
     least = min(float(first.min()), float(last.min()))
     tolerance = 1e-7 * min(run.extent[i], run.extent[j])
     for _ in range(HALVINGS):
@@ -241,7 +281,7 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> tuple[float, floa
         begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
         first, last = np.concatenate([first, between]), np.concatenate([between, last])
         k, m, rate = (np.concatenate([x, x]) for x in (k, m, rate))
-    return least, start
+    return least
 
 
 def _closing(run: Run, i: int, j: int, one: Path, other: Path, k: Indices, m: Indices) -> Array:

@@ -1,0 +1,108 @@
+"""``findings --prove ID``: the experiments beside a reason, run and shown."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.text import Text
+
+from adapters import registry
+from reports.wording import number, params_text, reproduce
+from validation.experiments import Experiment, experiments_of
+from validation.findings import FindingsError
+from validation.findings.files import findings_of
+from validation.proofs import Proof, prove
+from validation.switching import Reading
+
+
+def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
+    """Experiments of a reason (``all``: of every reason) by engine.
+
+    Raises
+    ------
+    FindingsError
+        If no chosen engine has such a reason, or nobody has written an experiment for it.
+    """
+    found: dict[str, list[Experiment]] = {}
+    families: list[str] = []
+    for engine in engines or registry.names():
+        known = findings_of(engine)
+        families += list(known.families) if known else []
+        wanted = [e for e in experiments_of(engine) if reason in ("all", e.family)]
+        if wanted and (reason == "all" or (known and reason in known.families)):
+            found[engine] = wanted
+    if not found and reason in families:
+        raise FindingsError(f"prove: no experiment stands beside the reason {reason!r} (validation/experiments)")
+    if not found:
+        raise FindingsError(f"prove: there is no reason called {reason!r}; known: {', '.join(families)}")
+    return found
+
+
+def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
+    """Run the experiments, print what came out, and exit with 1 unless all show what they say."""
+    console = Console()
+    proofs: list[Proof] = []
+    for engine, experiments in chosen(reason, engines).items():
+        with Console(stderr=True).status(f"{engine}: {len(experiments)} experiments"):
+            proofs += prove(engine, experiments)
+    if as_json:
+        click.echo(json.dumps([_plain(proof) for proof in proofs], indent=1))
+    else:
+        for proof in proofs:
+            for line in lines(proof):
+                console.print(line, soft_wrap=True)
+        held = sum(proof.holds for proof in proofs)
+        console.print(Text(f"{held} of {len(proofs)} experiments show what they say"))
+    sys.exit(0 if all(proof.holds for proof in proofs) else 1)
+
+
+def lines(proof: Proof) -> list[Text]:
+    """One experiment in words: what it says, the row before and after, what changes nothing, how to run the row."""
+    slot, told = proof.before.slot, proof.experiment
+    where = f"{proof.engine}/{slot.profile} {slot.scene} {slot.dimension}-D {params_text(dict(slot.params))}".strip()
+    where += f" at {slot.iterations} iterations" if slot.iterations is not None else ""
+    mark = "PROVEN" if proof.holds else "NOT PROVEN"
+    said = [Text(f"{mark}  {told.family}: {told.says}"), Text(f"  {where}: {_value(proof.before)}")]
+    said.append(Text(f"    with {_changes(told.off)}: {_value(proof.after)}"))
+    for change, each in zip(told.idle, proof.idle, strict=True):
+        said.append(Text(f"    with {_changes(change)} alone: {_value(each)}"))
+    if not proof.holds:
+        said.append(Text(f"    {proof.why_not}"))
+    said.append(Text(f"    {reproduce(slot.as_dict())}"))
+    return said
+
+
+def _changes(changes: Any) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in changes.items())
+
+
+def _value(found: Reading) -> str:
+    if found.value is None:
+        return f"no {found.check.metric}: {found.reason}"
+    mark = "PASS" if found.badness <= 1.0 else "FAIL"
+    check = found.check
+    return (
+        f"{mark} {check.metric} {number(found.value, 6)} {check.unit} of {number(check.truth)} +- {number(check.bound)}"
+    )
+
+
+def _plain(proof: Proof) -> dict[str, Any]:
+    def row(found: Reading) -> dict[str, Any]:
+        return {"slot": found.slot.as_dict(), "value": found.value, "reason": found.reason, **asdict(found.check)}
+
+    return {
+        "engine": proof.engine,
+        "family": proof.experiment.family,
+        "says": proof.experiment.says,
+        "holds": proof.holds,
+        "why_not": proof.why_not,
+        "before": row(proof.before),
+        "after": row(proof.after),
+        "idle": [row(each) for each in proof.idle],
+    }

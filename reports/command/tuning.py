@@ -1,0 +1,72 @@
+"""``tune``: are an engine's tuned profiles the best that its stock settings give? A search that anyone can repeat."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import click
+from rich.console import Console
+
+from adapters.engine import EngineError
+from adapters.registry import load
+from reports.command.group import AS_JSON, main
+from validation.experiments import candidates_of
+from validation.tuning import SEARCHED, Score, Search, search
+
+
+@main.command()
+@click.argument("engine")
+@click.option("--profile", default="tuned", show_default=True, help="Profile to start from.")
+@click.option("--group", multiple=True, type=click.Choice(list(SEARCHED)), help="Scenes of one kind; all by default.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@AS_JSON
+def tune(engine: str, profile: str, group: tuple[str, ...], dim: tuple[int, ...], jobs: int, as_json: bool) -> None:
+    """Search stock settings of ENGINE that do better than a profile of it on all scenes of a kind.
+
+    Changes nothing: what is found is adopted in the adapter, with its reason. Exits with 1 if something better was
+    found, so that a release of an engine that has better settings shows.
+    """
+    console = Console(stderr=True)
+    if not candidates_of(engine):
+        raise EngineError(f"tune: nobody has named stock settings of {engine} to try (validation/experiments)")
+    known = load(engine).facts.dimensions
+    dimensions = dim or ((2,) if known == {2} else (2, 3))
+    found = []
+    for name in group or SEARCHED:
+
+        def said(changes: Mapping[str, Any], score: Score) -> None:
+            console.print(f"  {_text(changes)}: {_score(score)}", markup=False, highlight=False, style="dim")
+
+        console.print(f"{engine}/{profile} on {name}", markup=False, highlight=False)
+        result = search(engine, profile, name, jobs, dimensions, said)
+        found.append(result)
+        for line in _lines(result):
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if as_json:
+        click.echo(json.dumps([asdict(result) for result in found], indent=1))
+    sys.exit(1 if any(result.changes for result in found) else 0)
+
+
+def _score(score: Score) -> str:
+    return f"{score.failing} fail, {score.decades:.1f} decades"
+
+
+def _text(changes: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in changes.items())
+
+
+def _lines(result: Search) -> list[str]:
+    head = f"{result.engine}/{result.profile} {result.group}: {_score(result.before)}; {len(result.trials)} tried"
+    if not result.changes:
+        lines = [f"{head}; none is better"]
+    else:
+        held = f"held out {_score(result.held_out[0])} -> {_score(result.held_out[1])}"
+        lines = [f"{head}; better: {_text(result.changes)} -> {_score(result.after)} ({held})"]
+    if result.needless:
+        lines.append(f"  as shipped does as well: {_text(result.needless)}")
+    return lines

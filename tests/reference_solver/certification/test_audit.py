@@ -1,0 +1,195 @@
+"""The audit passes what is right, refuses what is wrong, and shares nothing with the solver."""
+
+import ast
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import reference_solver.certification.audit as package
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certification import self_test
+from reference_solver.certification.audit import CHECKS, audit
+from reference_solver.certification.audit.motion import integrated_turn
+from reference_solver.certification.truth import certify
+
+DT, G = 1.0 / 240.0, 9.81
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def floor(dimension=2, **fields):
+    if dimension == 2:
+        return Body(HalfSpace((0.0, 1.0)), **({"motion": "fixed"} | fields))
+    return Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+
+
+def disc(x, y, *twist):
+    return Body(Disc(0.5), 1.0, 0.125, (x, y, 0.0), twist or None)
+
+
+def planar(*bodies, restitution=0.0, friction=0.5):
+    return Model(2, bodies, (0.0, -G), restitution, friction)
+
+
+def refused(model, steps, dt=DT):
+    record = Simulation(model, Settings.reference(dt)).record(steps, pieces=True)
+    return {finding.name for finding in audit(model, record, dt) if not finding.holds}
+
+
+def test_it_imports_no_solver():
+    """What certifies shares the model, the record's form and its own geometry, and no more."""
+    folder = Path(package.__file__).parent
+    allowed = ("certification", "model", "pieces", "records", "shapes")
+    for path in [*folder.glob("*.py"), folder.parent / "geometry.py"]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module.startswith("reference_solver"):
+                assert node.module.split(".")[1] in allowed, (path, node.module)
+
+
+@pytest.mark.parametrize("name", self_test.SCENES)
+def test_what_is_right_is_certified(name):
+    assert self_test.seen_by(*self_test.run(self_test.SCENES[name])) == ()
+
+
+def test_there_are_many_corruptions_of_all_families():
+    families = [corruption.family for corruption in self_test.CORRUPTIONS]
+    assert len(families) >= 40
+    assert set(families) == {"law", "input", "detection", "events", "motion", "bookkeeping"}
+    assert len({(c.family, c.name, c.scene) for c in self_test.CORRUPTIONS}) == len(families)
+
+
+@pytest.mark.parametrize("part", range(7))
+def test_corruptions_are_caught(part):
+    """A seventh of them; `crosscheck certify --self-test` plants them all, at all sizes."""
+    for corruption in self_test.CORRUPTIONS[part :: 7 * 2]:
+        scene = self_test.SCENES[corruption.scene]
+        assert self_test.seen_by(*corruption.plant(scene, self_test.JUDGED)), corruption.name
+
+
+def test_every_check_can_fail():
+    """No check is idle: each is the one that sees some corruption, or has its scene here."""
+    seen = set()
+    for trial in self_test.trials((1e-2,)):
+        seen |= set(trial.seen)
+    own = {"finite", "pull", "scale", "unknown", "resolution", "start"}
+    assert set(CHECKS) - own <= seen, set(CHECKS) - own - seen
+
+
+class TestWhatWasCertifiedOnce:
+    def test_a_disc_between_a_floor_and_a_ceiling_that_comes_down(self):
+        """No motion obeys all laws."""
+        ceiling = Body(HalfSpace((0.0, -1.0)), pose=(0.0, 1.2, 0.0), twist=(0.0, -0.3, 0.0), motion="prescribed")
+        certificate = certify(planar(floor(), ceiling, disc(0.0, 0.5)), Settings.reference(DT), 200)
+        assert not certificate.holds
+        assert {"overlap", "scale"} <= {finding.name for finding in certificate.findings if not finding.holds}
+
+    def test_a_start_in_the_floor(self):
+        assert "start" in refused(planar(floor(), disc(0.0, 0.3)), 10)
+
+    def test_an_overlap_of_a_tenth_of_a_body(self):
+        assert {"start", "overlap"} <= refused(planar(floor(), disc(0.0, 0.5), disc(0.9, 0.5)), 10)
+
+    @pytest.mark.parametrize("far", [1e10, 1e15])
+    def test_bodies_so_far_out_that_places_are_not_resolved(self, far):
+        assert "resolution" in refused(planar(floor(), disc(far, 0.5, 1.0, 0.0, 0.0)), 10)
+
+    def test_a_ball_that_passes_a_wall(self):
+        """The wall is known to the certificate only: every other body is where the solver has it."""
+        wall = Body(Box((0.01, 2.0)), pose=(2.0, 1.0, 0.0), motion="fixed")
+        model = planar(floor(), disc(0.0, 0.5, 50.0, 0.0, 0.0), friction=0.0)
+        record = Simulation(model, Settings.reference(DT)).record(30, pieces=True)
+        walled = planar(*model.bodies, wall, friction=0.0)
+        sample = np.repeat([[wall.pose]], len(record.pose), axis=0)
+        record = replace(record, pose=np.concatenate([record.pose, sample], axis=1))
+        found = {finding.name for finding in audit(walled, record, DT) if not finding.holds}
+        assert found == {"overlap"}
+
+
+class TestRecords:
+    """Faults of the record that no run of ours makes."""
+
+    @pytest.fixture
+    def sliding(self):
+        model = planar(floor(), Body(Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0)))
+        return model, Simulation(model, Settings.reference(DT)).record(10, pieces=True)
+
+    def broken(self, sliding, **fields):
+        model, record = sliding
+        changed = replace(record, pieces=replace(record.pieces, **fields))
+        return {finding.name for finding in audit(model, changed, DT) if not finding.holds}
+
+    def test_none(self, sliding):
+        assert self.broken(sliding) == set()
+
+    def test_no_number(self, sliding):
+        impulse = sliding[1].pieces.impulse.copy()
+        impulse[3, 0] = math.nan
+        assert "finite" in self.broken(sliding, impulse=impulse)
+
+    def test_a_pull(self, sliding):
+        assert "pull" in self.broken(sliding, impulse=-sliding[1].pieces.impulse)
+
+    def test_a_contact_on_a_body_that_its_piece_does_not_hold(self, sliding):
+        body = sliding[1].pieces.body.copy()
+        body[1] = 0
+        assert "unknown" in self.broken(sliding, body=body)
+
+    def test_an_impulse_beyond_any_scale(self, sliding):
+        assert "scale" in self.broken(sliding, impulse=1e9 * sliding[1].pieces.impulse)
+
+    def test_no_pieces(self, sliding):
+        with pytest.raises(ValueError, match="pieces"):
+            audit(sliding[0], replace(sliding[1], pieces=None), DT)
+
+
+def test_a_turn_is_integrated_to_round_off():
+    """About a principal axis it is known; and energy and the body's angular momentum are kept elsewhere."""
+    moments = np.array([[1.0, 2.0, 3.0]])
+    spin, length = 5.0, np.array([0.06])
+    start = np.array([UPRIGHT])
+    q = integrated_turn(start, np.array([[0.0, 0.0, 3.0 * spin]]), np.array([[0.0, 0.0, 3.0 * spin]]), moments, length)
+    half = 0.5 * spin * length[0]
+    assert q[0] == pytest.approx([math.cos(half), 0.0, 0.0, math.sin(half)], abs=1e-10)
+
+
+class TestTruth:
+    def test_the_error_bounds_what_a_scheme_of_first_order_is_off(self):
+        """Free fall at fixed steps is off by g t dt / 2 (E17); half the step tells exactly that."""
+        model = planar(floor(), disc(0.0, 50.0))
+        certificate = certify(model, Settings.fixed_step(DT), 100)
+        t = certificate.t
+        off = np.abs(certificate.pose[:, 1, 1] - (50.0 - 0.5 * G * t * t))
+        assert off[-1] == pytest.approx(0.5 * G * t[-1] * DT, rel=1e-9)
+        assert (off <= certificate.error * (1.0 + 1e-9)).all()
+        assert certificate.error[-1] <= 1.01 * off[-1]
+
+    def test_what_is_exact_is_certified_to_round_off(self):
+        certificate = certify(planar(floor(), disc(0.0, 1.5), restitution=0.8), Settings.reference(DT), 240)
+        assert certificate.holds and certificate.reasons == ()
+        assert certificate.error[-1] < 1e-13 and certificate.error_until(0.5) <= certificate.error[-1]
+        assert certificate.horizon == math.inf and certificate.growth[-1] < 10.0
+
+    def test_beyond_the_horizon_only_laws_are_certified(self):
+        """A ball in the room between four discs that touch: each bounce spreads a disturbance about twofold."""
+        posts = [Body(Disc(1.0), pose=(x, y, 0.0), motion="fixed") for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+        ball = Body(Disc(0.1), 1.0, 0.005, (0.05, 0.02, 0.0), (4.0, 3.0, 0.0))
+        certificate = certify(Model(2, [*posts, ball], (0.0, 0.0), 1.0, 0.0), Settings.reference(DT), 480)
+        assert certificate.holds and 0.5 < certificate.horizon < 2.0
+        assert "only laws" in certificate.reasons[-1]
+        assert certificate.error_until(certificate.horizon) == math.inf
+        early = 0.5 * certificate.horizon
+        assert certificate.error_until(early) < 1e-9
+
+    def test_steps_below_one_are_refused(self):
+        with pytest.raises(ValueError, match="steps"):
+            certify(planar(floor(), disc(0.0, 0.5)), Settings.reference(DT), 0)
+
+    def test_a_spatial_run(self):
+        ball = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0.7, *UPRIGHT), (1.0, 0.5, -1.0, 1.0, 0.0, 0.0))
+        certificate = certify(
+            Model(3, [floor(3), ball], (0.0, 0.0, -G), 0.8, 0.1), Settings.reference(DT), 60, stride=3
+        )
+        assert certificate.holds and len(certificate.t) == 21
+        assert certificate.error[-1] < 1e-12

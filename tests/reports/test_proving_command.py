@@ -1,0 +1,34 @@
+"""``findings --prove``: experiments run and are shown; a reason that nobody has written is one line."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main
+from reports.command.proving import chosen
+from validation.experiments import experiments_of
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["findings", *arguments])
+
+
+def test_an_unknown_reason_is_refused_in_one_line():
+    result = run("--prove", "phlogiston")
+    assert result.exit_code == 2
+    assert "there is no reason called 'phlogiston'" in result.output and "stack-slop" in result.output
+
+
+def test_all_means_every_experiment_of_the_chosen_engines():
+    assert chosen("all", ["mujoco"]) == {"mujoco": list(experiments_of("mujoco"))}
+    assert set(chosen("stack-sweeps", [])) == {"bullet"}
+
+
+def test_a_reason_is_proven_on_its_engine():
+    pytest.importorskip("pymunk", reason="pymunk is an optional engine")
+    result = run("--prove", "stack-slop", "--engine", "chipmunk", "--json")
+    assert result.exit_code == 0, result.output
+    proofs = json.loads(result.stdout)
+    assert len(proofs) == len(chosen("stack-slop", ["chipmunk"])["chipmunk"])
+    assert all(proof["holds"] and proof["why_not"] == "" for proof in proofs)

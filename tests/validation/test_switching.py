@@ -1,0 +1,114 @@
+"""Switch one setting: replaced, added, counted; the machine that tuning and proofs share."""
+
+import json
+import math
+
+import pytest
+
+from validation.canonical import Check
+from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
+from validation.experiments import Experiment, candidates_of, experiments_of
+from validation.findings.files import findings_of
+from validation.plan import QUICK_DT, in_quick_suite
+from validation.proofs import Proof
+from validation.switching import Reading, reading, readings, side_by_side, switched
+from validation.tuning import Score, broken, score
+
+pymunk = pytest.importorskip("pymunk", reason="pymunk is an optional engine")
+
+SLOT = Slot("stack", (("n", 2.0),), 2, "chipmunk", "default", QUICK_DT)
+OURS = ("bullet", "chipmunk", "mujoco", "reference")
+
+
+def test_a_switched_slot_is_another_cell_that_survives_json_and_is_never_listed():
+    other = switched(SLOT, {"collision_slop": 1e-5, "solref": (0.02, 1.0)})
+    again = slot_from_dict(json.loads(json.dumps(other.as_dict())))
+    assert again == other and again.key() == other.key() != SLOT.key()
+    assert in_quick_suite(SLOT) and not in_quick_suite(other)
+    assert switched(SLOT, {}) == SLOT
+    assert "switched" not in SLOT.as_dict()
+
+
+def test_a_setting_is_replaced_in_place_and_changes_the_cell_s_identity():
+    other = switched(SLOT, {"collision_slop": 1e-5})
+    cells = [prepare(slot).cell for slot in (SLOT, other)]
+    assert cells[0].settings_hash != cells[1].settings_hash
+    assert cells[0].scene_hash == cells[1].scene_hash
+
+
+def test_iterations_are_the_slot_s_own_field():
+    other = switched(switched(SLOT, {"iterations": 7}), {"collision_slop": 1e-5})
+    assert other.iterations == 7 and other.switched == (("collision_slop", 1e-5),)
+
+
+def test_a_cell_runs_with_the_setting_and_says_so():
+    own, more, wrong = side_by_side(SLOT, [{"iterations": 1000}, {"no_such_setting": 1}])
+    assert reading(own, "penetration").badness > 1.0 > reading(more, "penetration").badness
+    assert {s["name"]: s["value"] for s in more.settings}["iterations"] == 1000
+    assert wrong.outcome is Outcome.CRASHED and "no_such_setting" in wrong.reason
+    assert math.isinf(reading(wrong, "penetration").badness)
+
+
+@pytest.mark.parametrize("engine", OURS)
+def test_every_family_has_an_experiment_and_every_experiment_a_family_that_covers_it(engine):
+    """A reason that nobody can prove or refute is not one."""
+    families = findings_of(engine).families
+    experiments = experiments_of(engine)
+    assert {experiment.family for experiment in experiments} == set(families)
+    for experiment in experiments:
+        family = families[experiment.family]
+        assert experiment.profile in family.profiles
+        assert experiment.scene == family.scene
+        assert experiment.metric.partition("[")[0] in family.metrics
+
+
+def test_candidates_are_settings_that_the_engine_has():
+    for engine in OURS:
+        for name, values in candidates_of(engine).items():
+            assert len(set(values)) == len(values) > 1, (engine, name)
+
+
+CHECK = Check("x", "m", 0.0, 1.0, "because", "source")
+
+
+def read(value):
+    return Reading(SLOT, CHECK, value, "")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "idle", "holds"),
+    [
+        (2.0, 0.5, (2.0,), True),
+        (0.5, 0.5, (2.0,), False),  # the row does not fail
+        (2.0, 1.5, (2.0,), False),  # it goes on failing with the mechanism off
+        (2.0, 0.5, (0.9,), False),  # what others blame mends it as well
+        (2.0, None, (), False),  # a cell without an answer proves nothing
+        (None, 0.5, (), False),
+        (2.0, 0.5, (None,), False),
+    ],
+)
+def test_a_proof_holds_only_if_the_mechanism_alone_makes_the_row_fail(before, after, idle, holds):
+    experiment = Experiment(
+        "f", "says", "default", "stack", "x", {"a": 1}, idle=tuple({"b": k} for k in range(len(idle)))
+    )
+    proof = Proof("chipmunk", experiment, read(before), read(after), tuple(read(value) for value in idle))
+    assert proof.holds is holds
+    assert bool(proof.why_not) is not holds
+
+
+def test_a_score_counts_fails_before_it_counts_decades():
+    assert score([read(10.0), read(0.1)]) == Score(1, 4.0 + 2.0)
+    assert Score(0, 9.0).better_than(Score(1, 1.0))
+    assert Score(1, 1.0).better_than(Score(1, 2.0))
+    assert not Score(1, 1.95).better_than(Score(1, 2.0))  # nobody sees a tenth of a decade
+    assert score([read(None)]).failing == 1
+
+
+def test_what_passed_and_fails_is_broken_and_what_failed_is_not():
+    before, after = [read(0.5), read(2.0), read(0.5)], [read(1.5), read(3.0), read(0.9)]
+    assert len(broken(before, after)) == 1
+
+
+def test_an_unfinished_cell_has_readings_without_values():
+    lost = Observation(SLOT, "", 0, "", Outcome.TIMED_OUT, "no answer")
+    assert all(each.value is None and "no answer" in each.reason for each in readings(lost))

@@ -1,0 +1,36 @@
+"""The search finds a setting that is known to be better, keeps nothing that breaks, and names what is needless."""
+
+import pytest
+
+from validation import tuning
+from validation.tuning import search
+
+pytest.importorskip("pymunk", reason="pymunk is an optional engine")
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Two touching boxes searched with, one held out."""
+    monkeypatch.setattr(tuning, "SEARCHED", {"stand": (("stack", {"n": 2.0, "duration": 2.0}),)})
+    monkeypatch.setattr(tuning, "HELD_OUT", {"stand": (("stack", {"n": 1.0, "duration": 2.0}),)})
+
+
+def test_more_sweeps_are_found_where_too_few_are_the_fault(small, monkeypatch):
+    candidates = {"iterations": (10, 1000), "collision_persistence": (1, 3)}
+    monkeypatch.setattr(tuning, "candidates_of", lambda engine: candidates)
+    found = search("chipmunk", "default", "stand", dimensions=(2,))
+    assert found.changes["iterations"] == 1000
+    assert found.after.failing < found.before.failing
+    assert found.held_out[1].failing <= found.held_out[0].failing
+
+
+def test_what_helps_the_cells_searched_with_and_harms_others_is_not_kept(small, monkeypatch):
+    monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"iterations": (10, 1000)})
+    monkeypatch.setattr(tuning, "_holds", lambda before, after: False)
+    assert search("chipmunk", "default", "stand", dimensions=(2,)).changes == {}
+
+
+def test_a_tuned_value_that_does_no_better_than_the_shipped_one_is_named(small, monkeypatch):
+    monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"collision_persistence": (1, 3)})
+    found = search("chipmunk", "tuned", "stand", dimensions=(2,))
+    assert found.changes == {} and found.needless == {"collision_persistence": 3}

@@ -1,0 +1,99 @@
+"""Proves reasons: the row fails, with the mechanism switched off it passes, and what others would blame does nothing.
+
+A reason that passes its experiments is shown to be the cause on those rows; one that fails them is wrong, however
+plausible it reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from validation.cells import Observation, Slot
+from validation.experiments import Experiment
+from validation.plan import variations
+from validation.studies import STUDIES
+from validation.switching import Reading, observe, reading, switched
+
+
+@dataclass(frozen=True)
+class Proof:
+    """One experiment, done.
+
+    Parameters
+    ----------
+    before, after
+        The row as it is and with the mechanism off.
+    idle
+        The row with each of the settings that another explanation would blame.
+    """
+
+    engine: str
+    experiment: Experiment
+    before: Reading
+    after: Reading
+    idle: tuple[Reading, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the experiment shows what it says."""
+        return fails(self.before) and passes(self.after) and all(fails(each) for each in self.idle)
+
+    @property
+    def why_not(self) -> str:
+        """What did not come out; empty if it holds."""
+        said = [] if fails(self.before) else ["the row does not fail as it is"]
+        said += [] if passes(self.after) else ["it does not pass with the mechanism off"]
+        said += [f"it passes with {dict(each.slot.switched)}" for each in self.idle if not fails(each)]
+        return "; ".join(said)
+
+
+def passes(found: Reading) -> bool:
+    """Measured, and within the tolerance."""
+    return found.value is not None and found.badness <= 1.0
+
+
+def fails(found: Reading) -> bool:
+    """Measured, and outside the tolerance: a cell without an answer proves nothing."""
+    return found.value is not None and found.badness > 1.0
+
+
+def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list[Proof]:
+    """Run experiments; cells that several share run once."""
+    experiments = list(experiments)
+    wanted: list[Slot] = []
+    for experiment in experiments:
+        for slot in _versions(engine, experiment):
+            wanted += _cells(slot, experiment.metric)
+    seen = observe(wanted, jobs)
+    return [_proof(engine, experiment, seen) for experiment in experiments]
+
+
+def _versions(engine: str, experiment: Experiment) -> list[Slot]:
+    """The row's slot as it is, with the mechanism off, and with each idle change."""
+    slot = experiment.slot(engine)
+    return [slot, switched(slot, experiment.off), *(switched(slot, change) for change in experiment.idle)]
+
+
+def _cells(slot: Slot, metric: str) -> list[Slot]:
+    """Cells that a metric is read from: the slot itself, or all cells of a study."""
+    if not any(study.name == metric and study.scene == slot.scene for study in STUDIES):
+        return [slot]
+    return [slot.with_params(dict(variation.params)) for variation in variations(slot.scene, "quick")]
+
+
+def _proof(engine: str, experiment: Experiment, seen: dict[Slot, Observation]) -> Proof:
+    before, after, *idle = (_read(slot, experiment.metric, seen) for slot in _versions(engine, experiment))
+    return Proof(engine, experiment, before, after, tuple(idle))
+
+
+def _read(slot: Slot, metric: str, seen: dict[Slot, Observation]) -> Reading:
+    cells = _cells(slot, metric)
+    if cells == [slot]:
+        return reading(seen[slot], metric)
+    (study,) = (study for study in STUDIES if study.name == metric)
+    results = list(study.results(seen[cell] for cell in cells))
+    if not results:
+        check = next(iter(reading(seen[cells[0]], name).check for name in ("creep",)))
+        return Reading(slot, check, None, "the study's cells have no answer")
+    return Reading(slot, results[0].check, results[0].value, results[0].reason)

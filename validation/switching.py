@@ -1,0 +1,103 @@
+"""Switch one setting: run a cell with one or more settings of its profile replaced, on any engine.
+
+Tuning searches with it, proofs of reasons and cures compare with it. An experiment is a slot like any other (it runs
+in the same workers), whose `Slot.switched` names what differs. It is never listed and never shown as the profile's
+answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from validation.canonical import Check
+from validation.cells import Observation, Outcome, Slot
+from validation.posed import resolve
+from validation.workers import run_cells
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One check of one cell: what was measured, or why nothing was.
+
+    ``badness`` is the error over the tolerance: above 1 is a FAIL; infinite where nothing was measured.
+    """
+
+    slot: Slot
+    check: Check
+    value: float | None
+    reason: str
+
+    @property
+    def error(self) -> float | None:
+        """Distance from the truth, in the metric's unit."""
+        if self.value is None or self.check.truth is None:
+            return None
+        return abs(self.value - self.check.truth)
+
+    @property
+    def badness(self) -> float:
+        """Error over tolerance."""
+        if self.error is None or not self.check.bound:
+            return float("inf")
+        return self.error / self.check.bound
+
+
+def switched(slot: Slot, changes: Mapping[str, Any]) -> Slot:
+    """Return the slot with settings replaced, besides those that it replaces already; no change gives it back.
+
+    ``iterations`` is the slot's own field: an iteration count is asked for the way a user does.
+    """
+    changes = dict(changes)
+    iterations = changes.pop("iterations", slot.iterations)
+    both = dict(slot.switched) | changes
+    return replace(slot, iterations=iterations, switched=tuple(sorted(both.items())))
+
+
+def observe(slots: Iterable[Slot], jobs: int = 1) -> dict[Slot, Observation]:
+    """Run cells in worker processes; each slot once. What is left unfinished, as its engine hangs, counts as such."""
+    found: dict[Slot, Observation] = {}
+
+    def left(slot: Slot, reason: str) -> None:
+        found[slot] = Observation(slot, "", 0, "", Outcome.TIMED_OUT, reason)
+
+    found |= {observation.slot: observation for observation in run_cells(list(dict.fromkeys(slots)), jobs, leave=left)}
+    return found
+
+
+def readings(observation: Observation) -> list[Reading]:
+    """All judged checks of an observation; a cell without an answer has readings without values."""
+    slot = observation.slot
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    found = []
+    for check in canonical.checks(scene, slot.dt):
+        if check.truth is None or check.bound is None:
+            continue
+        value, reason = observation.metrics.get(check.metric, (None, "was not measured"))
+        if observation.outcome is not Outcome.OK:
+            value, reason = None, f"{observation.outcome.value}: {observation.reason}"
+        found.append(Reading(slot, check, value, reason))
+    return found
+
+
+def reading(observation: Observation, metric: str) -> Reading:
+    """One check of an observation.
+
+    Raises
+    ------
+    KeyError
+        If the scene has no such check.
+    """
+    for found in readings(observation):
+        if found.check.metric == metric:
+            return found
+    raise KeyError(metric)
+
+
+def side_by_side(slot: Slot, changes: Sequence[Mapping[str, Any]], jobs: int = 1) -> list[Observation]:
+    """Observations of a slot as its profile has it, and with each of ``changes``, in this order."""
+    slots = [slot, *(switched(slot, change) for change in changes)]
+    found = observe(slots, jobs)
+    return [found[each] for each in slots]

@@ -1,0 +1,242 @@
+"""Searches a tuned profile again for stock settings that do better on all scenes.
+
+    start       the profile as it is, on the cells of one group of scenes
+    search      every candidate value of every setting, one at a time; the best that helps is kept; again with it
+    accept      a change counts if it makes fewer checks fail, or the same number come clearly nearer, and if
+                nothing that passed fails; on other cells, held out, nothing may get worse, and where a profile's
+                own iterations are cut down nothing that passed may fail
+    fairness    a value as shipped that does as well as the tuned one is reported too: nothing is tuned for its own sake
+
+The same cells, candidates' budget and rule for every engine. What a search finds is adopted by hand, with its reason,
+in the adapter: a profile chooses by a scene's needs, a search knows only its cells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from adapters.needs import needs
+from adapters.registry import load
+from validation.cells import Observation, Slot, settings_of
+from validation.experiments import candidates_of
+from validation.plan import QUICK_DT, has_iterations
+from validation.posed import resolve
+from validation.switching import Reading, observe, readings, switched
+
+Cells = tuple[tuple[str, Mapping[str, float]], ...]
+#: Groups of scenes whose needs are alike, so that a profile has one set of settings for each.
+SEARCHED: dict[str, Cells] = {
+    "impact": (
+        *(("impact", {"e": e, "v": v}) for e, v in ((0.0, 1.0), (0.5, 6.0), (1.0, 1.0))),
+        *(("bounce", {"e": e, "height": 1.0}) for e in (0.5, 1.0)),
+        *(("bounce", {"height": height}) for height in (1.03, 1.1)),
+    ),
+    "stand": tuple(("stack", {"n": float(n)}) for n in (1, 2, 10)),
+    "slide": tuple(("incline", {"ratio": ratio}) for ratio in (0.5, 0.999, 1.001, 1.1, 2.0)),
+}
+HELD_OUT: dict[str, Cells] = {
+    "impact": (("impact", {"e": 0.2, "v": 50.0}), ("bounce", {"height": 1.07}), ("bounce", {"e": 1.0, "height": 1.05})),
+    "stand": (("stack", {}), ("stack", {"n": 20.0})),
+    "slide": tuple(("incline", {"ratio": ratio}) for ratio in (0.9, 0.99, 1.01, 1.5)),
+}
+#: Iterations at which the cells of a group must not fail where they passed, for profiles that have such a count: a
+#: setting that needs a solution to the end is no better one.
+STARVED: dict[str, tuple[int, ...]] = {"stand": (1, 10)}
+#: Least gain of the summed decades of error over tolerance that counts: a tenth of a decade is a quarter of an error.
+GAIN = 0.1
+#: A check this far below its tolerance cannot be improved in a way that anyone sees.
+INVISIBLE = 1e-3
+#: Most settings that a search changes, one a round: what needs more is another profile.
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Score:
+    """How bad a set of readings is: checks that fail, and decades of error over tolerance above `INVISIBLE`."""
+
+    failing: int
+    decades: float
+
+    def better_than(self, other: Score) -> bool:
+        """Fewer fails, or as many and clearly nearer."""
+        if self.failing != other.failing:
+            return self.failing < other.failing
+        return self.decades < other.decades - GAIN
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One change that was tried: its scores, what it broke, and whether it was kept."""
+
+    changes: Mapping[str, Any]
+    score: Score
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search of one group found.
+
+    ``needless`` are settings whose value as shipped does as well as the profile's.
+    """
+
+    engine: str
+    profile: str
+    group: str
+    before: Score
+    after: Score
+    changes: Mapping[str, Any]
+    held_out: tuple[Score, Score]
+    trials: tuple[Trial, ...]
+    needless: Mapping[str, Any]
+
+
+def score(found: Sequence[Reading]) -> Score:
+    """Score readings; a cell without an answer fails each of its checks, a thousand times over."""
+    bad = [min(max(each.badness, INVISIBLE), 1e3) for each in found]
+    return Score(sum(b > 1.0 for b in bad), sum(math.log10(b / INVISIBLE) for b in bad))
+
+
+def slots_of(engine: str, profile: str, cells: Cells, dimensions: Sequence[int]) -> list[Slot]:
+    """Slots of cells in every dimension."""
+    found = []
+    for scene, params in cells:
+        defaults = {parameter.name: parameter.default for parameter in resolve(scene).parameters}
+        differing = tuple(sorted((name, value) for name, value in params.items() if value != defaults[name]))
+        found += [Slot(scene, differing, dimension, engine, profile, QUICK_DT) for dimension in dimensions]
+    return found
+
+
+Progress = Callable[[Mapping[str, Any], Score], None]
+
+
+class _Bench:
+    """Readings of the group's cells under changes; every cell runs once."""
+
+    def __init__(self, slots: Sequence[Slot], jobs: int) -> None:
+        self.slots, self.jobs = slots, jobs
+        self.seen: dict[Slot, Observation] = {}
+
+    def prepare(self, many: Sequence[Mapping[str, Any]]) -> None:
+        """Run the cells of many changes in one go: starting workers costs more than a cell."""
+        wanted = [switched(slot, changes) for changes in many for slot in self.slots]
+        self.seen |= observe([slot for slot in wanted if slot not in self.seen], self.jobs)
+
+    def readings(self, changes: Mapping[str, Any]) -> list[Reading]:
+        """Readings of all cells, in the same order for every change."""
+        self.prepare([changes])
+        return [found for slot in self.slots for found in readings(self.seen[switched(slot, changes)])]
+
+
+def broken(before: Sequence[Reading], after: Sequence[Reading]) -> tuple[str, ...]:
+    """Checks that passed and fail."""
+    return tuple(
+        f"{old.slot.scene} {old.slot.dimension}-D {old.slot.params_text()} {old.check.metric}".replace("  ", " ")
+        for old, new in zip(before, after, strict=True)
+        if old.badness <= 1.0 < new.badness
+    )
+
+
+def search(
+    engine: str,
+    profile: str,
+    group: str,
+    jobs: int = 1,
+    dimensions: Sequence[int] = (2, 3),
+    progress: Progress = lambda changes, score: None,
+) -> Search:
+    """Search one profile of one engine on one group of scenes.
+
+    Raises
+    ------
+    KeyError
+        For an unknown group.
+    EngineError
+        For an unknown engine or profile.
+    """
+    bench = _Bench(slots_of(engine, profile, SEARCHED[group], dimensions), jobs)
+    held = _Bench(slots_of(engine, profile, HELD_OUT[group], dimensions), jobs)
+    starved = _Bench(_starved(bench.slots, group), jobs)
+    start, start_held, start_starved = bench.readings({}), held.readings({}), starved.readings({})
+    changes: dict[str, Any] = {}
+    best, trials = score(start), []
+    for _ in range(ROUNDS):
+        around = _around(engine, bench.slots[0], changes)
+        bench.prepare(around)
+        tried = [_trial(each, start, bench) for each in around]
+        trials += tried
+        for trial in tried:
+            progress(trial.changes, trial.score)
+        helpful = [trial for trial in tried if not trial.broken and trial.score.better_than(best)]
+        helpful.sort(key=lambda trial: (trial.score.failing, trial.score.decades))
+        held.prepare([trial.changes for trial in helpful])
+        starved.prepare([trial.changes for trial in helpful])
+        chosen = next(
+            (
+                trial
+                for trial in helpful
+                if _holds(start_held, held.readings(trial.changes))
+                and ("iterations" in trial.changes or not broken(start_starved, starved.readings(trial.changes)))
+            ),
+            None,
+        )
+        if chosen is None:
+            break
+        changes, best = dict(chosen.changes), chosen.score
+    after_held = score(held.readings(changes))
+    needless = _needless(engine, bench, changes)
+    return Search(
+        engine, profile, group, score(start), best, changes, (score(start_held), after_held), tuple(trials), needless
+    )
+
+
+def _around(engine: str, slot: Slot, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Every change by one more setting: all candidate values but those in force."""
+    return [
+        {**changes, name: value}
+        for name, values in candidates_of(engine).items()
+        for value in values
+        if changes.get(name, _own(slot, name)) != value
+    ]
+
+
+def _trial(changes: Mapping[str, Any], start: Sequence[Reading], bench: _Bench) -> Trial:
+    found = bench.readings(changes)
+    return Trial(changes, score(found), broken(start, found))
+
+
+def _own(slot: Slot, name: str) -> Any:
+    """Value that the profile has for a setting, or None where it leaves it as shipped."""
+    found = load(slot.engine)
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return {setting.name: setting.value for setting in settings_of(found, slot, scene)}.get(name)
+
+
+def _starved(slots: Sequence[Slot], group: str) -> list[Slot]:
+    """The group's cells with fewer iterations, for profiles that stop at a count."""
+    counted = [slot for slot in slots if has_iterations(load(slot.engine), slot)]
+    return [replace(slot, iterations=count) for slot in counted for count in STARVED.get(group, ())]
+
+
+def _holds(before: Sequence[Reading], after: Sequence[Reading]) -> bool:
+    """Whether cells that were not searched with are none the worse."""
+    return not broken(before, after) and not score(before).better_than(score(after))
+
+
+def _needless(engine: str, bench: _Bench, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of the profile whose value as shipped does as well: same fails, nothing broken, not clearly worse."""
+    slot = bench.slots[0]
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    shipped = {s.name: s.value for s in load(engine).settings("default", needs(scene), slot.dt)}
+    chosen = {name: changes.get(name, _own(slot, name)) for name in candidates_of(engine)}
+    differing = [n for n, own in chosen.items() if n in shipped and own is not None and own != shipped[n]]
+    bench.prepare([{**changes, name: shipped[name]} for name in differing])
+    reference, found = bench.readings(changes), {}
+    for name in differing:
+        restored = bench.readings({**changes, name: shipped[name]})
+        if not score(reference).better_than(score(restored)) and not broken(reference, restored):
+            found[name] = shipped[name]
+    return found
