@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.pieces import Journal
@@ -39,7 +39,6 @@ from reference_solver.planar.state import (
 )
 from reference_solver.stepping.clock import CONFINED, ESCAPED, LEFT, UNSETTLED
 from reference_solver.stepping.islands import (
-    FOUND,
     NODES,
     ROOM,
     Islands,
@@ -57,7 +56,7 @@ from reference_solver.tally import OPENED
 MADE, LEFT_BOUNDS, NO_ROOM = 0, 1, 2
 
 
-@inner_kernel
+@spliced_kernel
 def step_world(
     bodies: Bodies,
     pairs: Pairs,
@@ -69,32 +68,40 @@ def step_world(
     tally: Array,
     world: World,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on or makes the step anew."""
+    """One step; False if an array is too small: called again, it makes the step anew."""
     if not is_finite(bodies):
         return True
-    if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
-        ledger.used[0] = 0
-        for attempt in range(len(ROOM)):
-            if not find_islands(bodies, pairs, rows, options, world.islands, ROOM[attempt]):
-                return False
-            if world.islands.size[FOUND] <= 1:
-                break
-            keep(tally, world.tally)
-            outcome = step_islands(bodies, pairs, rows, problem, sub, ledger, options, tally, world)
-            if outcome == MADE:
-                return True
-            keep(world.tally, tally)
-            ledger.used[0] = 0
-            if outcome == NO_ROOM:
-                return False
-    sub.lasting.size[BODIES] = len(bodies.kind)
-    sub.clock[CONFINED] = 0.0
-    if not located_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
-        return False
-    rows.counts[KEPT] = 0
-    keep_remembered(rows)
-    pass_on(rows)
+    keep(tally, world.tally)
+    for attempt in range(len(ROOM) + 1):
+        if attempt == len(ROOM):
+            gather_all(bodies, world.islands)
+        elif not find_islands(bodies, pairs, rows, options, world.islands, ROOM[attempt]):
+            return False
+        confined = 1.0 if attempt < len(ROOM) else 0.0
+        outcome = step_islands(bodies, pairs, rows, problem, sub, ledger, options, tally, world, confined)
+        if outcome == MADE:
+            return True
+        keep(world.tally, tally)
+        if outcome == NO_ROOM:
+            return False
     return True
+
+
+@inner_kernel
+def gather_all(bodies: Bodies, islands: Islands) -> None:
+    """Let all bodies be one island."""
+    first, last = -1, -1
+    islands.size[NODES] = 0
+    for i in range(len(bodies.kind)):
+        islands.first[i], islands.mark[i], islands.next_free[i] = -1, -1, -1
+        if bodies.kind[i, MOTION] == FREE:
+            if last >= 0:
+                islands.next_free[last] = i
+            first, last = i if first < 0 else first, i
+            islands.label[i] = first
+    for i in range(len(bodies.kind)):
+        if first >= 0 and bodies.kind[i, MOTION] != FREE:
+            list_unmoved(islands, first, i)
 
 
 @inner_kernel
@@ -127,13 +134,11 @@ def find_islands(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, isl
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
         if bodies.kind[a, MOTION] == FREE and bodies.kind[b, MOTION] == FREE:
             join(islands, a, b)
-    islands.size[FOUND] = islands.size[NODES] = 0
+    islands.size[NODES] = 0
     for i in range(n):
         if bodies.kind[i, MOTION] == FREE:
             label = root(islands, i)
-            if label == i:
-                islands.size[FOUND] += 1
-            else:
+            if label != i:
                 islands.next_free[islands.last[label]] = i
             islands.last[label] = i
     for k in range(rows.counts[CANDIDATES]):
@@ -145,7 +150,7 @@ def find_islands(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, isl
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def step_islands(
     bodies: Bodies,
     pairs: Pairs,
@@ -156,12 +161,13 @@ def step_islands(
     options: Options,
     tally: Array,
     world: World,
+    confined: float,
 ) -> int:
-    """Make the step of every island; bodies change only if all stayed in their bounds."""
+    """Make the step of every island; bodies change only if all stayed in their bounds, where they are confined."""
     islands = world.islands
     opened, journal = tally[OPENED], sub.journal
     pieces, entries, contacts = journal.used[0], journal.used[1], journal.used[2]
-    rows.counts[KEPT] = 0
+    rows.counts[KEPT] = ledger.used[0] = 0
     outcome = MADE
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] != FREE or root(islands, i) != i:
@@ -172,7 +178,7 @@ def step_islands(
             tally[OPENED] = 0.0  # each island has a first solve, in which an overlap is one of the start
         local, own, around = part(world.bodies, count), sub_part(sub, world, count), pairs_part(pairs, world, count)
         own.lasting.size[BODIES] = count
-        own.clock[CONFINED], own.clock[ESCAPED] = 1.0, 0.0
+        own.clock[CONFINED], own.clock[ESCAPED] = confined, 0.0
         rows.counts[REMEMBERED] = 0
         made = located_step(local, around, rows, problem_part(problem, count), own, ledger, options, tally)
         if not made:
@@ -182,7 +188,6 @@ def step_islands(
             outcome = NO_ROOM
         elif own.clock[ESCAPED] > 0.0:
             outcome = LEFT_BOUNDS
-        own.clock[CONFINED] = 0.0
         if outcome != MADE:
             own.clock[LEFT] = own.clock[UNSETTLED] = 0.0
             journal.used[0], journal.used[1], journal.used[2] = pieces, entries, contacts

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import certify, is_finite, open_solve, row_work
+from reference_solver.planar.certificate import certify, open_solve, row_work
 from reference_solver.planar.columns import (
     APPROACH,
     FORCE_N,
@@ -66,7 +66,7 @@ from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
 
 
-@inner_kernel
+@spliced_kernel
 def located_step(
     bodies: Bodies,
     pairs: Pairs,
@@ -77,14 +77,8 @@ def located_step(
     options: Options,
     tally: Array,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped.
-
-    A run that has ended stays where it is: its state is no number.
-    """
-    if not is_finite(bodies):
-        return True
-    if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
-        open_step(sub.clock, len(bodies.kind), options.dt)
+    """One step of an island; False if an array is too small, with the step unfinished."""
+    open_step(sub.clock, len(bodies.kind), options.dt)
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
@@ -132,7 +126,7 @@ def end_run(bodies: Bodies) -> None:
                 bodies.pose[i, k] = bodies.twist[i, k] = math.nan
 
 
-@inner_kernel
+@spliced_kernel
 def sub_step(
     bodies: Bodies,
     pairs: Pairs,
@@ -257,7 +251,7 @@ def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float,
         tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
 
 
-@inner_kernel
+@spliced_kernel
 def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> float:
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]

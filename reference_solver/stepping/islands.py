@@ -17,10 +17,9 @@ from reference_solver.model import Array
 
 Indices = NDArray[np.int64]
 
-#: Entries of `Islands.size`: islands found, entries of the lists of bodies that do not move, bodies of the island
-#: gathered.
-FOUND, NODES, MEMBERS = 0, 1, 2
-SIZES = 3
+#: Entries of `Islands.size`: entries of the lists of bodies that forces do not move, bodies of the island gathered.
+NODES, MEMBERS = 0, 1
+SIZES = 2
 #: By how much farther than loads and speeds alone take it a body may get, one attempt after the other. An elastic
 #: impact with a heavy body doubles its speed and adds twice that of the other; the last attempt has no bounds.
 ROOM = (1.0, 8.0)
