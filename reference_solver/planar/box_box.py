@@ -8,13 +8,11 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.planar.closing_axis import lasting_axis
 from reference_solver.planar.columns import COS, EXTENT, SIN, SIZE
 from reference_solver.planar.points import share_of_gap, write_point
+from reference_solver.planar.separating_axis import AXIS_ADVANTAGE
 from reference_solver.planar.state import Bodies, Rows
-
-#: Another axis must be better by this fraction of the smaller half width, so that ties of aligned boxes are
-#: always decided the same way and round-off cannot swap the reference face (and with it the warm start).
-AXIS_ADVANTAGE = 1e-6
 
 
 @inner_kernel
@@ -31,8 +29,8 @@ def axis_separation(bodies: Bodies, a: int, b: int, dx: float, dy: float, axis: 
 
 
 @inner_kernel
-def box_box(bodies: Bodies, a: int, b: int, reach: float, rows: Rows, c: int) -> int:
-    """Up to two points of boxes a < b."""
+def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Rows, c: int) -> int:
+    """Up to two points of boxes a < b; ``ahead`` as in `collide`."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
     advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
@@ -48,6 +46,10 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, rows: Rows, c: int) ->
         if separation > best + advantage:
             best, axis, side = separation, k, sign
             reference = a if candidate < 2 else b
+    if ahead > 0.0:
+        edge = (0 if side > 0.0 else 2) if axis == 1 else (3 if side > 0.0 else 1)  # in the order of vertices
+        _, reference, edge, _ = lasting_axis(bodies, a, b, dx, dy, reference, edge, 0, 0.0, ahead)
+        axis, side = 1 - edge % 2, 1.0 if edge == 0 or edge == 3 else -1.0
     if reference == a:
         return clip_edge(bodies, a, b, dx, dy, axis, side, reach, rows, c)
     return clip_edge(bodies, b, a, -dx, -dy, axis, side, reach, rows, c)

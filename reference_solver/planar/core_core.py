@@ -7,6 +7,7 @@ to the reference edge; two corners, or a disc and anything, in one.
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.planar.closing_axis import lasting_axis
 from reference_solver.planar.columns import COS, ROUNDING, SIN, SIZE, VERTICES
 from reference_solver.planar.points import share_of_gap, write_point
 from reference_solver.planar.separating_axis import CORNERS, corner, corner_line, edge_normal, separating_axis
@@ -57,14 +58,17 @@ def half_space_core(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c:
 
 
 @inner_kernel
-def core_core(bodies: Bodies, a: int, b: int, reach: float, rows: Rows, c: int) -> int:
+def core_core(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Rows, c: int) -> int:
     """Up to two points of bodies a < b, neither of them a half-space."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
     separation, reference, k, l = separating_axis(bodies, a, b, dx, dy)
-    gap = separation - bodies.real[a, ROUNDING] - bodies.real[b, ROUNDING]
-    if gap > reach:
+    grown = bodies.real[a, ROUNDING] + bodies.real[b, ROUNDING]
+    if separation - grown > reach:
         return 0
+    if ahead > 0.0:
+        separation, reference, k, l = lasting_axis(bodies, a, b, dx, dy, reference, k, l, grown, ahead)
+    gap = separation - grown
     if reference == CORNERS:
         nx, ny = corner_line(bodies, a, b, k, l, dx, dy)
         x, y = corner(bodies, a, k)

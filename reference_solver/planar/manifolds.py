@@ -7,6 +7,7 @@ from reference_solver.planar.broadphase import find_candidates
 from reference_solver.planar.columns import FEATURE, IMPACT, NUMBER, PN, PT, A, B
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import (
+    BLOCK,
     CANDIDATES,
     CONTACTS,
     FEATURES,
@@ -45,7 +46,9 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
         a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
         # What flies towards a rebound must not be slowed down before it gets there (E8).
         bounces = options.scheme == FIXED_STEP and options.restitution and pairs.restitution[a, b] > 0.0
-        found = collide(bodies, a, b, TOUCHING if bounces else options.margin, rows, contacts)
+        # The textbook asks for gaps alone; it keeps its bits.
+        ahead = options.dt if options.solver == BLOCK else 0.0
+        found = collide(bodies, a, b, TOUCHING if bounces else options.margin, ahead, rows, contacts)
         if found > 0:
             rows.manifold[manifolds] = contacts
             manifolds += 1

@@ -20,8 +20,11 @@ from reference_solver.planar.state import CAPSULE, DISC, HALF_SPACE, Bodies, Row
 
 
 @inner_kernel
-def collide(bodies: Bodies, a: int, b: int, margin: float, rows: Rows, c: int) -> int:
-    """Write the contact points of bodies a < b at rows c, c + 1 and return how many."""
+def collide(bodies: Bodies, a: int, b: int, margin: float, ahead: float, rows: Rows, c: int) -> int:
+    """Write the contact points of bodies a < b at rows c, c + 1 and return how many.
+
+    ``ahead``: time [s] within which axes that separate them are told apart by when they close; 0: by their gaps alone.
+    """
     first, second = a, b
     if bodies.kind[a, SHAPE] > bodies.kind[b, SHAPE]:
         first, second = b, a
@@ -29,7 +32,7 @@ def collide(bodies: Bodies, a: int, b: int, margin: float, rows: Rows, c: int) -
     if bodies.kind[second, SHAPE] >= CAPSULE:
         if bodies.kind[first, SHAPE] == HALF_SPACE:
             return half_space_core(bodies, first, second, reach, rows, c)
-        return core_core(bodies, a, b, reach, rows, c)
+        return core_core(bodies, a, b, reach, ahead, rows, c)
     if bodies.kind[first, SHAPE] == HALF_SPACE:
         if bodies.kind[second, SHAPE] == DISC:
             return half_space_disc(bodies, first, second, reach, rows, c)
@@ -38,7 +41,7 @@ def collide(bodies: Bodies, a: int, b: int, margin: float, rows: Rows, c: int) -
         if bodies.kind[second, SHAPE] == DISC:
             return disc_disc(bodies, first, second, reach, rows, c)
         return disc_box(bodies, first, second, reach, rows, c)
-    return box_box(bodies, first, second, reach, rows, c)
+    return box_box(bodies, first, second, reach, ahead, rows, c)
 
 
 @inner_kernel

@@ -11,10 +11,12 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.box_box import AXIS_ADVANTAGE
 from reference_solver.planar.columns import COS, EXTENT, FIRST_VERTEX, ROUNDING, SIN, VERTICES
 from reference_solver.planar.state import Bodies
 
+#: Another axis must be better by this fraction of the smaller half width, so that ties of aligned boxes are
+#: always decided the same way and round-off cannot swap the reference face (and with it the warm start).
+AXIS_ADVANTAGE = 1e-6
 #: In place of a reference body: the axis is the line through two corners.
 CORNERS = -1
 

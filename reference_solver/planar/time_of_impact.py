@@ -53,7 +53,7 @@ def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int,
     place(bodies, sub, a, t)
     place(bodies, sub, b, t)
     nearest, approach, push = math.inf, 0.0, 0.0
-    for c in range(collide(bodies, a, b, UNLIMITED, sub.probe, 0)):
+    for c in range(collide(bodies, a, b, UNLIMITED, options.dt, sub.probe, 0)):
         if sub.probe.real[c, GAP] < nearest:
             prepare_masses(bodies, sub.probe, c)
             nearest = sub.probe.real[c, GAP]

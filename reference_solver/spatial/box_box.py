@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.spatial.closing_axis import NO_FACE, lasting_face
 from reference_solver.spatial.points import share_of_gap, write_point
 from reference_solver.spatial.polygon import ON_SIDE, clip_to_rectangle, keep_within_reach, reduce_to_four
 from reference_solver.spatial.state import POINTS, Bodies, Detection, Manifolds
@@ -34,9 +35,9 @@ EDGES = 72 * 64
 
 @inner_kernel
 def box_box(
-    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, manifolds: Manifolds, m: int
+    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, ahead: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
-    """Boxes f and s: up to four points of two faces, or one of two edges."""
+    """Boxes f and s: up to four points of two faces, or one of two edges; ``ahead`` as in `collide`."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     extent = min(bodies.extent[f], bodies.extent[s])
     face_f, gap_f = best_face(bodies, f, s, between)
@@ -47,6 +48,17 @@ def box_box(
     if gap_e > reach:
         return 0, (0.0, 0.0, 1.0)
     by_s = gap_s > gap_f + FACE_ADVANTAGE * extent
+    if ahead > 0.0:
+        gap, n = (gap_s, axis(bodies.axes, s, face_s)) if by_s else (gap_f, axis(bodies.axes, f, face_f))
+        n = n if dot(n, between) >= 0.0 else scale(-1.0, n)
+        if gap_e > gap + EDGE_ADVANTAGE * extent:
+            gap, n = gap_e, normal_e
+        face = lasting_face(bodies, f, s, between, n, gap, 2.0 * FACE_ADVANTAGE * extent, ahead)
+        if face >= 3:
+            count, normal = _clip_faces(bodies, detection, s, f, face - 3, 36, reach, manifolds, m)
+            return count, scale(-1.0, normal)
+        if face != NO_FACE:
+            return _clip_faces(bodies, detection, f, s, face, 0, reach, manifolds, m)
     if gap_e <= (gap_s if by_s else gap_f) + EDGE_ADVANTAGE * extent:
         if by_s:
             count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, manifolds, m)

@@ -36,7 +36,7 @@ def detect_touching(
         while old < detection.found[REMEMBERED] and memory.pair[old] < key:
             old += 1
         known = old if old < detection.found[REMEMBERED] and memory.pair[old] == key else -1
-        if collide(bodies, detection, key // n, key % n, options.margin, manifolds, m) == 0:
+        if collide(bodies, detection, key // n, key % n, options.margin, options.dt, manifolds, m) == 0:
             continue
         sort_points(manifolds, m)
         set_world_points(bodies, manifolds, m)

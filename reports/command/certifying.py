@@ -35,6 +35,7 @@ PARTS = (
     "conservation",
     "rotation",
     "turning",
+    "detection",
     "metamorphic",
     "hard_cases",
     "self_test",

@@ -130,7 +130,7 @@ def test_pair_values_that_are_one_number_take_no_room_per_pair(dimension):
     for table, value in ((model.restitution, 0.5), (model.friction, 0.3)):
         assert table.shape == (len(model.bodies),) * 2 and table[0, -1] == value
         kept = pair_table(table)
-        assert kept[0, -1] == value and kept.base.nbytes == 8
+        assert kept[0, -1] == value and kept.strides == (0, 0)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

@@ -2,7 +2,16 @@
 
 import pytest
 
-from reference_solver.certification import Gate, columns, conservation, friction, impact, rotation, turning
+from reference_solver.certification import (
+    Gate,
+    columns,
+    conservation,
+    detection,
+    friction,
+    impact,
+    rotation,
+    turning,
+)
 from reference_solver.certification.space import SPACES
 
 IN_BOTH = [
@@ -33,6 +42,8 @@ IN_BOTH = [
     (columns.heavy_on_light, 1e4, 1e-10),
     (columns.alternating, 1e4, 1e-10),
     (columns.pyramid,),
+    (detection.seams, "box"),
+    (detection.first_impacts,),
 ]
 ALONE = [
     (rotation.order, "classical"),
@@ -41,6 +52,7 @@ ALONE = [
     (rotation.angular_momentum, "reference"),
     *[(turning.errors, name) for name in turning.CASES],
     *[(turning.order, name) for name in turning.CASES],
+    (detection.seams, SPACES[0], "polygon"),
 ]
 
 
