@@ -53,6 +53,7 @@ ALONE = [
     *[(turning.errors, name) for name in turning.CASES],
     *[(turning.order, name) for name in turning.CASES],
     (detection.seams, SPACES[0], "polygon"),
+    (detection.slender_rod,),
 ]
 
 
