@@ -67,7 +67,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stack-sweeps-default", "default", "settle_time", 10),
             ("stack-sweeps-default", "default", "kinetic_energy", 10),
             ("stack-sweeps-default", "default", "impulse_scatter", 10),
-            ("stack-sweeps-default", "default", "interface_impulse[5]", 4),
+            ("stack-sweeps-default", "default", "interface_impulse[5]", 1),
             ("stack-sweeps", "one", "drift", None),
             ("stack-sweeps", "one", "penetration", None),
             ("stack-sweeps", "tuned", "drift", 10),
