@@ -24,7 +24,9 @@ from typing import Any
 
 from adapters.plain import lines, one_line
 
-_PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # <linux/prctl.h>
+#: Seconds that a child's guardian has to end what the child has started.
+GRACE = 10.0
 #: Bytes of a child's output that are kept: enough for the last lines of a traceback.
 LOG_BYTES = 2**16
 LOG_LINES = 5
@@ -136,17 +138,16 @@ class Child:
         """End the child and everything it started; says how it had ended if it did so itself."""
         if self._process is None:
             return self._reason
-        process, pid = self._process, self._process.pid or 0
-        # A child that has just closed its connection is about to end: its own reason says more than our kill.
-        ended = bool(wait([process.sentinel], 0.5)) if self._closed() else bool(wait([process.sentinel], 0.0))
+        process = self._process
         self.drain()
-        # The process is not waited for yet, so its number and its group's cannot belong to somebody else.
-        for other in _descendants(pid):
-            _kill(other)
-        if hasattr(os, "killpg"):
-            with contextlib.suppress(OSError):  # it may have had no time to make a group
-                os.killpg(pid, signal.SIGKILL)
+        # A child that has just closed its connection is about to end: its own reason says more than ours.
+        wait([process.sentinel], 0.5 if self._closed() else 0.0)
+        ended = _has_ended(process)
         if not ended:
+            process.terminate()  # its guardian ends all it started, and then itself
+            process.join(GRACE)
+            for other in _descendants(process.pid):  # of a guardian that was stopped by what it guards
+                _kill(other)
             process.kill()
         process.join()
         self._reason = _cause(process.exitcode) if ended else "the process closed its connection"
@@ -167,13 +168,11 @@ class Child:
 def _main(
     serve: Callable[[Connection], None], connection: Connection, log: Connection, parent: int, memory: int | None
 ) -> None:
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if hasattr(os, "setsid"):
-        os.setsid()  # its children are killed as a group, and Ctrl-C is the parent's business
-    if os.getppid() != parent:  # it died before we asked
-        os._exit(1)
+        os.setsid()  # Ctrl-C is the parent's business
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        _guard(parent, connection)
     null = os.open(os.devnull, os.O_RDONLY)
     os.dup2(null, 0)
     os.close(null)
@@ -182,6 +181,65 @@ def _main(
     log.close()
     limit(memory)
     serve(connection)
+
+
+def _guard(parent: int, connection: Connection) -> None:
+    """Divide this process: its child returns and serves, itself it waits, and ends all that the child leaves behind.
+
+    The guardian adopts whatever its descendants orphan, so it finds also what has left its group. It ends with the
+    child, in the same way, or when its own parent dies.
+    """
+    blocked = {signal.SIGTERM, signal.SIGCHLD}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
+    libc = ctypes.CDLL(None)
+    libc.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it died before we asked
+        os._exit(1)
+    guardian = os.getpid()
+    child = os.fork()
+    if child == 0:
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        libc.prctl(_PR_SET_CHILD_SUBREAPER, 0)
+        if os.getppid() != guardian:
+            os._exit(1)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        return
+    connection.close()
+    while True:
+        if signal.sigwait(blocked) == signal.SIGTERM:
+            _sweep()
+            os._exit(1)
+        while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+            if ended[0] == child:
+                _sweep()
+                _end_like(ended[1])
+
+
+def _sweep() -> None:
+    """End all descendants: killing one may orphan others, which come to us."""
+    ends = time.monotonic() + GRACE / 2.0
+    while time.monotonic() < ends:
+        for other in _descendants(os.getpid()):
+            _kill(other)
+        try:
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        except ChildProcessError:
+            return  # nobody is left
+        time.sleep(0.01)
+
+
+def _end_like(status: int) -> None:
+    """End as a child with this status has ended."""
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        with contextlib.suppress(OSError, ValueError):  # of signals that cannot be handled
+            signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
+        limit(None)
+        os.kill(os.getpid(), number)
+    os._exit(os.waitstatus_to_exitcode(status) & 0xFF)
 
 
 def limit(memory: int | None) -> None:
@@ -195,6 +253,20 @@ def limit(memory: int | None) -> None:
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         most = memory if hard == resource.RLIM_INFINITY else min(memory, hard)
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def _has_ended(process: Any) -> bool:
+    """Whether a process has ended by itself; it stays unwaited for, and its closed sentinel proves nothing."""
+    if not hasattr(os, "waitid"):
+        return bool(wait([process.sentinel], 0.0))
+    ends = time.monotonic() + 0.5
+    while wait([process.sentinel], 0.0):  # the sentinel closes a moment before the process can be waited for
+        if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+            return True
+        if time.monotonic() > ends:
+            return False
+        time.sleep(0.01)
+    return False
 
 
 def _cause(code: int | None) -> str:

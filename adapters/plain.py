@@ -15,8 +15,10 @@ from typing import Any
 REASON = 500
 #: Longest name or version [characters]; more does not fit a column.
 NAME = 80
-#: Most items and levels of a table that an engine reads back; real ones have some hundred, three deep.
-ITEMS, LEVELS = 4096, 8
+#: Most characters and levels of a table that an engine reads back; real ones have some thousand, three deep.
+SIZE, LEVELS = 2**18, 8
+#: Characters that a number counts for.
+NUMBER = 20
 #: Categories of Unicode that no reader sees or that steer what shows them: control, format (which turns the direction
 #: of writing), lone surrogates, private use, unassigned (XML allows some of these, no terminal shows them), and line
 #: and paragraph separators.
@@ -39,21 +41,46 @@ def is_visible(text: str) -> bool:
     return not any(unicodedata.category(c) in _STEERING for c in text)
 
 
-def plain(value: Any, level: int = 0) -> Any:
-    """``value`` as JSON-ready data: what is no number, word, list or table becomes its text; NaN and inf as words."""
+def plain(value: Any) -> Any:
+    """``value`` as JSON-ready data: what is no number, word, list or table becomes its text; NaN and inf as words.
+
+    Of what is too large the beginning is kept.
+    """
+    return _plain(value, 0, [SIZE])
+
+
+def _plain(value: Any, level: int, left: list[int]) -> Any:
+    """Plain data of at most ``left[0]`` characters, which are taken off."""
+    if isinstance(value, Mapping) and level < LEVELS:
+        table = {}
+        for key, item in value.items():
+            if left[0] <= 0:
+                break
+            name = _counted(one_line(key, NAME), left)
+            table[name] = _plain(item, level + 1, left)
+        return table
+    if isinstance(value, list | tuple | set | frozenset) and level < LEVELS:
+        items = []
+        for item in value:
+            if left[0] <= 0:
+                break
+            items.append(_plain(item, level + 1, left))
+        return items
+    if hasattr(value, "tolist") and getattr(value, "size", SIZE) < SIZE and level < LEVELS:
+        return _plain(value.tolist(), level, left)  # arrays and numbers of numpy
+    return _counted(_scalar(value), left)
+
+
+def _counted(value: Any, left: list[int]) -> Any:
+    left[0] -= len(value) + 1 if isinstance(value, str) else NUMBER
+    return value
+
+
+def _scalar(value: Any) -> Any:
     if value is None or isinstance(value, bool):
         return value
-    if isinstance(value, str):
-        return one_line(value)
-    if isinstance(value, Mapping) and level < LEVELS:
-        items = list(value.items())[:ITEMS]
-        return {one_line(key, NAME): plain(item, level + 1) for key, item in items}
-    if isinstance(value, list | tuple | set | frozenset) and level < LEVELS:
-        return [plain(item, level + 1) for item in list(value)[:ITEMS]]
     if isinstance(value, int):
         return int(value) if abs(value) < 2**63 else one_line(hex(value))
-    if hasattr(value, "tolist") and getattr(value, "size", ITEMS + 1) <= ITEMS and level < LEVELS:
-        return plain(value.tolist(), level + 1)  # arrays and numbers of numpy
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else str(float(value))
     return one_line(value)

@@ -88,8 +88,15 @@ def loaded(entry: EntryPoint) -> Found:
 
 
 def facts(name: str) -> EngineFacts | None:
-    """Constant facts of an engine, even of one that is not installed; None if its adapter cannot be loaded."""
-    return find(name).facts if name in _entries() else None
+    """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
+    entry = _entries().get(name)
+    if entry is None or not is_ours(entry):
+        return find(name).facts if entry else None
+    try:
+        told: EngineFacts = entry.load().facts
+    except ImportError:
+        return None
+    return told
 
 
 def load(name: str) -> Engine:

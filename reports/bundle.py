@@ -24,6 +24,7 @@ from typing import Any
 from reports import exports, speed
 from reports.page import load_source, render
 from reports.page.source import Source
+from reports.wording import cell
 from validation.store import Run, Store
 
 README = """contact-crosscheck, run {run}
@@ -77,7 +78,7 @@ def _texts(source: Source, folder: Path) -> dict[str, str]:
     }
     if source.bench is not None:
         store = Store(folder, create=False)
-        texts["timings.csv"] = speed.raw_of(store, source.bench.run).to_csv(index=False)
+        texts["timings.csv"] = speed.raw_of(store, source.bench.run).map(cell).to_csv(index=False)
         store.close()
     return texts | {"report.html": render(source), "CITATION.cff": citation(source.run)}
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.wording import number, reproduce
+from reports.wording import markdown, number, reproduce
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.comparison import Change, Kind, families
@@ -151,16 +151,16 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
         change = family.first
         mark = "worse" if change.regressed else ""
         cells = [
-            change.kind.value,
+            markdown(change.kind.value),
             mark,
             str(len(family.changes)),
-            _where(change),
-            f"`{change.metric}`",
-            change.before,
-            change.after,
-            _size(change),
+            markdown(_where(change)),
+            "`" + change.metric.replace("|", "\\|").replace("`", "'") + "`",
+            markdown(change.before),
+            markdown(change.after),
+            markdown(_size(change)),
         ]
-        out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        out.append("| " + " | ".join(cells) + " |")
     if len(found) > most:
         out.append(f"\n... and {len(found) - most} more families; `crosscheck compare --json` lists every change")
     return "\n".join(out) + "\n"

@@ -14,7 +14,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from reports.findings import ALARMING, finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
-from reports.wording import LABELS, mark_of
+from reports.wording import LABELS, cell, mark_of, markdown
 from validation.rows import Row, frame, rows_of
 from validation.store import Store
 
@@ -59,7 +59,7 @@ def as_csv(rows: Sequence[Plain]) -> str:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(names)
     for row in rows:
-        writer.writerow([_flat(row[name]) for name in names])
+        writer.writerow([cell(_flat(row[name])) for name in names])
     return stream.getvalue()
 
 
@@ -74,16 +74,19 @@ def _flat(value: Any) -> Any:
 def as_markdown(rows: Sequence[Plain]) -> str:
     """Verdict matrix and findings that need attention, fit for a step summary."""
     matrix, versions = matrix_of(rows), versions_of(rows)
-    heads = [f"{engine}/{profile}<br>{versions.get(engine, '')}" for engine, profile in matrix.columns]
+    heads = [
+        markdown(f"{engine}/{profile}") + f"<br>{markdown(versions.get(engine, ''))}"
+        for engine, profile in matrix.columns
+    ]
     out = ["| scene | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
     for line in matrix.lines:
         fields = [matrix.fields.get((line, column)) for column in matrix.columns]
-        out.append(f"| {line[0]} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
+        out.append(f"| {markdown(line[0])} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
     out += ["", legend().replace("|", "\\|"), ""]
     for mark, group in grouped(rows):
         out.append(f"**{LABELS[mark]}**: {len(group)} rows")
         if mark in ALARMING:
-            out += [f"* {finding_line(row)}" for row in group]
+            out += [f"* {markdown(finding_line(row))}" for row in group]
     return "\n".join(out) + "\n"
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from adapters import registry
 from adapters.needs import needs
+from adapters.plain import one_line
 from adapters.scene import SceneError
 from validation.identity import commit, machine
 from validation.plan import QUICK_DT, variations
@@ -133,9 +134,13 @@ def doctor() -> dict[str, Any]:
         bad = loaded.facts.known_bad_versions.get(engine["version"]) if loaded else None
         if bad:
             problems.append(f"{engine['name']} {engine['version']} is known to be bad: {bad}")
-    from reference_solver.compilation import cache_folder
+    try:
+        from reference_solver.compilation import cache_folder
 
-    folder = cache_folder()
+        folder = cache_folder()
+    except ImportError as error:
+        folder = None
+        problems.append(f"reference: its compiler cannot be loaded: {one_line(error)}")
     return {
         "machine": machine(),
         "commit": commit(),

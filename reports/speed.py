@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters import registry
-from reports.wording import number
+from reports.wording import cell, number
 from validation.bench import agreement, reading, work
 from validation.bench.primary import PRIMARY
 from validation.cells import Observation, Outcome, format_dt
@@ -67,7 +67,7 @@ def write_all(folder: Path, run: Run, protocol: Mapping[str, Any], tables: Table
     (target / "bench.json").write_text(as_json(run, protocol, tables) + "\n", encoding="utf-8")
     for name, table in {**tables, "raw_timings": raw}.items():
         flat = table.drop(columns=["slot"], errors="ignore")
-        flat.to_csv(target / f"{name}.csv", index=False)
+        flat.map(cell).to_csv(target / f"{name}.csv", index=False)
     return sorted(target.iterdir())
 
 

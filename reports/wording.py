@@ -12,6 +12,8 @@ from validation.cells import format_dt, parse_dt
 from validation.metrics import NEVER
 from validation.posed import resolve
 
+#: What a spreadsheet takes for the begin of a formula.
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Order in which a group of rows is summed up: the first that occurs is its mark.
 MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
@@ -91,6 +93,26 @@ def number(value: float | None, digits: int = 4) -> str:
         text = f"{value:.{digits}g}"
         return f"{float(text):g}" if "e" in text else text  # 5500, not 5.5e+03
     return f"{value:.{max(1, digits - 2)}e}".replace("e-0", "e-").replace("e+0", "e+")
+
+
+def cell(value: Any) -> Any:
+    """Value for a table that a spreadsheet may open: text that would be taken for a formula is quoted."""
+    return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA and not _is_number(value) else value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return text == "-"
+    return True
+
+
+def markdown(text: str) -> str:
+    """Text that is shown as it is in Markdown: no HTML, no cell of a table ends in it."""
+    for raw, escaped in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|")):
+        text = text.replace(raw, escaped)
+    return text
 
 
 def params_text(params: Mapping[str, float]) -> str:

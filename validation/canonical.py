@@ -76,6 +76,15 @@ class Check:
     because: str
     source: str
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether truth and bound, where there are any, are numbers that can be compared with."""
+        return all(number is None or math.isfinite(number) for number in (self.truth, self.bound))
+
+    def unjudged(self) -> Check:
+        """The same number, shown and not judged: its scene is too large for a tolerance."""
+        return Check(self.metric, self.unit, None, None, f"not judged, its tolerance is not finite; {self.because}", "")
+
 
 #: A measured value, or None and why there is none.
 Measured = tuple[float | None, str]
@@ -137,8 +146,18 @@ class CanonicalScene:
     notes: tuple[str, ...] = ()
 
     def checks(self, scene: Scene, dt: float) -> list[Check]:
-        """State all checks of ``scene`` at step ``dt`` [s]: truth, bound and reason."""
-        return self.rule(scene, dt, self.exact(scene))
+        """State all checks of ``scene`` at step ``dt`` [s]: truth, bound and reason.
+
+        Raises
+        ------
+        SceneError
+            If its numbers leave what can be computed with.
+        """
+        try:
+            found = self.rule(scene, dt, self.exact(scene))
+        except (OverflowError, ZeroDivisionError):
+            raise SceneError(f"{self.name}: its numbers are too large or too small to be judged") from None
+        return [check if check.is_finite else check.unjudged() for check in found]
 
     def complete(self, params: Mapping[str, float]) -> dict[str, float]:
         """All parameters with their values, defaults filled in.

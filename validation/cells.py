@@ -14,7 +14,9 @@ from typing import Any
 
 from adapters.engine import Engine, Setting
 from adapters.foreign import checked_settings
+from adapters.isolation import LOG_LINES
 from adapters.needs import needs
+from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
 from validation.canonical import CanonicalScene, Measured
@@ -140,8 +142,8 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
         if name not in data:
             raise SceneError(f"slot.{name}: is missing")
     for name in ("scene", "engine", "profile"):
-        if not isinstance(data[name], str):
-            raise SceneError(f"slot.{name}: {data[name]!r} is not a text")
+        if not isinstance(data[name], str) or not is_visible(data[name]):
+            raise SceneError(f"slot.{name}: {one_line(data[name], NAME)!r} is not a name")
     dt = parse_dt(str(data["dt"]))
     iterations = data.get("iterations")
     if iterations is not None and (not _is_whole(iterations) or not 1 <= iterations <= MOST_ITERATIONS):
@@ -215,7 +217,9 @@ class Observation:
 
 
 def observation_from_dict(data: Mapping[str, Any]) -> Observation:
-    """Inverse of `Observation.as_dict`.
+    """Inverse of `Observation.as_dict`; the one boundary that observations come through, from workers and stores.
+
+    Text is cleaned and capped here, whoever wrote it.
 
     Raises
     ------
@@ -224,10 +228,22 @@ def observation_from_dict(data: Mapping[str, Any]) -> Observation:
     """
     values = dict(data)
     values |= {"slot": slot_from_dict(data["slot"]), "outcome": Outcome(data["outcome"])}
-    values["metrics"] = {name: (value, reason) for name, (value, reason) in data["metrics"].items()}
+    values["metrics"] = {one_line(name): _measured(*found) for name, found in data["metrics"].items()}
     for name in ("settings", "receipts", "initial_change"):
-        values[name] = tuple(data[name])
+        values[name] = tuple(plain(item) for item in data[name])
+    for name in ("readback", "certificate"):
+        values[name] = dict(plain(data[name]))
+    for name, most in (("cell", NAME), ("engine_version", NAME), ("reason", REASON), ("state_hash", NAME)):
+        values[name] = one_line(data[name], most)
+    values["log"] = lines(str(data["log"]), LOG_LINES)
     return Observation(**values)
+
+
+def _measured(value: Any, reason: Any) -> Measured:
+    """A measured value as everything behind this boundary may rely on: a finite number, or None and a reason."""
+    if value is None or math.isfinite(value):
+        return (None if value is None else float(value)), one_line(reason)
+    return None, one_line(f"{reason}; the value is {float(value)}, not a finite number".removeprefix("; "))
 
 
 @dataclass(frozen=True)
@@ -256,7 +272,7 @@ def prepare(slot: Slot) -> Prepared:
     settings: list[Any] = []
     if found.engine is not None:
         settings = settings_of(found.engine, slot, scene)
-    text = json.dumps([(s.name, s.value) for s in settings], sort_keys=True, default=str)
+    text = json.dumps([(s.name, plain(s.value)) for s in settings], sort_keys=True, default=str)
     settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
     version = ".".join(platform.python_version_tuple()[:2])
     cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)

@@ -6,7 +6,7 @@ Everything an engine says is checked and made plain here (`adapters.plain`, `ada
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -61,9 +61,10 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         if found.engine is None:
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
-            refusal = checked_refusal(found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile))
+            refusal = found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile)
         except EngineError as error:
-            refusal = one_line(error)
+            refusal = str(error)
+        refusal = checked_refusal(refusal)
         if refusal:
             return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal), None
         observation, trajectory = _observe(found.engine, prepared, blank, keep is not None or shown)
@@ -130,14 +131,20 @@ def _plain(slip: Receipt) -> dict[str, Any]:
     return dict(plain(found))
 
 
+def _table(name: str, given: Any) -> dict[str, Any]:
+    if not isinstance(given, Mapping):
+        raise EngineError(f"{name}: a {type(given).__name__} was given, a table is needed")
+    return dict(plain(given))
+
+
 def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observation:
     return replace(
         observation,
         state_hash=trajectory.state_hash(),
         steps=len(trajectory.t) - 1,
         wall_time_s=trajectory.wall_time,
-        readback=dict(plain(trajectory.readback)),
-        certificate=dict(plain(trajectory.certificate)),
+        readback=_table("readback", trajectory.readback),
+        certificate=_table("certificate", trajectory.certificate),
         initial_change=tuple(one_line(change) for change in trajectory.initial_change),
         out_of_plane=trajectory.out_of_plane if math.isfinite(trajectory.out_of_plane) else 0.0,
     )

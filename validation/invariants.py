@@ -127,7 +127,7 @@ def energy_bound(scene: Scene, dt: float) -> float:
         bound += (load * load / body.mass + torque * torque / _least_moment(body)) * dt * dt
         # Energies that are subtracted: at the start, and what the place's distance from the origin rounds.
         place = math.hypot(*body.pose[: scene.dimension])
-        scale += 0.5 * body.mass * speed**2 + 0.5 * moment * spin**2 + load * place
+        scale += 0.5 * body.mass * speed * speed + 0.5 * moment * spin * spin + load * place
         # A body that rests without load still has a size, known to round-off, of which a step makes a speed.
         scale += 0.5 * body.mass * ROUND_OFF * (metrics.reach(body.shape) / dt) ** 2
     return bound + ROUND_OFF * scale

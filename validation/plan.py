@@ -120,7 +120,10 @@ def _engine_slots(
             params = _minimal(canonical, variation.params)
             for dt in _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
-                check_size(canonical.scene(dimension, variation.params), dt)
+                scene = canonical.scene(dimension, variation.params)
+                check_size(scene, dt)
+                if argument not in CATALOGUE:
+                    canonical.checks(scene, dt)  # a scene that cannot be judged is refused before it runs
                 for iterations in _iterations(request, variation, engine, base):
                     for ulp in (*request.ulps, *_moves(request, argument, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)

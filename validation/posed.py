@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
+from adapters.plain import is_visible, one_line
 from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
 from validation.scenes import CATALOGUE, matching
@@ -41,6 +42,8 @@ def pinned(argument: str) -> str:
     from validation.scene_text import read_text
 
     path, wanted = found["path"], found["digest"]
+    if not is_visible(path):
+        raise SceneError(f"scene: the name of {one_line(path)} has characters that steer a terminal; rename the file")
     text = read_text(Path(path))
     digest = _digest(text)
     if wanted and wanted.lower() != digest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -112,8 +113,15 @@ def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
     """Largest change of a value when its start moves by some units in the last place; INVALID runs say nothing."""
     sound = [observation for observation in moved if observation.outcome is not Outcome.INVALID]
     values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in sound]
-    changes = [abs(value - row.value) for value in values if value is not None and row.value is not None]
-    return max(changes, default=None)
+    changes = [_difference(value, row.value) for value in values]
+    return max((abs(change) for change in changes if change is not None), default=None)
+
+
+def _difference(value: float | None, other: float | None) -> float | None:
+    """``value - other``; None where either is missing, or where the difference overflows."""
+    if value is None or other is None or not math.isfinite(value - other):
+        return None
+    return value - other
 
 
 def _cell_rows(run: str, observation: Observation) -> list[Row]:
@@ -218,7 +226,7 @@ def _assemble(
         unit=check.unit,
         value=value,
         truth=check.truth,
-        error=None if value is None or check.truth is None else value - check.truth,
+        error=_difference(value, check.truth),
         tolerance=check.bound,
         because=check.because,
         outcome=observation.outcome.value,

@@ -52,7 +52,7 @@ def stated_from_text(text: str, path: Path) -> Stated:
         raise SceneError(f"{shown}: {said(errors)}") from None
     try:
         return stated(model)
-    except SceneError as error:
+    except (SceneError, ArithmeticError) as error:  # arithmetic: numbers too large for masses and moments
         raise SceneError(f"{shown}: {one_line(error)}") from None
 
 

@@ -47,7 +47,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     finding is listed to be shown, not to be hidden.
     """
     registry.find(engine)
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     proposal = propose(_rows_with_scatter(out, run, engine, jobs, console), engine, findings_of(engine))
     unknown = set(families) - {change.family.id for change in proposal.changes}
     if unknown:

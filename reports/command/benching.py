@@ -17,11 +17,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from adapters import registry
 from adapters.scene import SceneError
 from reports import speed
+from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import JOBS, SECONDS, parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from reports.stages import stage
 from validation.bench import agreement, reading
@@ -29,7 +31,7 @@ from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.primary import PRIMARY
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.units import Unit, prepared
-from validation.cells import Slot, parse_dt
+from validation.cells import Outcome, Slot, parse_dt
 from validation.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
@@ -55,7 +57,7 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
     than 90 % of the ratios agree.
     """
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
     options["full"] = not options["quick"]
@@ -67,6 +69,11 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(json.dumps({"cells": len(cells)}) if as_json else f"{len(cells)} cells")
         return
+    absent = missing(options["engine"], request.engines)
+    for line in absent:
+        click.echo(f"crosscheck: {line}", err=True)
+    if all(registry.find(name).engine is None for name in request.engines):
+        sys.exit(statuses.INCOMPLETE)
     store = Store(folder(out))
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
@@ -74,6 +81,10 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     run = run_plan(
         store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False
     )
+    if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
+        store.close()
+        click.echo("crosscheck: bench: no cell has a result, so there is nothing to time", err=True)
+        sys.exit(statuses.INCOMPLETE)
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
         _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
@@ -81,7 +92,7 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     _show(store, run, out, as_json, brief, console)
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
-    sys.exit(0 if agrees else 1)
+    sys.exit(statuses.verdict(not agrees, not absent))
 
 
 def _earlier(store: Store, name: str | None) -> Run | None:

@@ -42,6 +42,8 @@ class _Group(click.Group):
             _leave(str(error), statuses.INCOMPLETE)
         except StoreError as error:
             _leave(str(error), statuses.RESULTS)
+        except ModuleNotFoundError as error:
+            _leave(f"{error.name or error}: is not installed here; crosscheck doctor says what is", statuses.INCOMPLETE)
         except BrokenPipeError:
             _silence_stdout()  # whoever read our output has seen enough, but not all of it
             sys.exit(statuses.RESULTS)

@@ -46,7 +46,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
     if not all of it ran.
     """
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     options["full"] = not options["quick"]
     for name in ("junit", "markdown"):
         if options[name]:
@@ -69,7 +69,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     _show(rows, out, as_json, console, options)
-    absent = missing(options["engine"])
+    absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     sys.exit(statuses.verdict(any(row.alarming for row in rows), done.finished and not absent))

@@ -38,10 +38,12 @@ SECONDS = _Seconds()
 JOBS = click.IntRange(0, 4096)
 
 
-def missing(engines: Sequence[str]) -> list[str]:
-    """A line for each engine that was named and is not there: its cells have no answer."""
-    absent = [found for found in map(registry.find, engines) if found.engine is None]
-    return [f"engine: {found.name} was named, but did not run: {found.reason}" for found in absent]
+def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
+    """A line for each engine that was named and is not there, and one if none of the chosen is there at all."""
+    absent = [found for found in map(registry.find, chosen) if found.engine is None]
+    lines = [f"engine: {f.name} was named, but did not run: {f.reason}" for f in absent if f.name in named]
+    none = f"engine: none of {', '.join(chosen)} is installed here; crosscheck doctor says why"
+    return lines or ([none] if len(absent) == len(chosen) else [])
 
 
 def parameter(text: str) -> tuple[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -52,8 +53,13 @@ MEANINGS = {
 
 
 def slug(*parts: Any) -> str:
-    """Anchor from names that may hold anything; distinct for names that differ in letters and digits."""
-    return re.sub(r"[^a-z0-9]+", "-", "-".join(map(str, parts)).lower()).strip("-") or "x"
+    """Anchor from names that may hold anything; distinct for names that differ in any character.
+
+    What is more than small letters, digits and dashes loses something here, so it carries a hash of all of it.
+    """
+    raw = "-".join(map(str, parts))
+    plain = re.sub(r"[^a-z0-9]+", "-", raw.lower()).strip("-")
+    return plain if plain == raw else f"{plain or 'x'}-{hashlib.sha256(raw.encode()).hexdigest()[:8]}"
 
 
 def family_of(metric: str) -> str:

@@ -134,8 +134,10 @@ def test_rendering_imports_no_engine(page_folder):
 
 
 def test_anchors_are_plain_whatever_a_name_holds():
-    assert slug("scene", "<script>\"' x/y.toml") == "scene-script-x-y-toml"
-    assert slug("", "<>") == "x"
+    assert re.fullmatch(r"scene-script-x-y-toml-[0-9a-f]{8}", slug("scene", "<script>\"' x/y.toml"))
+    assert slug("scene", "a-b.toml@3f2a9c1d") != slug("scene", "a_b.toml@3f2a9c1d")
+    assert slug("scene", "bounce", 2) == "scene-bounce-2"
+    assert re.fullmatch(r"x-[0-9a-f]{8}", slug("", "<>"))
 
 
 def test_a_drawing_is_told_from_prose():

@@ -103,3 +103,38 @@ def test_a_shell_that_allows_too_little_memory_is_told_so_and_stores_no_crashes(
     assert "ulimit -v" in done.stderr and "Traceback" not in done.stderr
     enough = subprocess.run(["bash", "-c", script, str(3 * 2**20), *command], cwd=ROOT, capture_output=True, text=True)
     assert enough.returncode == statuses.FINE, enough.stderr
+
+
+HIDING = """
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {names!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Hidden())
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (["doctor"], statuses.FINE, "its compiler cannot be loaded"),
+        (["bench", "impact", "--engine", "chipmunk", "--dim", "2"], statuses.INCOMPLETE, "chipmunk was named"),
+        (["run", "impact", "--param", "v=6", "--engine", "chipmunk"], statuses.INCOMPLETE, "chipmunk was named"),
+        (["profile", "impact"], statuses.INCOMPLETE, "numba"),
+    ],
+)
+def test_what_is_not_installed_is_one_line_and_a_status(tmp_path, arguments, status, said):
+    (tmp_path / "sitecustomize.py").write_text(HIDING.format(names=("numba", "pymunk")))
+    out = ["--out", str(tmp_path / "out")] if arguments[0] in ("bench", "run") else []
+    done = subprocess.run([sys.executable, "-m", "reports.command", *arguments, *out], cwd=ROOT, text=True,
+                          capture_output=True, env=os.environ | {"PYTHONPATH": str(tmp_path)})  # fmt: skip
+    assert done.returncode == status, done.stderr
+    assert said in " ".join((done.stdout + done.stderr).split()) and "Traceback" not in done.stderr
+
+
+def test_a_bench_of_which_no_cell_has_a_result_says_so(tmp_path):
+    """Chipmunk is planar: there is nothing to time in space."""
+    result = call("bench", "impact", "--engine", "chipmunk", "--dim", 3, "--dt", "1/60", "--out", tmp_path)
+    assert result.exit_code == statuses.INCOMPLETE
+    assert "no cell has a result" in one_line(result)

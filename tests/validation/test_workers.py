@@ -1,15 +1,18 @@
 """An abort, a segfault, an exit, a hang or a leak costs that one cell; workers die with their parent."""
 
+import _multiprocessing
+import errno
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import pytest
 
 from validation.cells import Outcome, Slot
-from validation.workers import run_cells
+from validation.workers import limits, run_cells
 
 DT = 1 / 240
 
@@ -56,6 +59,44 @@ def test_a_broken_plugin_is_a_row_with_its_reason(plugins):
     (observation,) = run_cells([slot])
     assert observation.outcome is Outcome.NOT_INSTALLED
     assert "this plugin is broken" in observation.reason
+
+
+def test_neither_temporary_files_nor_semaphores_are_needed(monkeypatch):
+    """A full temporary folder, and a system without /dev/shm."""
+
+    def full(*arguments, **options):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def missing(*arguments, **options):
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory: /dev/shm")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", full)
+    monkeypatch.setattr(tempfile, "_mkstemp_inner", full)
+    monkeypatch.setattr(_multiprocessing, "SemLock", missing)
+    (observation,) = run_cells([Slot("impact", (), 2, "chipmunk", "tuned", DT)])
+    assert observation.outcome is Outcome.OK
+
+
+def test_limits_follow_from_the_machine_and_the_number_of_workers(monkeypatch):
+    gib = limits.GIB
+    monkeypatch.setattr(limits, "_hard_limit", lambda: None)
+    monkeypatch.setattr(limits, "cores", lambda: 4)
+    for installed, asked, cells, count, each in [
+        (64 * gib, 0, 100, 4, limits.PLENTY),
+        (64 * gib, 1000, 100, 4 * limits.PER_CORE, 4 * gib),
+        (64 * gib, 0, 2, 2, limits.PLENTY),
+        (2 * gib, 0, 100, 2, limits.NEEDED),
+        (gib // 2, 8, 100, 1, limits.NEEDED),
+        (12 * gib, 3, 100, 3, 4 * gib),
+    ]:
+        monkeypatch.setattr(limits, "installed_memory", lambda installed=installed: installed)
+        assert limits.workers(asked, cells) == count
+        assert limits.memory(count) == each
+    monkeypatch.setattr(limits, "_hard_limit", lambda: 3 * gib)
+    assert limits.memory(1) == 3 * gib
+    monkeypatch.setattr(limits, "_hard_limit", lambda: gib)
+    with pytest.raises(limits.LimitError, match="ulimit -v"):
+        limits.memory(1)
 
 
 PARENT = """

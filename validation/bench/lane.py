@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
+from adapters.registry import load_engines_here
 from validation.bench.statistics import spread
 from validation.bench.stopwatch import Lap, serve
 from validation.bench.timing import Timing
@@ -141,6 +142,7 @@ def _child(connection: Connection, parent: int) -> None:
     if os.getppid() != parent:
         os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    load_engines_here()
     serve(connection)
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Simulation
+from adapters.foreign import said_by
 from adapters.registry import find
 from adapters.stepping import PlanarView, advances
 from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_of
@@ -43,9 +44,8 @@ def lap(unit: Unit) -> Lap:
     version = find(unit.slot.engine).version
     try:
         seconds, wall, state, error, kernel = _clocked(unit)
-    except Exception as failure:  # whatever an engine raises costs this unit only
-        reason = f"{type(failure).__name__}: {failure}".splitlines()[0]
-        return Lap(version, 0.0, 0.0, time.process_time() - started, "", None, void=reason)
+    except BaseException as failure:  # whatever an engine raises costs this unit only
+        return Lap(version, 0.0, 0.0, time.process_time() - started, "", None, void=said_by(failure))
     return Lap(version, seconds, wall, time.process_time() - started, state, error, kernel, _void(unit, error))
 
 

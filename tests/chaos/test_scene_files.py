@@ -1,0 +1,238 @@
+"""Scene files of every kind: each is refused in one clean line, or runs into rows that every export can hold."""
+
+import copy
+import json
+import math
+import os
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from adapters.plain import is_visible
+from adapters.scene import SceneError
+from reports import exports
+from validation.plan import Request, slots
+from validation.posed import pinned, resolve
+from validation.rows import rows_of
+from validation.scene_text import MOST_BODIES, MOST_BYTES
+from validation.workers import run_cells
+
+BASE = {
+    "name": "drop", "dimension": 2, "gravity": [0.0, -9.81], "duration": 0.05,
+    "bodies": [
+        {"name": "floor", "shape": {"type": "half_space", "normal": [0.0, 1.0]}, "motion": "fixed"},
+        {"name": "ball", "shape": {"type": "disc", "radius": 0.5}, "mass": 1.0, "inertia": 0.125,
+         "pose": [0.0, 0.6, 0.0], "twist": [0.0, -1.0, 0.0]},
+        {"name": "box", "shape": {"type": "box", "half_extents": [0.5, 0.25]}, "mass": 2.0, "inertia": 0.3,
+         "pose": [3.0, 0.25, 0.0]},
+    ],
+    "pairs": [{"restitution": 0.5, "friction": 0.3}],
+}  # fmt: skip
+SPATIAL = {
+    "name": "drop", "dimension": 3, "gravity": [0.0, 0.0, -9.81], "duration": 0.05,
+    "bodies": [
+        {"name": "floor", "shape": {"type": "half_space", "normal": [0.0, 0.0, 1.0]}, "motion": "fixed"},
+        {"name": "ball", "shape": {"type": "sphere", "radius": 0.5}, "mass": 1.0, "inertia": [0.1, 0.1, 0.1],
+         "pose": [0.0, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0]},
+    ],
+    "pairs": [{"a": "ball", "b": "floor", "restitution": 1.0}],
+}  # fmt: skip
+#: Values that are put where others were expected.
+STRANGE = [
+    None, True, False, 0, -1, 1, 2, 7, 1e308, -1e308, 1e-320, -0.0, math.nan, math.inf, -math.inf, 10**400, 10**4000,
+    "", "*", "x" * 200, "<script>alert(1)</script>", "=1+1", "[red]", "[/]", "a|b", "\x1b[2J", "\x00", "\ud800",
+    "\u202e", "ball", [], {}, [[]], [0.0], [0.0] * 3, [0.0] * 7, ["x"], {"type": "disc"}, {"a": {"b": 1}},
+    [math.nan, 0.0],
+]  # fmt: skip
+
+
+def places(value, path=()):
+    """Every place in nested data."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield from places(item, (*path, key))
+
+
+def mutated(data, dice):
+    """The same data with one to three things wrong, or merely different."""
+    data = copy.deepcopy(data)
+    for _ in range(dice.choice((1, 1, 1, 2, 3))):
+        path = dice.choice(list(places(data))[1:])
+        owner = data
+        for key in path[:-1]:
+            owner = owner[key]
+        what, key = dice.random(), path[-1]
+        if what < 0.45:
+            owner[key] = dice.choice(STRANGE)
+        elif what < 0.6:
+            del owner[key]
+        elif what < 0.7 and isinstance(owner, list):
+            owner.append(copy.deepcopy(owner[key]))
+        elif what < 0.8 and isinstance(owner, dict):
+            owner[dice.choice(["mass", "extra", "friction", "\x1b", "type", ""])] = owner[key]
+        elif isinstance(owner[key], float):
+            owner[key] *= 10.0 ** dice.uniform(-3.0, 3.0) * dice.choice((1.0, 1.0, -1.0))
+    return data
+
+
+def written(data, dice, folder, number):
+    """A file of it: JSON mostly; some cut short, some with bytes of their own."""
+    text = json.dumps(data).encode("utf-8", "surrogatepass")
+    if dice.random() < 0.05:
+        text = text[: dice.randrange(len(text))]
+    if dice.random() < 0.05:
+        spot = dice.randrange(len(text))
+        text = text[:spot] + bytes(dice.randrange(256) for _ in range(3)) + text[spot:]
+    path = folder / f"scene-{number}.json"
+    path.write_bytes(text)
+    return path
+
+
+def planned(path):
+    """Slots of a scene file on one engine; or None if it is refused, in one clean line."""
+    try:
+        request = Request([str(path)], ["chipmunk", "bullet"], ["tuned"], dts=[1.0 / 240.0])
+        found = slots(request)
+        for slot in found:
+            canonical = resolve(slot.scene)
+            for check in canonical.checks(canonical.scene(slot.dimension), slot.dt):
+                assert check.bound is None or check.bound >= 0.0 or math.isnan(check.bound)
+        return found
+    except SceneError as error:
+        said = str(error)
+        assert said and is_visible(said) and len(said) < 6000, said[:500]
+        return None
+
+
+def judged(cells, run="r"):
+    """Run cells; every slot has one observation, and every export holds all rows."""
+    found = list(run_cells(cells, jobs=2, timeout=60.0))
+    assert sorted(o.slot.key() for o in found) == sorted(slot.key() for slot in cells)
+    rows = [row.as_dict() for row in rows_of(run, found)]
+    assert len(json.loads(exports.as_json(rows))) == len(rows)
+    ElementTree.fromstring(exports.as_junit(rows))
+    assert "<script" not in exports.as_markdown(rows)
+    assert not [line for line in exports.as_csv(rows).splitlines() if line[:1] in "=+@"]
+    return found
+
+
+def test_generated_files_are_refused_in_one_line_or_run_into_rows(dice, soak, tmp_path):
+    count, most = (12_000, 2_000) if soak else (500, 24)
+    cells = []
+    for number in range(count):
+        path = written(mutated(dice.choice((BASE, SPATIAL)), dice), dice, tmp_path, number)
+        cells += planned(path) or []
+    assert len(cells) > count // 20, "the generator makes nothing that is valid"
+    dice.shuffle(cells)
+    judged(cells[:most])
+
+
+@pytest.mark.parametrize("scene", [BASE, SPATIAL])
+def test_the_scenes_that_are_changed_are_sound(tmp_path, scene, dice):
+    path = tmp_path / "sound.json"
+    path.write_text(json.dumps(scene))
+    assert planned(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[" * 100_000, "nested too deep"),
+        ('{"a":' * 50_000, "nested too deep"),
+        ('{"name": ' + "9" * 5000 + "}", "not valid JSON"),
+        ("", "not valid JSON"),
+        ("[]", "file"),
+        ("null", "file"),
+        ("\ufeff{}", "not valid JSON"),
+        ('{"duration": 1e999}', "duration"),
+        (" " * (MOST_BYTES + 1), "larger than"),
+        (json.dumps(BASE | {"bodies": BASE["bodies"] * 20_000}), "larger than"),
+        (json.dumps(BASE | {"bodies": [{}] * (MOST_BODIES + 1)}), "more than the"),
+        (json.dumps(BASE | {"bodies": [BASE["bodies"][1] | {"name": "a" * 81}]}), "cannot be the name"),
+        (json.dumps(BASE | {"bodies": [BASE["bodies"][1] | {"name": "\x1b[2J"}]}), "cannot be the name"),
+    ],
+)  # fmt: skip
+def test_what_no_reader_should_wait_for_is_refused_at_once(tmp_path, text, said):
+    path = tmp_path / "scene.json"
+    path.write_text(text)
+    with pytest.raises(SceneError) as caught:
+        resolve(pinned(str(path)))
+    assert said in str(caught.value) and is_visible(str(caught.value))
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 5000, "a" * 5000 + " = ", "\x00"])
+def test_toml_that_is_none_is_refused_in_one_line(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    with pytest.raises(SceneError) as caught:
+        resolve(pinned(str(path)))
+    assert is_visible(str(caught.value)) and len(str(caught.value)) < 2000
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_pipes_folders_and_devices_are_no_scene_files(tmp_path):
+    os.mkfifo(tmp_path / "pipe.json")
+    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "zero.json").symlink_to("/dev/zero")
+    (tmp_path / "loop.json").symlink_to(tmp_path / "loop.json")
+    for name in ("pipe", "folder", "zero", "loop"):
+        with pytest.raises(SceneError, match="cannot read"):
+            pinned(str(tmp_path / f"{name}.json"))
+
+
+def many(count):
+    balls = [{"name": f"b{k}", "shape": {"type": "disc", "radius": 0.5}, "mass": 1.0, "inertia": 0.125,
+              "pose": [1.5 * k, 0.6, 0.0]} for k in range(count)]  # fmt: skip
+    return BASE | {"bodies": [BASE["bodies"][0], *balls]}
+
+
+def test_reading_and_planning_looks_at_each_body_a_few_times_not_at_each_pair(tmp_path, monkeypatch):
+    """Counted, not timed: the material of a pair is asked for no more often than there are bodies."""
+    from adapters.scene import Scene
+
+    asked = []
+    real = Scene.material
+    monkeypatch.setattr(Scene, "material", lambda scene, a, b: asked.append(1) or real(scene, a, b))
+    path = tmp_path / "many.json"
+    path.write_text(json.dumps(many(MOST_BODIES - 1)))
+    assert planned(path)
+    assert len(asked) <= MOST_BODIES
+
+
+@pytest.mark.parametrize("dt", ["1e-320", "1e-12", "5e-324"])
+def test_a_step_that_makes_too_many_steps_is_refused_before_anything_runs(tmp_path, dt):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(BASE))
+    with pytest.raises(SceneError, match=r"^dt: .* steps"):
+        slots(Request([str(path)], ["chipmunk"], dts=[float(dt)]))
+
+
+def test_a_step_longer_than_the_run_is_one_step_and_can_be_shown(tmp_path):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(BASE))
+    cells = slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[3.0, 1.7e308]))
+    judged(cells)
+
+
+def test_a_value_that_is_not_finite_is_missing_with_its_reason(tmp_path):
+    """Two bodies at 1e160 m/s: their energy is more than a number can hold."""
+    fast = copy.deepcopy(BASE)
+    fast["gravity"], fast["bodies"][1]["twist"] = [0.0, 0.0], [1e160, 0.0, 0.0]
+    path = tmp_path / "fast.json"
+    path.write_text(json.dumps(fast))
+    (observation,) = judged(slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0])))
+    missing = [reason for value, reason in observation.metrics.values() if value is None]
+    assert any("not a finite number" in reason for reason in missing) or observation.reason, observation
+    assert all(value is None or math.isfinite(value) for value, _ in observation.metrics.values())
+
+
+def test_the_name_of_the_file_itself_may_hold_anything_that_can_be_seen(tmp_path):
+    path = tmp_path / "a\x1b[31mb.json"
+    path.write_text(json.dumps(BASE))
+    with pytest.raises(SceneError) as caught:
+        pinned(str(path))
+    assert is_visible(str(caught.value))
+    marked = tmp_path / "[bold]<b>|x.json"
+    marked.write_text(json.dumps(BASE))
+    judged(slots(Request([str(marked)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0])))
