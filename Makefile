@@ -34,7 +34,9 @@ run: $(STAMP)
 # has wheels for CPython 3.11 only.
 REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys; print(",bullet" * (sys.version_info < (3, 12)))' 2>/dev/null)
 
+# Kernels are compiled first, once per dimension: tests side by side would each compile the same.
 test: $(STAMP)
+	$(BIN)/crosscheck compile --engine reference
 	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
 
 # All faults, 12 000 scene files, 2 000 cells, 60 kills, from a seed of its own (CROSSCHECK_SEED=N repeats one).

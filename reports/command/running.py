@@ -20,6 +20,7 @@ from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
+from reports.stages import warm_up
 from reports.summary import show
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
@@ -85,6 +86,17 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
     if as_json:
         click.echo(exports.as_json(plain))
     show(plain, console, files=written.values())
+
+
+@main.command("compile")
+@selection
+def compile_kernels(**options: Any) -> None:
+    """Compile what the engines of these cells compile at their first steps, and nothing else.
+
+    `run` and `bench` do so by themselves; tests that run side by side would each compile the same.
+    """
+    options["full"] = not options["quick"]
+    warm_up(slots(request_from(options)), 0, Console(stderr=True, markup=False))
 
 
 @main.command("run-cell")
