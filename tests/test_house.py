@@ -27,19 +27,6 @@ def test_each_package_imports_only_what_stands_to_its_left(package):
         assert not forbidden & set(imported(path)), path
 
 
-@pytest.mark.parametrize("room", ["stepping", "planar", "spatial"])
-def test_no_dimension_imports_the_other_and_the_step_imports_neither(room):
-    others = {f"reference_solver.{other}" for other in ("planar", "spatial") if other != room}
-    paths = sorted((ROOT / "reference_solver" / room).rglob("*.py"))
-    assert paths
-    for path in paths:
-        for node in ast.walk(ast.parse(path.read_text())):
-            modules = [node.module] if isinstance(node, ast.ImportFrom) else []
-            modules += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            for module in modules:
-                assert ".".join((module or "").split(".")[:2]) not in others, f"{path}: {module}"
-
-
 def test_only_adapters_import_engines():
     for package in ("reference_solver", "validation", "reports"):
         for path in (ROOT / package).rglob("*.py"):

@@ -51,9 +51,11 @@ class Warming:
         return len(self._tasks)
 
     def estimate(self, jobs: int) -> float:
-        """Expected time [s]: that of an earlier compilation on this machine, else of the one this was written on."""
+        """Expected time [s]: the longest of earlier compilations on this machine, which may have found kernels ready,
+        and of the one on the machine this was written on.
+        """
         known = [_seconds(path) for _, mark in self._tasks for path in mark.parent.parent.glob("*/warm-*.json")]
-        each = max((seconds for seconds in known if seconds), default=FIRST / 2.0)
+        each = max([*known, FIRST / 2.0])
         return each * -(-len(self._tasks) // max(1, min(jobs, len(self._tasks))))
 
     def run(self, jobs: int) -> Iterator[str]:

@@ -8,14 +8,11 @@ that the caller's machine code is found on disk again by the next process. Uncom
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
-
-#: The bodies of either dimension: what operations are chosen by.
-Bodies: TypeAlias = Any
 
 
 def operation(function: Callable[..., Any]) -> Any:

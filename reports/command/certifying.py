@@ -34,8 +34,6 @@ PARTS = (
     "columns",
     "conservation",
     "rotation",
-    "turning",
-    "turning_in_space",
     "detection",
     "metamorphic",
     "hard_cases",
