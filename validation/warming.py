@@ -51,8 +51,9 @@ class Warming:
         return len(self._tasks)
 
     def estimate(self, jobs: int) -> float:
-        """Expected time [s]: the longest of earlier compilations on this machine, which may have found kernels ready,
-        and of the one on the machine this was written on.
+        """Expected time [s]: the longest of earlier compilations here and the one on the machine this was written on.
+
+        Earlier ones may have found their kernels ready, and took less than the next will.
         """
         known = [_seconds(path) for _, mark in self._tasks for path in mark.parent.parent.glob("*/warm-*.json")]
         each = max([*known, FIRST / 2.0])
