@@ -34,11 +34,15 @@ def stage(console: Console, name: str) -> Iterator[None]:
     say(console, f"{name}: {clock(time.monotonic() - started)}")
 
 
-def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> None:
-    """Compile what the engines of these cells compile at their first steps; no clock and no limit runs yet."""
+def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
+    """Compile what the engines of these cells compile at their first steps; no clock and no limit runs yet.
+
+    Returns what had to be compiled, an engine and a dimension each.
+    """
     warming = Warming(slots)
+    names: list[str] = []
     if not len(warming):
-        return
+        return names
     jobs = jobs or os.cpu_count() or 1
     expected = clock(warming.estimate(jobs))
     say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores")
@@ -49,4 +53,6 @@ def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> None:
     ):
         task = progress.add_task(f"compiling, about {expected}", total=len(warming))
         for done in warming.run(jobs):
+            names.append(done)
             progress.update(task, advance=1, description=f"compiled {done}; about {expected} in all")
+    return names

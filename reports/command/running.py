@@ -90,13 +90,16 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
 
 @main.command("compile")
 @selection
-def compile_kernels(**options: Any) -> None:
+@AS_JSON
+def compile_kernels(as_json: bool, **options: Any) -> None:
     """Compile what the engines of these cells compile at their first steps, and nothing else.
 
     `run` and `bench` do so by themselves; tests that run side by side would each compile the same.
     """
     options["full"] = not options["quick"]
-    warm_up(slots(request_from(options)), 0, Console(stderr=True, markup=False))
+    done = warm_up(slots(request_from(options)), 0, Console(stderr=True, markup=False))
+    if as_json:
+        click.echo(json.dumps({"compiled": done}))
 
 
 @main.command("run-cell")
