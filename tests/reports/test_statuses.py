@@ -127,8 +127,10 @@ sys.meta_path.insert(0, Hidden())
 def test_what_is_not_installed_is_one_line_and_a_status(tmp_path, arguments, status, said):
     (tmp_path / "sitecustomize.py").write_text(HIDING.format(names=("numba", "pymunk")))
     out = ["--out", str(tmp_path / "out")] if arguments[0] in ("bench", "run") else []
+    # What CI demands of its own engines must not be demanded here, where one is hidden.
+    environment = {name: value for name, value in os.environ.items() if name != "CROSSCHECK_REQUIRE_ENGINES"}
     done = subprocess.run([sys.executable, "-m", "reports.command", *arguments, *out], cwd=ROOT, text=True,
-                          capture_output=True, env=os.environ | {"PYTHONPATH": str(tmp_path)})  # fmt: skip
+                          capture_output=True, env=environment | {"PYTHONPATH": str(tmp_path)})  # fmt: skip
     assert done.returncode == status, done.stderr
     assert said in " ".join((done.stdout + done.stderr).split()) and "Traceback" not in done.stderr
 
