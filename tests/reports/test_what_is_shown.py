@@ -11,7 +11,7 @@ import pytest
 from reports import exports
 from reports.findings import finding_line, grouped
 from reports.matrix import Field, matrix_of
-from reports.wording import MARKS, mark_of, number
+from reports.wording import MARKS, mark_of, markdown, number
 from validation.rows import Row
 
 VALUE, TRUTH = 0.12345678901234567, 0.8
@@ -62,7 +62,7 @@ def test_what_makes_the_command_fail_is_a_failure_everywhere(name):
     row = ALARMING[name]
     assert row.alarming
     assert junit(row)
-    assert "* " + finding_line(row.as_dict()) in exports.as_markdown([row.as_dict()])
+    assert "* " + markdown(finding_line(row.as_dict())) in exports.as_markdown([row.as_dict()])
     assert [mark for mark, _ in grouped([row.as_dict()])] == [mark_of(row.as_dict())]
 
 
