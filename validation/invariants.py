@@ -56,11 +56,11 @@ def fed_by(scene: Scene) -> str:
     """
     if any(body.motion == "prescribed" for body in scene.bodies):
         return "a prescribed body may feed energy in"
+    boxes = [body.motion == "free" and isinstance(body.shape, Box) for body in scene.bodies]
+    if not any(boxes) or not any(e > 0.0 and mu > 0.0 for e, mu in scene.materials()):
+        return ""  # without a look at every pair
     for i, j, material in scene.contact_pairs():
-        eccentric = any(
-            body.motion == "free" and isinstance(body.shape, Box) for body in (scene.bodies[i], scene.bodies[j])
-        )
-        if eccentric and material.restitution > 0.0 and material.friction > 0.0:
+        if (boxes[i] or boxes[j]) and material.restitution > 0.0 and material.friction > 0.0:
             return (
                 "Newton's restitution with friction can add energy where a box is hit off its centre (Kane's paradox)"
             )

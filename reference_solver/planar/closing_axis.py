@@ -17,6 +17,9 @@ from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF
 
 #: Axes whose times differ by less than this share of the time looked ahead separate equally long.
 SAME_TIME = 1e-6
+#: Cosine of the angle between two axes of one contact. Faces that lie on each other have all but the same normal: which
+#: of the two is taken the order says (E50), not the time, which round-off would decide. Sides of a seam stand apart.
+SAME_AXIS = 0.9
 
 
 @inner_kernel
@@ -96,7 +99,7 @@ def lasting_axis(
         for edge in range(bodies.kind[r, VERTICES] if bodies.kind[r, VERTICES] > 1 else 0):
             x, y = axis_normal(bodies, a, b, r, edge, 0, dx, dy)
             gap = separation_along(bodies, a, b, x, y, dx, dy)
-            if gap - grown < -noise:
+            if gap - grown < -noise or x * nx + y * ny > SAME_AXIS:
                 continue
             time = closing_time(bodies, a, b, x, y, gap - grown, noise, ahead)
             if time > longest + SAME_TIME * ahead:

@@ -16,6 +16,9 @@ from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF
 
 #: Axes whose times differ by less than this share of the time looked ahead separate equally long.
 SAME_TIME = 1e-6
+#: Cosine of the angle between two axes of one contact: which of two faces that lie on each other is taken the order
+#: says, not the time, which round-off would decide. Sides of a seam stand apart.
+SAME_AXIS = 0.9
 #: No face but the chosen one.
 NO_FACE = -1
 
@@ -74,7 +77,7 @@ def lasting_face(
         for d in range(3):
             apart -= bodies.geometry[f, d] * abs(dot(u, axis(bodies.axes, f, d)))
             apart -= bodies.geometry[s, d] * abs(dot(u, axis(bodies.axes, s, d)))
-        if apart < -noise:
+        if apart < -noise or dot(u, n) > SAME_AXIS:
             continue
         time = closing_time(bodies, f, s, u, apart, noise, ahead)
         if time > longest + SAME_TIME * ahead:
