@@ -19,6 +19,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from reports.answers import answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
@@ -50,6 +51,7 @@ def render(source: Source) -> str:
             cite=cite(source),
             sentences=conclusions.sentences(source),
             matrix=verdicts.matrix(source),
+            answers=answers(source.rows),
             findings=conclusions.findings(source),
             choices=choosing.choices(source),
             scenes=scene_sections(source),

@@ -224,6 +224,27 @@ def test_the_cheapest_engine_that_passes_stands_first(page_source):
     assert found.answer.startswith("Use chipmunk/default at dt = 1/60 s: the cheapest that passes every check, 1")
 
 
+@pytest.mark.parametrize(("low", "tied"), [(0.9, True), (1.2, False)])
+def test_who_cannot_be_told_apart_from_the_cheapest_is_a_tie(low, tied):
+    from reports.page.choosing import Candidate, Cost, _answer, _with_ties
+
+    steps = [("1/60", True)]
+    first = Candidate("a", "x", steps, "1/60", Cost(1.0, 0.9, 1.1), "")
+    second = Candidate("b", "y", steps, "1/60", Cost(1.3, low, 1.5), "")
+    untimed = Candidate("c", "z", steps, "1/60", None, "")
+    found = _with_ties([first, second, untimed])
+    assert [c.tied for c in found] == [False, tied, False]
+    assert ("a/x or b/y" in _answer(found, True)) is tied
+
+
+def test_times_of_a_busy_machine_rank_nobody(page_source, monkeypatch):
+    from reports.page import choosing
+
+    assert any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
+    monkeypatch.setattr(choosing, "busy", lambda timings: "This machine was busy.")
+    assert not any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
+
+
 def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     cure = next(c for c in cures(page_source) if (c.engine, c.scene, c.dimension) == ("bullet", "impact", 2))
     assert cure.before.mark != "pass" and cure.after.mark == "pass"
