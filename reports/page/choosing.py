@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from reports.cures import Change, changes, pasteable
+from reports.cures import Change, changes, how_measured, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
@@ -186,6 +186,7 @@ class Cure:
     after_text: str
     changes: list[Change]
     paste: str
+    measured: str
 
 
 def cures(source: Source, shipped: str = "default", better: str = "tuned") -> list[Cure]:
@@ -209,6 +210,8 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     known = [(a, b) for a, b in pairs if b is not None]
     if not known:
         return None
+    # What the better profile passes says more than what it still fails.
+    known = [pair for pair in known if pair[1]["physics"] == "pass"] or known
     # The default cell of the scene is the one that people know, and its first check the plainest; else the worst.
     plain = [pair for pair in known if not pair[0]["slot"]["params"]]
     plain.sort(key=lambda pair: abs(math.log(pair[0]["dt"] / QUICK_DT)))
@@ -221,6 +224,7 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
         changes(source.observations, scene, dimension, engine, shipped, better),
         pasteable(source.observations, scene, dimension, engine, shipped, better),
+        how_measured(engine, scene, shipped, better),
     )  # fmt: skip
 
 

@@ -4,8 +4,8 @@
        |   | ->       sticks if tan(theta) <= mu,
     ==============    else a = g (sin(theta) - mu cos(theta))
 
-Gravity is turned by theta, not the floor: a tilted, touching start is not representable exactly and costs some engines a
-transient. ``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
+Gravity is turned by theta, not the floor: a tilted, touching start is not representable exactly and costs some engines
+a transient. ``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
 """
 
 from __future__ import annotations
