@@ -45,7 +45,7 @@ SUBJECTS = {
     ),
     "validation/tolerances.py": ("validation/test_worked_bounds.py", "validation/test_tolerances.py"),
     "validation/metrics.py": ("validation/test_metrics.py",),
-    "validation/quantities.py": ("validation/test_scene_files.py",),
+    "validation/quantities.py": ("validation/test_quantities.py", "validation/test_scene_files.py"),
     "validation/canonical.py": ("validation/test_verdicts.py", "validation/test_tolerances.py"),
     "validation/identity.py": ("validation/test_store.py",),
     "validation/cells.py": ("validation/test_store.py",),
