@@ -55,9 +55,9 @@ SUBJECTS = {
     "adapters/lift.py": ("adapters/test_lift.py",),
     "adapters/needs.py": ("adapters/test_scene.py",),
     "adapters/plain.py": ("adapters/test_plain.py",),
-    "reports/exports.py": ("reports/test_what_is_shown.py",),
-    "reports/wording.py": ("reports/test_what_is_shown.py",),
-    "reports/changes.py": ("reports/test_comparison.py",),
+    "reports/exports.py": ("reports/test_exports.py", "reports/test_what_is_shown.py"),
+    "reports/wording.py": ("reports/test_wording.py", "reports/test_what_is_shown.py"),
+    "reports/changes.py": ("reports/test_changes.py", "reports/test_comparison.py"),
     "reports/command/statuses.py": ("reports/test_statuses.py",),
 }
 PACKAGES = ("validation", "adapters", "reports")
