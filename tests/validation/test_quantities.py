@@ -95,6 +95,13 @@ def test_an_angle_in_space_is_that_of_the_rotation_whatever_its_axis_and_start(a
     trajectory = Trajectory(np.array([0.0, 1.0]), pose, np.zeros((2, 3, 6)), None, 1.0, "completed")
     value, why = quantity(scene_of(3), trajectory, "ball.angle")
     assert (value, why) == (pytest.approx(turn, abs=1e-12), "")
+    assert quantity(scene_of(3), trajectory, "ball.angle", 0.0)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_name_with_a_slash_is_that_of_its_body():
+    scene = scene_of(2)
+    named = Scene("s", 1, 2, (*scene.bodies[:2], Body("a/b", Disc(0.5))), (Pair(),), (0.0, 0.0), 4.0)
+    assert quantity(named, moving(2), "a/b.y") == (214.0, "")
 
 
 def pushed(dimension, rows_per_sample, dt=0.25, samples=17):
