@@ -45,8 +45,11 @@ CAUGHT_BY = {
     "nothing read back": "check readback",
 }
 
-#: Faults of a given size that any engine can be given from outside, in what it is told or in what it reports.
-SIZED = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step", "velocity", "impulse", "drift")
+#: Faults of a given size that any engine can be given from outside, in what it is told...
+TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
+#: ... or in what it reports.
+REPORTED = ("velocity", "impulse", "damping", "drift", "climb", "tremble", "flicker")
+SIZED = TOLD + REPORTED
 
 
 class Planted(Engine):
@@ -55,8 +58,11 @@ class Planted(Engine):
     Parameters
     ----------
     fault
-        One of `SIZED`. The last three are faults of what is read, the others of what is built; ``drift`` moves every
-        body along x by ``size`` times 1 m/s.
+        One of `SIZED`: of what is built (`TOLD`), or of what is read (`REPORTED`). Motion that a solver leaves behind
+        or adds is no share of a parameter: ``drift`` moves every body along x by ``size`` times 1 m/s and ``climb``
+        upwards, as a correction of places that never ends does; ``tremble`` adds ``size`` times 1 m/s along x with a
+        sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``damping`` takes the
+        share of all speeds away in a second.
     size
         Share by which it is off, 0.02 for two per cent.
     """
@@ -110,11 +116,11 @@ class Planted(Engine):
 
 
 class _Misread(Simulation):
-    """A simulation whose velocities or contact impulses are reported with a factor, or whose bodies seem to drift."""
+    """A simulation that is read wrongly, in one of the ways of `REPORTED`."""
 
     def __init__(self, inner: Simulation, fault: str, factor: float, dt: float) -> None:
-        self.inner, self.fault, self.factor = inner, fault, factor
-        self.drift = dt * (1.0 - factor) if fault == "drift" else 0.0
+        self.inner, self.fault, self.factor, self.dt = inner, fault, factor, dt
+        self.size = 1.0 - factor
         self.steps = 0
         self.initial_change = inner.initial_change
 
@@ -124,18 +130,34 @@ class _Misread(Simulation):
 
     def pose(self) -> Array:
         pose = self.inner.pose()
-        if self.drift:
+        if self.fault in ("drift", "climb"):
             pose = pose.copy()
-            pose[:, 0] += self.drift * self.steps
+            up = 1 if pose.shape[1] == 3 else 2
+            pose[:, 0 if self.fault == "drift" else up] += self.size * self.dt * self.steps
         return pose
 
     def twist(self) -> Array:
         twist = self.inner.twist()
-        return self.factor * twist if self.fault == "velocity" else twist
+        if self.fault == "velocity":
+            return self.factor * twist
+        if self.fault == "damping":
+            return twist * self.factor ** (self.steps * self.dt)
+        if self.fault == "tremble":
+            twist = twist.copy()
+            twist[:, 0] += self._turn() * self.size
+        return twist
 
     def contacts(self) -> Contacts:
         found = self.inner.contacts()
-        return replace(found, impulse=self.factor * found.impulse) if self.fault == "impulse" else found
+        if self.fault == "impulse":
+            return replace(found, impulse=self.factor * found.impulse)
+        if self.fault == "flicker":
+            return replace(found, impulse=(1.0 + self._turn() * self.size) * found.impulse)
+        return found
+
+    def _turn(self) -> float:
+        """Sign of this step: one step +1, the next -1."""
+        return 1.0 if self.steps % 2 else -1.0
 
     def readback(self) -> dict[str, Any]:
         return self.inner.readback()

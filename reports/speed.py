@@ -118,8 +118,10 @@ def physics(observation: Observation) -> list[dict[str, Any]]:
     return rows
 
 
-#: What the marks in a table of costs mean.
-KEY = "*: cheapest; =: a tie, its interval overlaps the cheapest; -: not reached; 1/240 x30: step, iterations"
+def key(ranked: bool) -> str:
+    """What the marks in a table of costs mean; where no engine is ranked there are fewer of them."""
+    ranks = "*: cheapest; =: a tie, its interval overlaps the cheapest; " if ranked else ""
+    return f"{ranks}-: not reached; 1/240 x30: step, iterations"
 
 
 def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:

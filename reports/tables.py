@@ -156,11 +156,19 @@ def health(data: Plain, console: Console) -> None:
         console.print(Text(f"  {problem}"))
 
 
-def sensitivity(entries: Sequence[Plain], console: Console) -> None:
-    """Print from which size on every check and receipt sees a planted fault."""
+def sensitivity(entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], console: Console) -> None:
+    """Print from which size on every check and receipt sees a planted fault, and what no check of a scene sees."""
     table = grid("check or receipt", "sees a fault from this size on")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
         table.add_row(Text(entry["name"]), Text(", ".join(seen) or "none of these faults"))
     console.print(table)
-    console.print(Text("faults: told or reported 10, 1 or 0.1 % too low; drift: 0.1, 0.01 or 0.001 m/s along x"))
+    for fault, receipts in receipts_alone.items():
+        console.print(Text(f"{fault}: no check of these scenes sees it; the cell is INVALID by {', '.join(receipts)}"))
+    console.print(
+        Text("faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:")
+    )
+    console.print(
+        Text("drift along x, climb upwards, tremble to and fro along x at every step. 1 % of flicker: impulses")
+    )
+    console.print(Text("1 % too high and too low in turn; of damping: speeds lose 1 % in a second"))

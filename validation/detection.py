@@ -27,6 +27,7 @@ SIZES = (0.1, 0.01, 0.001)
 CELLS: tuple[tuple[str, Mapping[str, float]], ...] = (
     ("impact", {"e": 0.8, "v": 6.0}),
     ("bounce", {"e": 0.8}),
+    ("bounce", {"e": 1.0}),  # energy that a bounce adds shows only where it takes none away
     ("stack", {"n": 2.0}),
     ("incline", {"ratio": 0.9}),
     ("incline", {"ratio": 1.1}),
@@ -94,6 +95,19 @@ def lines(found: list[Seen]) -> Iterator[dict[str, str]]:
         own = {entry.fault: entry.size for entry in found if (entry.scene, entry.watcher) == (scene, watcher)}
         shown = {fault: "" if size is None else f"{100.0 * size:g} %" for fault, size in own.items()}
         yield {"name": watcher if scene == "any" else f"{scene}/{watcher}", **shown}
+
+
+def only_by_receipts(found: list[Seen]) -> dict[str, list[str]]:
+    """Faults that no check of a scene sees, each with the receipts that do."""
+    faults: dict[str, list[Seen]] = {}
+    for entry in found:
+        if entry.size is not None:
+            faults.setdefault(entry.fault, []).append(entry)
+    return {
+        fault: sorted(entry.watcher.removeprefix("receipt ") for entry in by)
+        for fault, by in faults.items()
+        if all(entry.scene == "any" for entry in by)
+    }
 
 
 def _receipts_last(entry: tuple[str, str]) -> bool:

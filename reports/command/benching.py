@@ -147,10 +147,10 @@ def _show(store: Store, run: Run, out: Path, as_json: bool, brief: bool, console
 
 
 def _print_tables(tables: speed.Tables, console: Console) -> None:
-    busy = speed.busy(tables["timings"])
-    for table in speed.level_tables(tables["work_points"], ranked=not busy):
+    ranked = not speed.busy(tables["timings"])
+    for table in speed.level_tables(tables["work_points"], ranked):
         console.print(table)
-    console.print(Text(speed.KEY, style="dim"))
+    console.print(Text(speed.key(ranked), style="dim"))
     console.print(speed.overhead_table(tables["overhead"]))
     console.print(speed.scaling_table(tables["scaling"], tables["scaling_fits"]))
 

@@ -16,7 +16,7 @@ from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
-from validation.detection import detection, lines
+from validation.detection import Seen, detection, lines, only_by_receipts
 from validation.store import Store
 
 
@@ -34,10 +34,12 @@ def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool
     receipt; takes a minute.
     """
     data: list[Any]
+    seen: list[Seen] = []
     if sensitivity:
         if what != "checks":
             raise SceneError("sensitivity: checks have one, not " + what)
-        data = list(lines(detection(registry.load(engine), profile, 2)))
+        seen = detection(registry.load(engine), profile, 2)
+        data = list(lines(seen))
     elif what == "runs":
         store = Store(out, create=False)
         data = [{"id": r.id, "date": r.date, "title": r.title, "finished": r.finished} for r in store.runs()]
@@ -46,7 +48,7 @@ def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool
     if as_json:
         click.echo(json.dumps(data, indent=1))
     elif sensitivity:
-        tables.sensitivity(data, terminal())
+        tables.sensitivity(data, only_by_receipts(seen), terminal())
     else:
         tables.listed(what, data, terminal())
 

@@ -1,5 +1,6 @@
 """Every command that the README names exists with the options it names; its Python snippet runs."""
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -30,6 +31,107 @@ def test_a_command_of_the_readme_exists_with_its_options(line):
 def test_there_are_commands_in_the_readme_and_every_command_has_help():
     assert len(COMMANDS) >= 12
     assert all(isinstance(command, click.Command) and command.help for command in main.commands.values())
+
+
+#: Command of the README -> the calls that stand for it, placeholders filled in. They take seconds, so they are run, one
+#: after the other, on one folder of results.
+RUN = {
+    "crosscheck run bounce --param e=.8 --param height=1.03 --engine bullet --profile tuned --dt 1/240": [
+        "run bounce --param e=.8 --param height=1.03 --engine bullet --profile tuned --dt 1/240",
+        "run bounce --param e=.8 --engine mujoco --profile default --dim 2",
+    ],
+    "crosscheck run my-scene.toml": ["run my-scene.toml --engine chipmunk --profile tuned --out elsewhere"],
+    "crosscheck show": ["show"],
+    "crosscheck findings --engine mujoco": [
+        "findings --engine mujoco", "findings --scene bounce --profile default", "findings --new", "findings --all"
+    ],
+    "crosscheck explain mujoco/default/bounce": ["explain mujoco/default/bounce"],
+    "crosscheck compare A B": ["compare latest crosscheck-out", "compare crosscheck-out/rows.jsonl latest"],
+    "crosscheck list scenes|engines|checks|runs": ["list scenes", "list engines", "list checks", "list runs"],
+    "crosscheck describe bounce": ["describe bounce", "describe bullet"],
+    "crosscheck doctor": ["doctor"],
+    "crosscheck check-adapter NAME": ["check-adapter chipmunk"],
+}  # fmt: skip
+#: What each of them must say of that folder.
+SAID = {
+    "run my-scene.toml --engine chipmunk --profile tuned --out elsewhere": "box.mass: 2 kg, its density times its area",
+    "show": "default 2-D",
+    "findings --engine mujoco": "mujoco/default bounce",
+    "findings --scene bounce --profile default": "mujoco/default bounce",
+    "findings --new": "no such row fails",
+    "findings --all": "mujoco/default bounce",
+    "explain mujoco/default/bounce": "crosscheck run bounce --param",
+    "compare latest crosscheck-out": "nothing changed",
+    "compare crosscheck-out/rows.jsonl latest": "nothing changed",
+    "list scenes": "incline",
+    "list engines": "chipmunk",
+    "list checks": "apex_growth",
+    "list runs": "quick: bounce",
+    "describe bounce": "coefficient of restitution",
+    "describe bullet": "contactBreakingThreshold",
+    "doctor": "no problem found",
+    "check-adapter chipmunk": "receipt turn: as declared",
+}
+#: Command of the README -> why it is not run here.
+NOT_RUN = {
+    "crosscheck run": "minutes: every continuous-integration run makes it by `make run`",
+    "crosscheck run --full": "an hour: steps, heights and sweeps of all scenes",
+    "crosscheck bench [SCENES]": "half a minute at least: run by test_bench_command.py",
+    "crosscheck report --open": "opens a browser: the page is made by test_page.py, looked at by the tests beside it",
+    "crosscheck bundle": "a quarter of a minute: run by test_bundle.py",
+    "crosscheck certify [--order|--self-test]": "compiles and runs the solver's gates: run by test_certify_command.py",
+    "crosscheck compile": "minutes where the kernels are not there yet: `make test` begins with it",
+    "crosscheck findings --prove ID": "runs an engine again with one setting switched: run by test_proving_command.py",
+    "crosscheck tune ENGINE": "minutes: its search is run by tests/validation/test_tuning.py",
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A folder with the scene of CONTRIBUTING.md, from which the commands are run in the order of the README."""
+    for package in ("pymunk", "pybullet", "mujoco"):
+        pytest.importorskip(package)
+    folder = tmp_path_factory.mktemp("readme")
+    contributing = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    scene = next(block for block in re.findall(r"```toml\n(.*?)```", contributing, re.S) if "[[bodies]]" in block)
+    (folder / "my-scene.toml").write_text(scene, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for line in RUN[next(iter(RUN))]:
+            result = CliRunner().invoke(main, shlex.split(line))
+            assert result.exit_code == 0, result.output
+    return folder
+
+
+def test_every_command_of_the_readme_is_run_or_says_why_not():
+    assert set(COMMANDS) == set(RUN) | set(NOT_RUN)
+    assert not set(RUN) & set(NOT_RUN)
+    assert set(SAID) == {line for calls in list(RUN.values())[1:] for line in calls}
+    assert all(len(reason) > 20 for reason in NOT_RUN.values())
+
+
+@pytest.mark.parametrize("line", SAID)
+def test_a_command_of_the_readme_runs(results, monkeypatch, line):
+    monkeypatch.chdir(results)
+    result = CliRunner().invoke(main, shlex.split(line))
+    assert result.exit_code == 0, result.output
+    assert SAID[line] in result.output and "Traceback" not in result.output
+
+
+@pytest.mark.parametrize("line", ["show", "findings --all", "explain mujoco/default/bounce", "compare latest latest",
+                                  "list runs", "describe bounce", "doctor"])  # fmt: skip
+def test_json_is_json(results, monkeypatch, line):
+    monkeypatch.chdir(results)
+    result = CliRunner().invoke(main, [*shlex.split(line), "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)
+
+
+def test_json_works_on_all_commands_as_the_readme_says():
+    assert "`--json` works on all of them" in README
+    named = {shlex.split(line)[1] for line in COMMANDS}
+    without = {name for name in named if not any("--json" in p.opts for p in main.commands[name].params)}
+    assert without == set()
 
 
 def test_the_python_snippet_runs(tmp_path, monkeypatch, capsys):

@@ -195,3 +195,150 @@ def test_the_check_of_a_row_is_what_it_was_judged_by():
     (row,) = rows()
     assert acceptance._check(row) == Check("creep", "m/s", 0.0, row.tolerance, row.because, row.source)
     assert row.tolerance == pytest.approx(TOLERANCE)
+
+
+# ---- what a proposal holds, in full --------------------------------------------------------------------------------
+
+
+def test_a_draft_names_profile_scene_and_kind_of_metric_and_the_release_by_two_numbers():
+    (row,) = rows(version="3.2.7+5f3a")
+    draft = acceptance._draft(replace(row, metric="interface_impulse[3]", scene="stack"))
+    assert draft == Family(
+        "default-stack-interface-impulse", ("default",), "stack", ("interface_impulse",), "", "", "==3.2.*"
+    )
+
+
+def test_a_proposal_is_of_its_engine_and_its_changes_hold_what_was_listed_and_what_is_found():
+    old = Finding(FAMILY, 0.51, 1e-3)
+    drifted = propose(rows(), "nameless", listed(FAMILY, creep=old))
+    assert drifted.engine == "nameless"
+    assert drifted.changes[0].drifted == {KEY: (old, Finding(FAMILY, 0.5, pytest.approx(4e-3)))}
+    gone = propose(rows(creep=0.0), "nameless", listed(FAMILY, creep=old))
+    assert gone.changes[0].gone == {KEY: old}
+    other = row_key(SLOT, "slides")
+    findings = Findings("nameless", {"creeps": replace(FAMILY, metrics=("*",))}, (), {other: old})
+    assert propose(rows(creep=0.0), "nameless", findings).changes[0].gone == {other: old}
+
+
+NONE, EXPLODED = Finding(FAMILY, None), Finding(FAMILY, None, diverged=True)
+
+
+@pytest.mark.parametrize(
+    ("old", "found"),
+    [
+        (NONE, {"outcome": Outcome.DIVERGED, "creep": None, "moved": 0.0}),
+        (EXPLODED, {"creep": None, "moved": 0.0}),
+        (EXPLODED, {}),
+        (NONE, {}),
+        (Finding(FAMILY, 0.5, 1e-3), {"creep": None, "moved": 0.0}),
+        (Finding(FAMILY, 0.5, 1e-3), {"outcome": Outcome.DIVERGED, "creep": None, "moved": 0.0}),
+    ],
+)
+def test_a_value_that_comes_or_goes_or_explodes_has_drifted(old, found):
+    (change,) = propose(rows(**found), "nameless", listed(FAMILY, creep=old)).changes
+    ((before, now),) = change.drifted.values()
+    assert before == old and (now.value is None, now.diverged) != (old.value is None, old.diverged)
+    assert not change.same and not change.new
+
+
+@pytest.mark.parametrize(("old", "found"), [(NONE, {"creep": None}), (EXPLODED, {"outcome": Outcome.DIVERGED})])
+def test_what_still_has_no_value_or_still_explodes_is_the_same(old, found):
+    found = {"creep": None, "moved": 0.0, **found}
+    (change,) = propose(rows(**found), "nameless", listed(FAMILY, creep=old)).changes
+    assert change.same == {KEY: old} and not change.asks
+
+
+@pytest.mark.parametrize(("value", "same"), [(0.625, True), (0.6251, False)])
+def test_a_row_at_the_edge_of_its_band_is_the_same(value, same):
+    old = Finding(FAMILY, 0.5, 0.125)
+    (change,) = propose(rows(creep=value), "nameless", listed(FAMILY, creep=old)).changes
+    assert (change.same == {KEY: old}, KEY in change.drifted) == (same, not same)
+
+
+def test_rows_that_say_nothing_do_not_hide_those_that_come_after_them():
+    silent = rows(replace(SLOT, dimension=3), outcome=Outcome.CRASHED)
+    foreign = rows(replace(SLOT, engine="another"))
+    outside = rows(replace(SLOT, dt=1 / 1000))
+    proposal = propose([*foreign, *outside, *silent, *rows()], "nameless", listed(FAMILY))
+    assert list(proposal.changes[0].new) == [KEY] and len(proposal.changes) == 1
+
+
+@pytest.mark.parametrize("slot", [replace(SLOT, engine="another"), replace(SLOT, dt=1 / 1000)])
+def test_rows_of_another_engine_or_outside_the_quick_suite_propose_nothing(slot):
+    assert not propose(rows(slot), "nameless", listed(FAMILY)).changes[0].asks
+
+
+def test_a_listed_row_stays_with_its_family_though_another_speaks_about_it_first():
+    second = replace(FAMILY, id="second", reason="another mechanism")
+    old = Finding(second, 0.5, 1e-3)
+    first, other = propose(rows(), "nameless", listed(FAMILY, second, creep=old)).changes
+    assert (first.same, other.same) == ({}, {KEY: old})
+
+
+def row_of(**fields):
+    (row,) = rows()
+    return replace(row, **fields)
+
+
+@pytest.mark.parametrize(
+    ("fields", "entry"),
+    [
+        # 0.0625 off and 4 x 0.015625 of scatter: within a tolerance of 0.125, to the last bit
+        ({"value": 1.0625, "physics": "pass", "floor": 0.015625}, ("", None)),
+        ({"value": 1.0625, "physics": "pass", "floor": 0.0157}, ("", (1.0625, 0.0628, False))),
+        ({"value": 0.9375, "physics": "pass", "floor": 0.0157}, ("", (0.9375, 0.0628, False))),
+        ({"value": 1.0624, "physics": "pass", "floor": 1.0}, ("", None)),
+        ({"tolerance": None, "physics": None}, ("", None)),
+        ({"truth": None, "physics": None}, ("", None)),
+        ({"standing": "explained"}, ("", None)),
+        ({"value": None, "physics": None}, ("", (None, 0.0, False))),
+        ({"outcome": "diverged", "value": None}, ("", (None, 0.0, True))),
+        ({"floor": None}, ("its scatter is not known: the cell has not been run from moved starts", None)),
+        ({"engine": "reference", "profile": "reference"},
+         ("its profile promises a solution: what fails there is mended, not listed", None)),
+    ],
+)  # fmt: skip
+def test_what_a_row_would_be_listed_as_or_why_it_is_refused(fields, entry):
+    given = {"truth": 1.0, "tolerance": 0.125, "value": 1.5, "physics": "fail", "floor": 0.0}
+    why, found = acceptance._entry(row_of(**{**given, **fields}))
+    assert why == entry[0]
+    if entry[1] is None or entry[1][0] is None:
+        assert found == entry[1]
+    else:
+        assert found == (entry[1][0], pytest.approx(entry[1][1], rel=1e-12), entry[1][2])
+
+
+def test_the_reasons_of_refusals_in_full(monkeypatch):
+    ((_, why),) = propose(rows(outcome=Outcome.INVALID), "nameless", listed(FAMILY)).refused
+    assert why == "its receipts or its certificate do not hold"
+    ((_, why),) = propose(rows(version="2.0"), "nameless", listed(FAMILY)).refused
+    assert why == "family creeps holds for >=1,<2, not for 2.0"
+    law = Deviation("nameless", ("default",), "incline", "creep", lambda scene, dt: (0.4, 0.01), "by design", "manual")
+    monkeypatch.setattr("validation.rows.covering", lambda *where: iter([law]))
+    ((_, why),) = propose(rows(), "nameless", listed(FAMILY)).refused
+    assert why == "a deviation law speaks about it and misses: the law or the engine has changed"
+
+
+def test_a_study_has_no_scatter_and_the_least_of_bands():
+    study = next(study for study in acceptance.STUDIES if study.scene == "incline")
+    why, (value, width, _) = acceptance._entry(row_of(metric=study.name, floor=None, truth=1.0, tolerance=0.125))
+    assert (why, value, width) == ("", 0.5, pytest.approx(0.00125))
+
+
+@pytest.mark.parametrize(
+    ("fields", "moved"),
+    [
+        ({}, True),
+        ({"value": 0.75 * TOLERANCE, "physics": "pass"}, True),
+        ({"value": 0.25 * TOLERANCE, "physics": "pass"}, False),
+        ({"outcome": "invalid", "physics": None, "value": 0.75 * TOLERANCE}, False),
+        ({"outcome": "diverged", "value": None}, False),
+        ({"value": None, "physics": None}, False),
+        ({"standing": "explained"}, False),
+        ({"engine": "reference", "profile": "reference"}, False),
+        ({"floor": 0.0}, False),
+    ],
+)
+def test_which_rows_are_run_again_from_moved_starts(fields, moved):
+    row = row_of(**{"floor": None, **fields})
+    assert bool(slots_to_move([row], row.engine)) is moved

@@ -7,7 +7,7 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from validation.cells import Observation, Outcome, Slot, parse_dt
-from validation.findings import Family, Finding, FindingsError, files, known_of, row_key
+from validation.findings import Family, Finding, FindingsError, Known, Unsupported, files, known_of, row_key
 from validation.plan import in_quick_suite
 from validation.rows import rows_of
 from validation.scenes import CATALOGUE
@@ -200,6 +200,59 @@ def test_a_wrong_file_is_refused_with_one_line_that_names_the_entry(findings, fa
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
+MORE_UNSUPPORTED = UNSUPPORTED.replace('id = "planar"', 'id = "again"')
+
+
+@pytest.mark.parametrize(
+    ("families", "members", "said"),
+    [
+        (FAMILY.replace("releases", "release"), HEAD,
+         "{families}: family creeps: release is no field; there are id, profiles, scene, metrics, reason, source, "
+         "releases"),
+        (FAMILY.replace('id = "creeps"', ""), HEAD, "{families}: family ?: id is missing"),
+        (FAMILY.replace('["creep"]', "[]"), HEAD,
+         "{families}: family creeps: metrics must be a list of names"),
+        (FAMILY.replace('["creep"]', "[1]"), HEAD,
+         "{families}: family creeps: metrics must be a list of names"),
+        (FAMILY.replace('"incline"', '"*"'), HEAD, "{families}: family creeps: scene must be the name of one scene"),
+        (FAMILY + FAMILY, HEAD, "{families}: family creeps stands twice"),
+        (UNSUPPORTED.replace("3", "1"), HEAD,
+         "{families}: unsupported planar: dimension must be 2 or 3, or missing for both"),
+        (MORE_UNSUPPORTED.replace('"it is planar"', "7"), HEAD, "{families}: unsupported again: reason is missing"),
+        (FAMILY, "a,b\n", "{members}: the first line must be "
+         "family,profile,dimension,params,dt,iterations,metric,value,band"),
+        (FAMILY, HEAD + MEMBER + MEMBER, "{members}:3: default incline 2 ratio=0.99 1/240  creep stands twice"),
+        (FAMILY, HEAD + "creeps,default\n", "{members}:2: has 2 fields, not 9"),
+        (FAMILY, HEAD + MEMBER + MEMBER.replace("creeps", "slides"), "{members}:3: there is no family 'slides'"),
+        (FAMILY, HEAD + MEMBER.replace("0.5", "half"),
+         "{members}:2: value 'half' and band '1e-3' must be numbers"),
+        (FAMILY, HEAD + MEMBER.replace("0.5", "nan"),
+         "{members}:2: value nan and band 1e-3 must be finite, the band above 0"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_file_and_line_or_entry(findings, families, members, said):
+    folder = findings(families, members)
+    with pytest.raises(FindingsError) as caught:
+        files.read("nameless", folder)
+    assert str(caught.value) == said.format(families=folder / files.FAMILIES, members=folder / files.MEMBERS)
+
+
+@pytest.mark.parametrize("name", [files.FAMILIES, files.MEMBERS])
+def test_a_file_that_is_no_utf_8_is_refused_by_its_name(findings, name):
+    folder = findings()
+    (folder / name).write_bytes(b"\xff\xfe" + "µ".encode("utf-16-le"))
+    with pytest.raises(FindingsError, match=rf"^.*{name}: .*codec"):
+        files.read("nameless", folder)
+
+
+def test_families_without_members_are_findings_of_their_engine(findings):
+    folder = findings(FAMILY + UNSUPPORTED.replace("dimension = 3\n", "") + MORE_UNSUPPORTED.replace("3", "2"))
+    (folder / files.MEMBERS).unlink()
+    found = files.read("nameless", folder)
+    assert (found.engine, list(found.families), found.members) == ("nameless", ["creeps"], {})
+    assert [(entry.id, entry.dimension) for entry in found.unsupported] == [("planar", 0), ("again", 2)]
+
+
 @pytest.mark.parametrize("profiles", ['["reference"]', '["classical", "reference"]'])
 def test_rows_of_a_profile_that_promises_a_solution_cannot_be_listed_by_hand_either(findings, profiles):
     folder = findings(FAMILY.replace('["default"]', profiles), HEAD)
@@ -237,6 +290,88 @@ def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):
     assert files.read("nameless", folder).families["quoted"] == family
 
 
+@pytest.mark.parametrize(
+    ("value", "band", "text"),
+    [(0.3, 1e-3, "0.3"), (123.4, 600.0, "1e+02"), (0.1234567890123456, 1e-16, "0.1234567890123456"),
+     (0.75, 1.1, "0.8"), (0.1, 1e-20, "0.1")],
+)  # fmt: skip
+def test_values_are_written_with_as_many_digits_as_their_band_needs(findings, value, band, text):
+    folder = findings()
+    family = files.read("nameless", folder).families["creeps"]
+    files.write_members(folder, {row_key(SLOT, "creep"): Finding(family, value, band)})
+    assert (folder / files.MEMBERS).read_text().splitlines()[1].split(",")[7] == text
+
+
+def test_members_are_written_as_lines_that_git_can_compare(findings):
+    folder = findings()
+    family = files.read("nameless", folder).families["creeps"]
+    members = {row_key(replace(SLOT, params=(("ratio", r),)), "creep"): Finding(family, None) for r in (0.9, 0.5)}
+    members[row_key(replace(SLOT, iterations=20), "creep")] = Finding(family, 0.25, 0.125)
+    files.write_members(folder, members)
+    assert (folder / files.MEMBERS).read_bytes().decode() == (
+        HEAD + "creeps,default,2,ratio=0.5,1/240,,creep,,\ncreeps,default,2,ratio=0.9,1/240,,creep,,\n"
+        "creeps,default,2,ratio=0.99,1/240,20,creep,0.25,1.2e-01\n"
+    )
+
+
+def test_families_are_appended_in_words_that_people_read(tmp_path):
+    folder = tmp_path / "not" / "there yet"
+    family = Family("soft", ("a", "b"), "stack", ("drift",), "sinks 3 µm \x7f", "its manual", "==1.*")
+    files.add_families(folder, [])
+    assert not folder.exists()
+    files.add_families(folder, [family])
+    files.add_families(folder, [replace(family, id="softer"), replace(family, id="softest")])
+    blocks = (folder / files.FAMILIES).read_bytes().decode("utf-8").split("\n\n")
+    assert [block.strip().splitlines() for block in blocks] == [
+        ["[[family]]", f'id = "{name}"', 'profiles = ["a", "b"]', 'scene = "stack"', 'metrics = ["drift"]',
+         'reason = "sinks 3 µm \\u007f"', 'source = "its manual"', 'releases = "==1.*"']
+        for name in ("soft", "softer", "softest")]  # fmt: skip
+    assert files.read("nameless", folder).families["softest"].reason == family.reason
+
+
+# ---- what is known of a row ----------------------------------------------------------------------------------------
+
+
+def test_what_is_known_of_a_row_and_what_is_said_of_it(findings):
+    findings()
+    own = files.findings_of("nameless")
+    listed = Finding(own.families["creeps"], 0.5, 1e-3)
+    outside = replace(SLOT, dt=1 / 1000)
+    assert known_of(SLOT, "creep", "1.2", None) == Known(None, False, "the engine has no list of findings")
+    assert known_of(SLOT, "creep", "1.2", own) == Known(listed, True)
+    assert known_of(SLOT, "creep", "2.0", own) == Known(None, True, "listed for releases >=1.0,<2 only: it is soft")
+    said = "outside the quick suite, not listed; rows like it: it is soft"
+    assert known_of(outside, "creep", "1.2", own) == Known(None, False, said)
+    assert known_of(outside, "creep", "2.0", own) == Known(None, True)
+    assert known_of(replace(SLOT, iterations=None, dimension=3), "creep", "1.2", own) == Known(None, True)
+
+
+def test_a_release_candidate_is_of_its_release():
+    family = Family("f", ("*",), "incline", ("creep",), "it is soft", "its manual", ">=1.0,<2")
+    assert family.holds_for("1.3rc1") and family.holds_for("1.3.dev4")
+    assert not family.holds_for("2.1rc1")
+
+
+@pytest.mark.parametrize(("iterations", "written"), [(None, ""), (20, "20")])
+def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
+    key = row_key(replace(SLOT, iterations=iterations), "creep")
+    assert key == ("default", "incline", "2", "ratio=0.99", "1/240", written, "creep")
+
+
+@pytest.mark.parametrize(
+    ("entry", "covered"),
+    [
+        (Unsupported("u", ("*",), "*", 0, "why", "source"), True),
+        (Unsupported("u", ("default",), "incline", 2, "why", "source"), True),
+        (Unsupported("u", ("tuned",), "*", 0, "why", "source"), False),
+        (Unsupported("u", ("*",), "stack", 0, "why", "source"), False),
+        (Unsupported("u", ("*",), "*", 3, "why", "source"), False),
+    ],
+)
+def test_what_an_unsupported_entry_speaks_about(entry, covered):
+    assert entry.covers(SLOT) is covered
+
+
 # ---- findings that another package brings --------------------------------------------------------------------------
 
 
@@ -261,6 +396,19 @@ def package(tmp_path, monkeypatch):
 def test_an_engine_s_package_brings_its_findings_without_being_imported(package):
     package("nameless_crosscheck:data.findings")
     assert judged(SLOT, creep=0.5) == ("fail", "known", False)
+
+
+def test_the_group_of_entry_points_is_the_one_that_is_documented(package, monkeypatch):
+    asked = []
+    monkeypatch.setattr(files, "entry_points", lambda group: asked.append(group) or [])
+    files.findings_of.cache_clear()
+    assert files.findings_of("nameless") is None
+    assert asked == ["contact_crosscheck.findings"]
+
+
+def test_only_the_entry_of_that_engine_is_looked_at(package):
+    package("not_there:findings")
+    assert files.findings_of("another") is None
 
 
 @pytest.mark.parametrize("value", ["nameless_crosscheck:nothing", "nameless_crosscheck", "not_there:findings", "a b:c"])

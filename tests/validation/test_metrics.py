@@ -123,3 +123,176 @@ def test_chatter_of_a_resting_ball_is_no_arc():
     t = np.arange(200) / 240
     chatter = 1e-13 * np.sin(40.0 * t)
     assert len(metrics.apexes(t, chatter, chatter, 2 * G / 240)[0]) == 0
+
+
+# ---- every metric on numbers that are worked out by hand -----------------------------------------------------------
+
+
+def spatial(t, **columns):
+    """A floor and one body that moves as ``columns`` say: x, z and speeds vx, vz."""
+    pose, twist = np.zeros((len(t), 2, 7)), np.zeros((len(t), 2, 6))
+    pose[:, :, 3] = 1.0
+    for name, values in columns.items():
+        where, axis = (twist, "xyz".index(name[1])) if name[0] == "v" else (pose, "xyz".index(name))
+        where[:, 1, axis] = values
+    return Trajectory(t, pose, twist, None, t[1] - t[0], "completed")
+
+
+def recorded(trajectory, rows_per_sample, first=1):
+    """The trajectory with contacts: a list of rows (a, b, impulse) for every sample from ``first`` on."""
+    d = trajectory.dimension
+    flat = [(a, b, (0.0,) * d, (0.0,) * d, impulse, 0.0) for rows in rows_per_sample for a, b, impulse in rows]
+    offset = np.cumsum([0, *(len(rows) for rows in rows_per_sample)])
+    step = np.arange(first, first + len(rows_per_sample))
+    record = ContactRecord(step, offset, Contacts.from_rows(flat, d))
+    return Trajectory(trajectory.t, trajectory.pose, trajectory.twist, record, trajectory.dt, "completed")
+
+
+def resting(samples, dt=0.1):
+    return planar(np.arange(samples) * dt, np.zeros(samples), np.zeros(samples))
+
+
+def test_the_total_impulse_is_the_sum_over_all_samples_and_contacts_of_the_pair():
+    rows = [[(0, 1, (1.0, 2.0)), (0, 1, (0.5, 0.25))], [], [(1, 0, (-1.0, -4.0)), (0, 2, (64.0, 64.0))]]
+    total, why = metrics.total_impulse(recorded(resting(4), rows), 0, 1)
+    assert (list(total), why) == ([2.5, 6.25], "")
+
+
+def test_impulses_that_were_not_recorded_are_none():
+    assert metrics.total_impulse(resting(2), 0, 1) == (None, "contacts were not recorded")
+    assert metrics.interface_load(resting(2), 0, 1, 1.0, 1.0) == ((None, "contacts were not recorded"), None)
+
+
+def test_one_component_that_is_not_reported_makes_the_impulse_none():
+    trajectory = recorded(resting(2), [[(0, 1, (1.0, math.nan))]])
+    assert metrics.total_impulse(trajectory, 0, 1) == (None, metrics.UNAVAILABLE)
+
+
+def test_tops_of_two_arcs_that_lie_between_samples():
+    """Two parabolas under 8 m/s^2 with tops at (0.28125, 1.5) and (0.84375, 0.75), sampled every 1/16 s."""
+    t = np.arange(20) / 16
+    tops = [(0.28125, 1.5), (0.84375, 0.75)]
+    arc = np.where(t < 0.5625, 0, 1)
+    from_top = t - np.array([tops[k][0] for k in arc])
+    y, v = np.array([tops[k][1] for k in arc]) - 4.0 * from_top**2, -8.0 * from_top
+    times, heights = metrics.apexes(t, y, v)
+    assert list(times) == pytest.approx([0.28125, 0.84375], abs=1e-14)
+    assert list(heights) == pytest.approx([1.5, 0.75], abs=1e-14)
+
+
+@pytest.mark.parametrize(("least", "found"), [(1.0, 0), (0.999, 1), (0.5, 1)])
+def test_an_arc_counts_if_it_starts_faster_than_the_least_speed(least, found):
+    """Its fastest sample is 1 m/s; that an earlier arc was faster does not make this one count."""
+    v = np.array([5.0, 2.0, -3.0, 1.0, 0.5, 0.0, -0.5])
+    times, _ = metrics.apexes(np.arange(7) / 8, np.array([0.0, 0.5, 0.25, 0.0, 0.25, 0.375, 0.25]), v, least)
+    assert len(times) == 1 + found
+
+
+def test_an_arc_that_ends_at_rest_has_ended_and_one_that_is_cut_off_has_not():
+    t = np.arange(4) / 8
+    y = np.array([0.0, 0.5, 0.75, 0.75])
+    assert len(metrics.apexes(t, y, np.array([2.0, 1.0, 0.5, 0.0]))[0]) == 1
+    assert len(metrics.apexes(t, y, np.array([2.0, 1.0, 0.5, 0.25]))[0]) == 0
+
+
+def test_a_top_without_curvature_is_the_first_of_its_highest_samples():
+    t = np.arange(6) / 8
+    times, tops = metrics.apexes(t, np.full(6, 0.5), np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
+    assert (list(times), list(tops)) == ([0.125], [0.5])
+
+
+def test_the_ratio_of_intervals_is_the_second_over_the_first():
+    assert metrics.interval_ratio(np.array([1.0, 3.0, 4.0, 9.0])) == (0.5, "")
+    assert metrics.interval_ratio(np.array([1.0, 3.0, 4.0])) == (0.5, "")
+    assert metrics.interval_ratio(np.array([1.0, 3.0])) == (0.0, "there are only 2 apexes, three are needed")
+
+
+def test_the_last_motion_is_the_first_sample_from_which_no_speed_is_above_the_threshold():
+    t = np.arange(5) / 4
+    assert metrics.last_motion(t, np.array([1.0, -1.0, 0.0, 0.0, 0.0]), 0.5) == (0.5, "")
+    assert metrics.last_motion(t, np.array([1.0, 0.5, -0.5, 0.5, 0.0]), 0.5) == (0.25, "")
+    assert metrics.last_motion(t, np.array([0.0, 0.0, 0.0, 1.0, 0.0]), 0.5) == (1.0, "")
+    assert metrics.last_motion(t, np.array([0.0, 0.0, 0.0, 0.0, -1.0]), 0.5) == (
+        1.0, "never settled: still moving at the end of the run")  # fmt: skip
+
+
+@pytest.mark.parametrize("samples", [5, 6])
+def test_the_mean_rate_is_that_of_the_second_half(samples):
+    t = np.arange(samples) / 4
+    value = np.where(np.arange(samples) < samples // 2, 100.0, 3.0 * t)
+    assert metrics.mean_rate(t, value) == (pytest.approx(3.0), "")
+
+
+@pytest.mark.parametrize(
+    ("shape", "reach"),
+    [(Disc(0.25), 0.25), (Sphere(0.75), 0.75), (Box((3.0, 4.0)), 5.0), (Box((1.0, 2.0, 2.0)), 3.0),
+     (HalfSpace((0.0, 1.0)), 0.0)],
+)  # fmt: skip
+def test_the_reach_of_a_shape_is_its_outermost_point(shape, reach):
+    assert metrics.reach(shape) == pytest.approx(reach)
+
+
+def pile(dimension, *shapes):
+    floor = Body("floor", HalfSpace((*(0.0,) * (dimension - 1), 1.0)), motion="fixed")
+    pose = (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    inertia = 0.5 if dimension == 2 else (0.5, 0.5, 0.5)
+    free = [Body(f"b{k}", shape, 2.0, inertia, pose) for k, shape in enumerate(shapes)]
+    return Scene("s", 1, dimension, (floor, *free), (Pair(),), (0.0,) * dimension, 1.0)
+
+
+def test_only_free_bodies_have_a_speed_and_spin_counts_at_the_outermost_point():
+    scene = pile(2, Disc(0.5), Box((3.0, 4.0)))
+    assert metrics.free_bodies(scene) == [1, 2]
+    twist = np.array([[[9.0, 9.0, 9.0], [3.0, 4.0, -2.0], [0.0, 0.0, 1.0]]])
+    trajectory = Trajectory(np.zeros(1), np.zeros((1, 3, 3)), twist, None, 0.1, "completed")
+    assert metrics.body_speeds(scene, trajectory).tolist() == [[6.0, 5.0]]
+    assert metrics.kinetic_energy(scene, trajectory) == pytest.approx([0.5 * 2 * 25 + 0.5 * 0.5 * 4 + 0.5 * 0.5])
+
+
+def test_speeds_in_space_take_all_components():
+    scene = pile(3, Sphere(0.5))
+    twist = np.array([[[9.0] * 6, [2.0, 3.0, 6.0, 1.0, 2.0, 2.0]]])
+    trajectory = Trajectory(np.zeros(1), np.zeros((1, 2, 7)), twist, None, 0.1, "completed")
+    assert metrics.body_speeds(scene, trajectory).tolist() == [[8.5]]
+
+
+def test_drift_is_horizontal_and_from_start_to_end():
+    t = np.array([0.0, 1.0, 2.0])
+    flat = planar(t, np.array([0.0, 0.0, 7.0]), np.zeros(3))
+    flat.pose[:, 1, 0] = [1.0, 9.0, 0.5]
+    assert metrics.lateral_drift(flat) == 0.5
+    solid = spatial(t, x=np.array([1.0, 9.0, 4.0]), y=np.array([2.0, 9.0, 6.0]), z=np.array([0.0, 0.0, 7.0]))
+    assert metrics.lateral_drift(solid) == 5.0
+
+
+def test_the_deepest_overlap_is_of_neighbours_at_any_sample():
+    scene = pile(2, Disc(0.5), Disc(0.5), Disc(0.5))
+    pose = np.zeros((2, 4, 3))
+    pose[:, 1:, 1] = [[0.5, 1.5, 2.5], [0.5, 1.25, 2.25]]
+    trajectory = Trajectory(np.arange(2.0), pose, np.zeros_like(pose), None, 1.0, "completed")
+    assert metrics.deepest_overlap(scene, trajectory) == pytest.approx(0.25)
+    alone = Scene("s", 1, 2, (scene.bodies[0],), (), (0.0, 0.0), 1.0)
+    assert metrics.deepest_overlap(alone, trajectory) == 0.0
+
+
+def test_overlaps_are_those_of_all_pairs_that_can_meet_and_do():
+    scene = pile(2, Disc(0.5), Disc(0.5), Disc(0.5))
+    pose = np.zeros((2, 4, 3))
+    pose[:, 1:, 1] = [[0.5, 1.5, 9.0], [0.375, 1.5, 9.0]]
+    pose[1, 3, 1] = 0.625
+    trajectory = Trajectory(np.arange(2.0), pose, np.zeros_like(pose), None, 1.0, "completed")
+    found = {pair: depth.tolist() for pair, depth in metrics.overlaps(scene, trajectory).items()}
+    assert found == {(0, 1): [0.0, 0.125], (1, 3): [0.0, 0.75], (2, 3): [0.0, 0.125]}
+
+
+def test_the_load_of_an_interface_is_the_mean_and_scatter_of_its_last_window():
+    """Samples at .1 to 1 s, the first half of them absurd; windows begin after their first instant."""
+    impulses = [(0.0, 100.0)] * 5 + [(5.0, f) for f in (1.0, 2.0, 3.0, 2.0, 2.0)]
+    trajectory = recorded(resting(11), [[(0, 1, impulse)] for impulse in impulses])
+    (mean, why), deviation = metrics.interface_load(trajectory, 0, 1, 0.5, 0.45)
+    assert (mean, why) == (pytest.approx(4.0), "")
+    assert deviation == pytest.approx(2.0 * math.sqrt(0.4))
+    with_a_gap = recorded(resting(11), [[(0, 1, (0.0, math.nan))] for _ in impulses])
+    assert metrics.interface_load(with_a_gap, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
+    too_early = recorded(resting(11), [[(0, 1, (0.0, 1.0))]])
+    assert metrics.interface_load(too_early, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)

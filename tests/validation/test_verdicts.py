@@ -1,6 +1,7 @@
 """Verdicts: physics is blind to the engine, standing never changes physics, and nothing is whitewashed."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from validation.canonical import Check
 from validation.deviation import Deviation
 from validation.findings import Family, Finding, Known
-from validation.verdicts import Physics, Standing, is_marginal, judge, judge_divergence, judge_physics
+from validation.verdicts import Physics, Standing, is_marginal, judge, judge_divergence, judge_physics, predicted
 
 CHECK = Check("m", "1", 1.0, 0.1, "because", "source")
 FAMILY = Family("f", ("p",), "s", ("m",), "a reason", "source", ">=0")
@@ -95,3 +96,106 @@ def test_marginal_is_within_a_factor_of_two_of_the_tolerance():
 def test_what_has_no_truth_or_no_bound_is_shown_and_not_judged(check, value):
     verdict = judge(value, check, (), NEW)
     assert (verdict.physics, verdict.standing) == (None, None)
+
+
+@pytest.mark.parametrize("check", [Check("m", "1", None, 1.0, "shown", ""), Check("m", "1", 1.0, None, "shown", "")])
+def test_what_has_no_truth_or_no_bound_has_no_physics_and_is_not_marginal(check):
+    assert judge_physics(1.0, check) is None
+    assert is_marginal(1.5, check) is False
+
+
+# ---- edges: numbers that are exact in binary, so that equality is meant --------------------------------------------
+
+EDGE = Check("m", "1", 1.0, 0.125, "because", "source")
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_tolerance_itself_passes(side):
+    assert judge_physics(1.0 + side * 0.125, EDGE) is Physics.PASS
+    assert judge_physics(1.0 + side * math.nextafter(0.125, 1.0) * (1 + 2**-40), EDGE) is Physics.FAIL
+
+
+@pytest.mark.parametrize(("off", "marginal"), [(0.0625, True), (0.25, True), (0.0624, False), (0.2501, False)])
+def test_the_edges_of_marginal_are_half_the_tolerance_and_twice_it(off, marginal):
+    assert is_marginal(1.0 + off, EDGE) is marginal
+    assert is_marginal(1.0 - off, EDGE) is marginal
+
+
+@pytest.mark.parametrize(("value", "standing"), [(1.75, Standing.EXPLAINED), (1.7501, Standing.DRIFTED)])
+def test_the_band_of_a_law_holds_at_its_edge(value, standing):
+    assert judge(value, EDGE, [(LAW, 1.5, 0.25)], NEW).standing is standing
+
+
+@pytest.mark.parametrize(("value", "standing"), [(1.3125, Standing.KNOWN), (1.3126, Standing.DRIFTED)])
+def test_the_band_of_a_finding_holds_at_its_edge(value, standing):
+    assert judge(value, EDGE, [], Known(Finding(FAMILY, 1.25, 0.0625), True)).standing is standing
+
+
+# ---- what a reader is told -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "predictions", "known", "said"),
+    [
+        (1.505, LAWFUL, NEW, "it does so by design (predicted 1.5 +- 0.01)"),
+        (1.6, LAWFUL, NEW, "left the band of its law, 1.5 +- 0.01: it does so by design"),
+        (1.2, [], NEW, "neither listed nor explained by a law"),
+        (1.2, [], Known(None, True, "another release"), "neither listed nor explained by a law; another release"),
+        (1.2, [], UNLISTED, "the engine has no list"),
+        (1.21, [], FAILS, "a reason"),
+        (1.23, [], FAILS, "is listed with 1.2 +- 0.02: a reason"),
+        (1.05, [], FAILS, "passes, but is listed with 1.2 +- 0.02: a reason"),
+        (1.09, [], MARGINAL, "passes within the band of what is listed as failing: a reason"),
+        (1.12, [], MARGINAL, "a reason"),
+        (1.2, [], NO_VALUE, "is listed as having no value: a reason"),
+        (1.2, [], EXPLODES, "is listed as diverging: a reason"),
+        (1.05, [], NO_VALUE, "passes, but is listed as having no value: a reason"),
+        (1.05, [], NEW, ""),
+        (None, [], NEW, "has no value, and is not listed as having none"),
+        (None, [], UNLISTED, "the engine has no list"),
+        (None, [], NO_VALUE, "a reason"),
+        (None, [], FAILS, "has no value any more; is listed with 1.2 +- 0.02: a reason"),
+        (None, [], EXPLODES, "has no value any more; is listed as diverging: a reason"),
+    ],
+)
+def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
+    assert judge(value, CHECK, predictions, known).reason == said
+
+
+def test_a_missing_value_says_why_after_what_is_wrong_with_that():
+    verdict = judge(None, CHECK, (), NEW, "there is no apex")
+    assert verdict.reason == "has no value, and is not listed as having none; there is no apex"
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        (NEW, "it blew up"),
+        (UNLISTED, "it blew up; the engine has no list"),
+        (EXPLODES, "it blew up; a reason"),
+        (FAILS, "it blew up; is listed with 1.2 +- 0.02: a reason"),
+        (NO_VALUE, "it blew up; is listed as having no value: a reason"),
+    ],
+)
+def test_the_reason_of_a_divergence_in_full(known, said):
+    assert judge_divergence(known, "it blew up").reason == said
+
+
+def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from_the_first():
+    other = Deviation("e", ("p",), "s", "m", lambda scene, dt: (2.0, 0.1), "another mechanism", "its manual")
+    both = [*LAWFUL, (other, 2.0, 0.1)]
+    assert judge(2.05, CHECK, both, NEW).reason == "another mechanism (predicted 2 +- 0.1)"
+    assert judge(3.0, CHECK, both, NEW).reason == "left the band of its law, 1.5 +- 0.01: it does so by design"
+
+
+def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_are_left_out():
+    asked = []
+
+    def law(scene, dt):
+        asked.append((scene, dt))
+        return (dt, 0.5)
+
+    speaks = Deviation("e", ("p",), "s", "m", law, "because", "source")
+    silent = Deviation("e", ("p",), "s", "m", lambda scene, dt: None, "because", "source")
+    assert predicted([silent, speaks], "the scene", SimpleNamespace(dt=0.25)) == [(speaks, 0.25, 0.5)]
+    assert asked == [("the scene", 0.25)]

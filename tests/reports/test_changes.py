@@ -1,0 +1,216 @@
+"""What `compare` says in full: both sides, the headline, one line a family; and where its sides come from."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from reports import changes
+from reports.changes import Side, as_json, as_markdown, as_text, header, headline, load_side
+from reports.wording import reproduce
+from validation.cells import Observation, Outcome, Slot
+from validation.comparison import Change, Kind
+from validation.store import MissingError, Store
+
+SLOT = {"scene": "stack", "params": {"n": 5.0}, "dimension": 2, "engine": "bullet", "profile": "tuned",
+        "dt": 1 / 240, "iterations": None, "ulp": 0}  # fmt: skip
+FLIP = Change(Kind.FLIP, True, "bullet", "tuned", "stack", 2, "n=5", "drift", "pass 1e-6 m", "FAIL 3e-3 m", 2.5, SLOT,
+              "3.2.6 -> 3.2.7")  # fmt: skip
+MILDER = replace(FLIP, size=1.5, params="n=2")
+BETTER = replace(FLIP, kind=Kind.ERROR, regressed=False, metric="interface_impulse[3]", size=-0.25, note="")
+FASTER = replace(FLIP, kind=Kind.SPEED, regressed=False, metric="time", size=0.5, note="")
+GONE = replace(FLIP, kind=Kind.REMOVED, regressed=False, metric="interface_impulse[1]", size=0.0, after="-")
+ALSO_GONE = replace(GONE, metric="interface_impulse[2]")
+ADDED = replace(FLIP, kind=Kind.ADDED, regressed=False, scene="incline", metric="creep", size=0.0, before="-")
+
+
+def side(run, *engines, commit="", date=""):
+    rows = [{"engine": name, "engine_version": version} for name, version in engines]
+    return Side(rows, (), run, date, commit)
+
+
+A = side(
+    "one", ("bullet", "3.2.6"), ("mujoco", "4.0.1"), ("chipmunk", "7.3.1"), ("ours", ""), commit="0123456789abcdef"
+)
+B = side("", ("bullet", "3.2.7"), ("mujoco", "4.0.1"), ("planck", "1.0"), date="today")
+
+
+def test_the_header_says_runs_commits_and_which_versions_moved():
+    assert header(A, B) == [
+        "A: one (commit 0123456789ab, 4 rows)",
+        "B: rows (3 rows)",
+        "versions that differ: bullet 3.2.6 -> 3.2.7, chipmunk 7.3.1 -> not run, planck not run -> 1.0",
+        "same versions: mujoco 4.0.1",
+    ]
+    assert header(A, A)[2:] == ["same versions: bullet 3.2.6, mujoco 4.0.1, chipmunk 7.3.1"]
+    assert header(side("x", ("a", "1")), side("y", ("a", "2")))[2:] == ["versions that differ: a 1 -> 2"]
+
+
+def test_the_headline_counts_kinds_and_what_got_worse():
+    assert headline([ADDED, GONE, BETTER, FLIP, FASTER, MILDER, ALSO_GONE]) == (
+        "2 verdict flipped (2 regressed); 1 value changed (0 regressed); 1 speed changed (0 regressed); 1 only in B; "
+        "2 not run in B"
+    )
+    assert headline([]) == "nothing changed"
+
+
+def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
+    again = reproduce(SLOT)
+    lines = as_text([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B).splitlines()
+    assert lines[:5] == [*header(A, B), headline([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED])]
+    assert sorted(lines[5:]) == sorted([
+        f"{Kind.FLIP.value} (regressed): bullet/tuned stack 2-D n=5 drift: pass 1e-6 m -> FAIL 3e-3 m +2.5 tol "
+        f"[3.2.6 -> 3.2.7] and 1 more like it | {again}",
+        f"{Kind.ERROR.value} (improved or neutral): bullet/tuned stack 2-D n=5 interface_impulse[3]: pass 1e-6 m -> "
+        f"FAIL 3e-3 m -0.25 tol [] | {again}",
+        f"{Kind.SPEED.value} (improved or neutral): bullet/tuned stack 2-D n=5 time: pass 1e-6 m -> FAIL 3e-3 m x0.5 "
+        f"[] | {again}",
+        f"{Kind.REMOVED.value}: bullet/tuned stack interface_impulse: 2 rows",
+        f"{Kind.ADDED.value}: bullet/tuned incline creep: 1 rows",
+    ])  # fmt: skip
+    assert as_text([], A, A).endswith("nothing changed\n")
+
+
+def test_a_change_without_a_size_says_none():
+    (line,) = as_text([replace(FLIP, size=0.0, params="")], A, B).splitlines()[5:]
+    assert "stack 2-D drift: pass 1e-6 m -> FAIL 3e-3 m  [3.2.6 -> 3.2.7] | " in line
+
+
+def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
+    odd = replace(BETTER, metric="a|b`c", before="<1>", after="2 & 3")
+    text = as_markdown([FLIP, MILDER, odd], A, B)
+    value, flip = Kind.ERROR.value, Kind.FLIP.value
+    assert text == "\n".join([
+        f"**contact-crosscheck compare**: {headline([FLIP, MILDER, odd])}", "",
+        *[f"* {line}" for line in header(A, B)], "",
+        "| change | | rows | where | metric | before | after | size |",
+        "|---|---|---|---|---|---|---|---|",
+        f"| {flip} | worse | 2 | bullet/tuned stack 2-D n=5 | `drift` | pass 1e-6 m | FAIL 3e-3 m | +2.5 tol |",
+        f"| {value} |  | 1 | bullet/tuned stack 2-D n=5 | `a\\|b'c` | &lt;1&gt; | 2 &amp; 3 | -0.25 tol |", "",
+    ])  # fmt: skip
+    assert "| change |" not in as_markdown([], A, B)
+
+
+def test_markdown_says_how_many_families_it_leaves_out():
+    every = [replace(FLIP, metric=f"m{k}") for k in range(53)]
+    text = as_markdown(every, A, B)
+    assert text.count("| worse |") == 50
+    assert text.endswith("\n\n... and 3 more families; `crosscheck compare --json` lists every change\n")
+    assert "more families" not in as_markdown(every[:50], A, B)
+    assert as_markdown(every, A, B, most=52).endswith(
+        "\n... and 1 more families; `crosscheck compare --json` lists every change\n"
+    )
+
+
+def test_json_has_both_sides_and_every_change():
+    text = as_json([FLIP, MILDER], A, B)
+    data = json.loads(text)
+    assert data == {
+        "a": {"run": "one", "date": "", "commit": "0123456789abcdef", "rows": 4,
+              "versions": {"bullet": "3.2.6", "mujoco": "4.0.1", "chipmunk": "7.3.1"}},
+        "b": {"run": "", "date": "today", "commit": "", "rows": 3,
+              "versions": {"bullet": "3.2.7", "mujoco": "4.0.1", "planck": "1.0"}},
+        "headline": headline([FLIP, MILDER]),
+        "changes": [FLIP.as_dict(), MILDER.as_dict()],
+    }  # fmt: skip
+    assert text.startswith('{\n "a": {\n  "run"')
+
+
+# ---- where sides come from -----------------------------------------------------------------------------------------
+
+CELL = Slot("impact", (("e", 0.8),), 2, "nameless", "default", 1 / 240)
+
+
+@pytest.fixture
+def results(tmp_path):
+    """A folder with two runs, and their ids."""
+    store, ids = Store(tmp_path / "results"), []
+    for e in (0.5, 0.8):
+        asked = replace(CELL, params=(("e", e),))
+        run, _ = store.start(f"e = {e}", [asked])
+        store.add(run, Observation(asked, f"cell {e}", 1, "1.0", Outcome.OK, metrics={"rebound_ratio": (e, "")}))
+        store.finish(run)
+        ids.append(run)
+    store.close()
+    return tmp_path / "results", ids
+
+
+def value(found):
+    (row,) = [row for row in found.rows if row["metric"] == "rebound_ratio"]
+    return row["value"]
+
+
+def test_a_side_is_a_run_of_the_folder_or_a_folder_or_a_run_of_it(results, tmp_path):
+    folder, (first, last) = results
+    for argument, expected in [(first.id, first), (last.id, last), ("latest", last), (str(folder), last),
+                               (f"{folder}:{first.id}", first), (f"{folder}:latest", last)]:  # fmt: skip
+        elsewhere = tmp_path / "elsewhere" if argument.startswith(str(folder)) else folder
+        found = load_side(argument, elsewhere)
+        assert (found.run, found.date, found.commit) == (expected.id, expected.date, expected.commit), argument
+        assert value(found) == (0.5 if expected is first else 0.8), argument
+        assert {row["run"] for row in found.rows} == {expected.id}
+        assert list(found.ratios) == []
+
+
+def test_times_are_of_the_last_bench_run_unless_a_run_is_named(results, monkeypatch):
+    """The last run is a bench run here: rows are of the last that is none, ratios of the bench run."""
+    import pandas as pd
+
+    folder, (first, last) = results
+    monkeypatch.setattr(changes, "bench_runs", lambda store: [run for run in store.runs() if run.id == last.id])
+    monkeypatch.setattr(changes, "ratios", lambda store, bench: pd.DataFrame([{"of": bench.id, "ratio": 2.0}]))
+    latest = load_side("latest", folder)
+    assert (latest.run, value(latest), latest.ratios) == (first.id, 0.5, [{"of": last.id, "ratio": 2.0}])
+    named = load_side(last.id, folder)
+    assert (named.run, value(named), named.ratios) == (last.id, 0.8, [{"of": last.id, "ratio": 2.0}])
+    assert load_side(first.id, folder).ratios == []
+
+
+def test_where_there_are_bench_runs_only_the_last_is_taken(results, monkeypatch):
+    import pandas as pd
+
+    folder, (_, last) = results
+    monkeypatch.setattr(changes, "bench_runs", lambda store: store.runs())
+    monkeypatch.setattr(changes, "ratios", lambda store, bench: pd.DataFrame([{"of": bench.id}]))
+    found = load_side("latest", folder)
+    assert found.run == last.id and len(found.ratios) == 1
+
+
+ROW = {"slot": {}, "metric": "drift", "value": 1.0}
+TIME = {"slot": {}, "purpose": "p", "ratio": 2.0}
+
+
+def written(tmp_path, *lines):
+    path = tmp_path / "rows.jsonl"
+    path.write_text("".join((line if isinstance(line, str) else json.dumps(line)) + "\n" for line in lines))
+    return path
+
+
+def test_a_side_is_a_file_of_rows_and_ratios(tmp_path):
+    rows = [{**ROW, "run": "one"}, {**ROW, "run": "two"}, {**ROW, "run": "one"}]
+    found = load_side(str(written(tmp_path, *rows, "", "  ", TIME)), tmp_path)
+    assert (found.rows, found.ratios, found.run) == (rows, [TIME], "one, two")
+    assert load_side(str(written(tmp_path, ROW)), tmp_path).run == "rows.jsonl"
+
+
+@pytest.mark.parametrize("line", [{"slot": {}, "metric": "drift"}, {"slot": {}, "ratio": 1.0}, [1], "7", {}])
+def test_a_file_that_holds_anything_else_is_refused(tmp_path, line):
+    path = written(tmp_path, ROW, line)
+    with pytest.raises(MissingError) as caught:
+        load_side(str(path), tmp_path)
+    assert str(caught.value) == f"run: {path} does not hold rows of this project"
+
+
+def test_a_file_that_cannot_be_read_is_refused_with_its_name_and_why(tmp_path):
+    for path in (tmp_path / "none.jsonl", written(tmp_path, "{")):
+        with pytest.raises(MissingError) as caught:
+            load_side(str(path), tmp_path)
+        assert (
+            str(caught.value).startswith(f"run: cannot read {path}: ") and len(str(caught.value)) > len(str(path)) + 20
+        )
+
+
+def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
+    with pytest.raises(MissingError):
+        load_side("nothing", tmp_path / "not there")
+    assert not (tmp_path / "not there").exists()

@@ -1,0 +1,209 @@
+"""Exports in full: what each format holds of a row, line by line, and that it can be read again."""
+
+import csv
+import io
+import json
+import os
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from reports import exports
+from reports.findings import finding_line
+from reports.matrix import legend
+from validation.cells import Observation, Outcome, Slot
+from validation.rows import Row
+from validation.store import Store, StoreError
+
+ROW = Row(
+    "run", "chipmunk", "7.3.1", "tuned", "impact", 2, {"e": 0.8, "v": 6.0}, 1 / 240, None, "impact/rebound_ratio",
+    "rebound_ratio", "1", 0.75, 0.8, -0.05, 1e-12, "exact | law", "ok", "fail", "new", "nobody knew", "ab", 120, 0.1,
+    source="Newton", log="its words", initial_change=["moved", "turned"], cells=["c1", "c2"], floor=0.5,
+    slot={"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engine": "chipmunk", "profile": "tuned",
+          "dt": 1 / 240, "iterations": None, "ulp": 0},
+)  # fmt: skip
+PASS = replace(ROW, value=0.8, error=0.0, physics="pass", standing=None, reason="", metric="rebound_speed")
+KNOWN = replace(ROW, standing="known", profile="default", slot={**ROW.slot, "profile": "default"})
+SWEPT = replace(PASS, iterations=20, slot={**ROW.slot, "iterations": 20})
+SPATIAL = replace(PASS, dimension=3, slot={**ROW.slot, "dimension": 3})
+CRASHED = replace(ROW, outcome="crashed", value=None, error=None, physics=None, standing=None, reason="it died")
+SILENT = replace(CRASHED, outcome="timed_out", log="")
+
+
+def plain(*rows):
+    return [row.as_dict() for row in rows]
+
+
+# ---- JSON and CSV --------------------------------------------------------------------------------------------------
+
+
+def test_json_is_an_array_with_a_line_per_field_and_json_lines_have_one_per_row():
+    rows = plain(ROW, PASS)
+    text = exports.as_json(rows)
+    assert json.loads(text) == rows
+    assert text.startswith('[\n {\n  "run": "run",\n')
+    lines = exports.as_jsonl(rows).split("\n")
+    assert [json.loads(line) for line in lines[:-1]] == rows and lines[-1] == ""
+
+
+@pytest.mark.parametrize("write", [exports.as_json, exports.as_jsonl])
+def test_what_is_no_json_is_refused_and_not_written(write):
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write(plain(replace(ROW, value=float("nan"))))
+
+
+def test_csv_holds_all_fields_but_slot_and_log():
+    text = exports.as_csv(plain(ROW, replace(PASS, initial_change=[], reason='=cmd|"x"', cells=["c1"])))
+    assert "\r" not in text and text.endswith("\n")
+    first, second = csv.DictReader(io.StringIO(text))
+    assert first == {
+        "run": "run", "engine": "chipmunk", "engine_version": "7.3.1", "profile": "tuned", "scene": "impact",
+        "dimension": "2", "params": "e=0.8 v=6", "dt": repr(1 / 240), "iterations": "", "check": "impact/rebound_ratio",
+        "metric": "rebound_ratio", "unit": "1", "value": "0.75", "truth": "0.8", "error": "-0.05",
+        "tolerance": "1e-12", "because": "exact | law", "outcome": "ok", "physics": "fail", "standing": "new",
+        "reason": "nobody knew", "state_hash": "ab", "steps": "120", "wall_time_s": "0.1", "source": "Newton",
+        "initial_change": "moved;turned", "cells": "c1;c2", "floor": "0.5", "certificate": "",
+    }  # fmt: skip
+    assert (second["initial_change"], second["reason"], second["cells"]) == ("", '\'=cmd|"x"', "c1")
+
+
+# ---- Markdown ------------------------------------------------------------------------------------------------------
+
+
+def test_markdown_is_the_matrix_its_legend_and_what_needs_attention():
+    rows = plain(KNOWN, ROW, PASS, SPATIAL, CRASHED)
+    empty = legend().replace("|", "\\|")
+    assert exports.as_markdown(rows) == "\n".join([
+        "| scene | chipmunk/default<br>7.3.1 | chipmunk/tuned<br>7.3.1 |",
+        "|---|---|---|",
+        "| impact 2-D | FAIL known 1/1 | CRASHED 2/3 |",
+        "| impact 3-D |  | pass 1 |",
+        "", empty, "",
+        "**CRASHED**: 1 rows",
+        "* " + finding_line(rows[4]).replace("|", "\\|"),
+        "**FAIL new**: 1 rows",
+        "* " + finding_line(rows[1]).replace("|", "\\|"),
+        "**FAIL known**: 1 rows",
+        "",
+    ])  # fmt: skip
+
+
+def test_markdown_of_an_engine_that_did_not_run_has_no_version():
+    row = replace(CRASHED, engine="another", engine_version="", outcome="not_installed")
+    assert exports.as_markdown(plain(row)).startswith("| scene | another/tuned<br> |\n|---|---|\n")
+
+
+# ---- JUnit ---------------------------------------------------------------------------------------------------------
+
+
+def junit(*rows):
+    return ElementTree.fromstring(exports.as_junit(plain(*rows)))
+
+
+def test_junit_has_a_suite_per_engine_and_profile_and_counts_what_fails():
+    document = junit(ROW, KNOWN, PASS, SWEPT, SPATIAL, CRASHED)
+    assert document.get("name") == "contact-crosscheck"
+    suites = {suite.get("name"): suite for suite in document.iter("testsuite")}
+    assert list(suites) == ["chipmunk/tuned", "chipmunk/default"]
+    counts = {name: [suite.get(n) for n in ("tests", "failures", "errors")] for name, suite in suites.items()}
+    assert counts == {"chipmunk/tuned": ["5", "1", "1"], "chipmunk/default": ["1", "0", "0"]}
+    assert [document.get(n) for n in ("tests", "failures", "errors")] == ["6", "1", "1"]
+    names = [(case.get("classname"), case.get("name")) for case in suites["chipmunk/tuned"].iter("testcase")]
+    assert names == [
+        ("chipmunk/tuned.impact2d", "rebound_ratio e=0.8 v=6 dt=0.00416667 it=own"),
+        ("chipmunk/tuned.impact2d", "rebound_speed e=0.8 v=6 dt=0.00416667 it=own"),
+        ("chipmunk/tuned.impact2d", "rebound_speed e=0.8 v=6 dt=0.00416667 it=20"),
+        ("chipmunk/tuned.impact3d", "rebound_speed e=0.8 v=6 dt=0.00416667 it=own"),
+        ("chipmunk/tuned.impact2d", "rebound_ratio e=0.8 v=6 dt=0.00416667 it=own"),
+    ]
+
+
+def outcome_of(row):
+    (case,) = junit(row).iter("testcase")
+    return [(child.tag, child.get("message"), child.text) for child in case]
+
+
+NO_VALUE = replace(ROW, value=None, error=None, physics=None, standing=None, reason="there is no apex")
+
+
+@pytest.mark.parametrize("row", [CRASHED, SILENT])
+def test_what_died_is_an_error_with_its_last_words(row):
+    assert outcome_of(row) == [("error", finding_line(row.as_dict()), row.log or None)]
+
+
+@pytest.mark.parametrize(
+    "row",
+    [ROW, replace(ROW, standing="drifted"), replace(PASS, standing="drifted"), replace(CRASHED, outcome="invalid"),
+     replace(CRASHED, outcome="missing")],
+)  # fmt: skip
+def test_an_alarm_is_a_failure_that_says_what_it_is(row):
+    assert outcome_of(row) == [("failure", finding_line(row.as_dict()), None)]
+
+
+@pytest.mark.parametrize(
+    "row", [NO_VALUE, replace(CRASHED, outcome="not_installed"), replace(CRASHED, outcome="unsupported")]
+)
+def test_what_has_no_verdict_is_skipped_with_its_reason(row):
+    assert outcome_of(row) == [("skipped", row.reason, None)]
+
+
+@pytest.mark.parametrize("row", [KNOWN, replace(ROW, standing="explained"), replace(ROW, standing=None)])
+def test_a_fail_that_is_no_alarm_passes_and_says_so(row):
+    assert outcome_of(row) == [("system-out", None, finding_line(row.as_dict()))]
+
+
+def test_a_pass_says_nothing():
+    assert outcome_of(PASS) == []
+
+
+# ---- files and DataFrames ------------------------------------------------------------------------------------------
+
+
+def test_all_files_are_written_in_utf_8(tmp_path):
+    rows = plain(replace(ROW, reason="3 µm"))
+    paths = exports.write_all(tmp_path, rows)
+    assert paths == {name: tmp_path / name for name in ("rows.jsonl", "rows.csv", "summary.md")}
+    texts = [exports.as_jsonl(rows), exports.as_csv(rows), exports.as_markdown(rows)]
+    assert [path.read_bytes().decode("utf-8").replace(os.linesep, "\n") for path in paths.values()] == texts
+    assert "3 µm" in texts[1] and "3 µm" in texts[2]
+
+
+@pytest.fixture
+def two_runs(tmp_path, monkeypatch):
+    """A folder of results with two runs: one cell each, with the rebound at 0.5 and at 0.8 of 0.8."""
+    monkeypatch.chdir(tmp_path)
+    slot = Slot("impact", (("e", 0.8),), 2, "nameless", "default", 1 / 240)
+    ids = []
+    for ratio, title in ((0.5, "first"), (0.8, "second")):
+        store = Store(tmp_path / "crosscheck-out")
+        asked = slot if title == "first" else replace(slot, params=(("e", 0.8), ("v", 5.0)))
+        run, _ = store.start(title, [asked])
+        store.add(
+            run, Observation(asked, f"cell {title}", 1, "1.0", Outcome.OK, metrics={"rebound_ratio": (ratio, "")})
+        )
+        store.finish(run)
+        store.close()
+        ids.append(run.id)
+    return ids
+
+
+def ratio(table):
+    return table[table["metric"] == "rebound_ratio"][["run", "value"]].values.tolist()
+
+
+def test_load_reads_the_last_run_of_the_usual_folder_or_any_other(two_runs, tmp_path):
+    first, last = two_runs
+    assert isinstance(exports.load(), pd.DataFrame)
+    assert ratio(exports.load()) == ratio(exports.load(tmp_path / "crosscheck-out", "latest")) == [[last, 0.8]]
+    assert ratio(exports.load("crosscheck-out", first)) == [[first, 0.5]]
+    rows = exports.load_rows()
+    assert {row.run for row in rows} == {last} and [r.value for r in rows if r.metric == "rebound_ratio"] == [0.8]
+    assert {row.run for row in exports.load_rows("crosscheck-out", first)} == {first}
+
+
+def test_a_folder_without_results_is_not_made(tmp_path):
+    with pytest.raises(StoreError):
+        exports.load(tmp_path / "nothing")
+    assert not (tmp_path / "nothing").exists()

@@ -1,0 +1,101 @@
+"""Words and numbers, one by one: units, escapes, commands that run again what they name, ids that stay."""
+
+import hashlib
+import json
+import shlex
+
+import pytest
+
+from reports.wording import cell, mark_of, markdown, measured, number, params_text, quantity, reproduce, row_id
+from validation.scenes import CATALOGUE
+
+SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engine": "chipmunk", "profile": "tuned",
+        "dt": 1 / 240, "iterations": None, "ulp": 0}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [(0.123456, "m/s", "0.1235 m/s"), (0.123456, "1", "0.1235"), (None, "m", "-"), (None, "1", "-"), (0.0, "s", "0 s")],
+)
+def test_a_quantity_has_its_unit_unless_it_is_a_ratio_or_nothing(value, unit, text):
+    assert quantity(value, unit) == text
+
+
+def test_digits_are_four_unless_somebody_asks():
+    assert number(0.123456789) == "0.1235"
+    assert number(0.123456789, 6) == "0.123457"
+    assert quantity(0.123456789, "m", 6) == "0.123457 m"
+    row = {"value": 0.123456789, "unit": "m", "reason": ""}
+    assert (measured(row), measured(row, 6)) == ("0.1235 m", "0.123457 m")
+
+
+def test_a_time_that_the_end_cut_off_is_no_time():
+    assert measured({"value": 5.0, "unit": "s", "reason": "never settled: still moving"}) == "never settled"
+
+
+def test_a_plain_number_keeps_the_digits_it_was_asked_for():
+    assert number(1.234567891, 9) == "1.23456789"
+
+
+@pytest.mark.parametrize(
+    ("raw", "shown"),
+    [("a & b", "a &amp; b"), ("<b>", "&lt;b&gt;"), ("a|b", "a\\|b"), ("&lt;", "&amp;lt;"), ("plain", "plain")],
+)
+def test_markdown_shows_text_as_it_is(raw, shown):
+    assert markdown(raw) == shown
+
+
+@pytest.mark.parametrize("begin", ["=", "+", "-", "@", "\t", "\r"])
+def test_what_a_spreadsheet_takes_for_a_formula_is_quoted(begin):
+    assert cell(f"{begin}cmd") == f"'{begin}cmd"
+
+
+@pytest.mark.parametrize("value", ["-", "-1.5", "+2e-3", "plain", "", 1.5, None, True])
+def test_numbers_dashes_and_other_text_are_no_formulas(value):
+    assert cell(value) is value
+
+
+def test_parameters_are_named_and_parted_by_a_space():
+    assert params_text({"e": 0.8, "height": 1.03}) == "e=0.8 height=1.03"
+    assert params_text({}) == ""
+
+
+@pytest.mark.parametrize("outcome", ["crashed", "timed_out", "missing", "invalid", "not_installed"])
+def test_a_cell_without_an_answer_is_marked_by_its_outcome(outcome):
+    assert mark_of({"outcome": outcome, "physics": None, "standing": None}) == outcome
+
+
+def options_of(command):
+    words = shlex.split(command)
+    assert words[:2] == ["crosscheck", "run"]
+    return words[2], list(zip(words[3::2], words[4::2], strict=True))
+
+
+def test_a_command_names_all_that_was_asked():
+    scene, options = options_of(reproduce({**SLOT, "iterations": 20}))
+    assert scene == "impact"
+    assert options == [
+        ("--param", "e=0.8"), ("--param", "v=6"), ("--dim", "2"), ("--engine", "chipmunk"), ("--profile", "tuned"),
+        ("--dt", "1/240"), ("--iterations", "20")]  # fmt: skip
+    assert "--iterations" not in dict(options_of(reproduce(SLOT))[1])
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, 1 / 3, 0.8, 6.0, 1e-300])
+def test_a_parameter_in_a_command_is_the_same_number_again(value):
+    _, options = options_of(reproduce({**SLOT, "params": {"e": value}}))
+    assert float(dict(options)["--param"].partition("=")[2]) == value
+
+
+def test_a_command_without_parameters_names_the_first_with_its_default():
+    _, options = options_of(reproduce({**SLOT, "params": {}}))
+    first = CATALOGUE["impact"].parameters[0]
+    assert [value for name, value in options if name == "--param"] == [f"{first.name}={first.default:.12g}"]
+
+
+def test_the_id_of_a_row_is_eight_digits_of_what_was_asked_and_of_nothing_else():
+    row = {"slot": SLOT, "metric": "rebound_ratio", "value": 0.1, "run": "one"}
+    text = json.dumps([SLOT, "rebound_ratio"], sort_keys=True)
+    assert row_id(row) == hashlib.sha256(text.encode()).hexdigest()[:8]
+    turned = dict(reversed(list(SLOT.items())))
+    assert row_id({"slot": turned, "metric": "rebound_ratio", "value": 0.2, "run": "two"}) == row_id(row)
+    assert row_id({**row, "metric": "impulse"}) != row_id(row) != row_id({**row, "slot": {**SLOT, "dimension": 3}})

@@ -1,0 +1,150 @@
+"""Quantities that a scene file may state: units, signs, windows and turns, on trajectories worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.metrics import UNAVAILABLE
+from validation.quantities import force_window, quantity, unit
+
+
+def scene_of(dimension, duration=4.0):
+    flat = (0.0,) * (dimension - 1)
+    pose = (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    inertia = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)
+    shape = Disc(0.5) if dimension == 2 else Sphere(0.5)
+    bodies = (
+        Body("floor", HalfSpace((*flat, 1.0)), motion="fixed"),
+        Body("ball", shape, 1.0, inertia, pose),
+        Body("top", shape, 1.0, inertia, pose),
+    )
+    return Scene("s", 1, dimension, bodies, (Pair(),), (0.0,) * dimension, duration)
+
+
+def moving(dimension, samples=5, dt=1.0):
+    """Every coordinate of every body is a number of its own: 100 body + 10 coordinate + sample."""
+    size = (3, 3) if dimension == 2 else (7, 6)
+    grid = np.arange(samples)[:, None, None] + 100.0 * np.arange(3)[None, :, None]
+    pose, twist = (grid + 10.0 * np.arange(n)[None, None, :] for n in size)
+    return Trajectory(np.arange(samples) * dt, pose, -twist, None, dt, "completed")
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [("x y z", "m"), ("angle", "rad"), ("omega wx wy wz", "rad/s"), ("vx vy vz", "m/s"), ("fx fy fz", "N")],
+)
+def test_units(names, expected):
+    assert {unit(f"ball.{name}") for name in names.split()} == {expected}
+    assert {unit(f"floor/ball.{name}") for name in names.split()} == {expected}
+
+
+@pytest.mark.parametrize(("duration", "window"), [(4.0, 1.0), (2.0, 1.0), (1.0, 0.5)])
+def test_forces_are_means_over_a_second_or_the_last_half_of_a_short_run(duration, window):
+    assert force_window(scene_of(2, duration)) == window
+
+
+@pytest.mark.parametrize(
+    ("dimension", "name", "column"),
+    [(2, "x", 0), (2, "y", 1), (2, "vx", 0), (2, "vy", 1), (2, "omega", 2),
+     (3, "x", 0), (3, "y", 1), (3, "z", 2), (3, "vx", 0), (3, "vy", 1), (3, "vz", 2),
+     (3, "wx", 3), (3, "wy", 4), (3, "wz", 5)],
+)  # fmt: skip
+def test_coordinates_are_those_of_the_body_at_the_end_or_between_samples(dimension, name, column):
+    sign = 1.0 if name in "xyz" else -1.0
+    scene, trajectory = scene_of(dimension), moving(dimension)
+    assert quantity(scene, trajectory, f"ball.{name}") == (sign * (104.0 + 10.0 * column), "")
+    assert quantity(scene, trajectory, f"top.{name}", 1.25) == (sign * (201.25 + 10.0 * column), "")
+    assert quantity(scene, trajectory, f"top.{name}", 0.0) == (sign * (200.0 + 10.0 * column), "")
+
+
+@pytest.mark.parametrize("name", ["ball.z", "ball.vz"])
+def test_a_plane_has_no_third_axis(name):
+    with pytest.raises(AssertionError):
+        quantity(scene_of(2), moving(2), name)
+
+
+def test_an_angle_in_the_plane_counts_all_turns_since_the_start():
+    """Three turns and a half, sampled as angles between -pi and pi, from 1 rad."""
+    angle = 1.0 + np.linspace(0.0, 7.0 * math.pi, 200)
+    pose = np.zeros((200, 3, 3))
+    pose[:, 1, 2] = np.arctan2(np.sin(angle), np.cos(angle))
+    trajectory = Trajectory(np.linspace(0.0, 1.0, 200), pose, np.zeros_like(pose), None, 1 / 199, "completed")
+    assert quantity(scene_of(2), trajectory, "ball.angle") == (pytest.approx(7.0 * math.pi), "")
+    assert quantity(scene_of(2), trajectory, "ball.angle", 0.0) == (pytest.approx(0.0), "")
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.48, 0.6, 0.64)])
+@pytest.mark.parametrize("turn", [0.0, 0.4, 1.7, 3.0])
+def test_an_angle_in_space_is_that_of_the_rotation_whatever_its_axis_and_start(axis, turn):
+    def quaternion(about, by):
+        return np.array([math.cos(by / 2), *(math.sin(by / 2) * np.array(about))])
+
+    def product(p, q):
+        (a, *u), (b, *v) = p, q
+        u, v = np.array(u), np.array(v)
+        return np.array([a * b - u @ v, *(a * v + b * u + np.cross(u, v))])
+
+    start = quaternion((0.6, 0.0, 0.8), 0.9)
+    pose = np.zeros((2, 3, 7))
+    pose[:, :, 3] = 1.0
+    pose[0, 1, 3:], pose[1, 1, 3:] = start, product(quaternion(axis, turn), start)
+    trajectory = Trajectory(np.array([0.0, 1.0]), pose, np.zeros((2, 3, 6)), None, 1.0, "completed")
+    value, why = quantity(scene_of(3), trajectory, "ball.angle")
+    assert (value, why) == (pytest.approx(turn, abs=1e-12), "")
+    assert quantity(scene_of(3), trajectory, "ball.angle", 0.0)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_name_with_a_slash_is_that_of_its_body():
+    scene = scene_of(2)
+    named = Scene("s", 1, 2, (*scene.bodies[:2], Body("a/b", Disc(0.5))), (Pair(),), (0.0, 0.0), 4.0)
+    assert quantity(named, moving(2), "a/b.y") == (214.0, "")
+
+
+def pushed(dimension, rows_per_sample, dt=0.25, samples=17):
+    """Contacts (a, b, impulse on b) at every sample from the first step on."""
+    still = moving(dimension, samples, dt)
+    flat = [(a, b, (0.0,) * dimension, (0.0,) * dimension, f, 0.0) for rows in rows_per_sample for a, b, f in rows]
+    offset = np.cumsum([0, *(len(rows) for rows in rows_per_sample)])
+    step = np.arange(1, 1 + len(rows_per_sample))
+    record = ContactRecord(step, offset, Contacts.from_rows(flat, dimension))
+    return Trajectory(still.t, still.pose, still.twist, record, dt, "completed")
+
+
+#: 16 steps of 1/4 s: absurd impulses but for the last four, which are the last second.
+LAST_SECOND = [[(0, 1, (900.0, 900.0))]] * 12 + [[(0, 1, (0.5, f)), (1, 2, (0.0, 1.0))] for f in (1.0, 2.0, 3.0, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("name", "force"),
+    [
+        ("ball.fy", (10.0 - 4.0) / 1.0),  # the floor pushes up, the body above pushes down
+        ("ball.fx", 2.0),
+        ("floor/ball.fy", 10.0),
+        ("ball/floor.fy", -10.0),
+        ("top.fy", 4.0),
+        ("ball/top.fy", 4.0),
+        ("top/ball.fy", -4.0),
+        ("floor.fy", -10.0),
+        ("floor/top.fy", 0.0),
+    ],
+)
+def test_forces_are_signed_by_who_is_pushed_and_mean_over_the_last_second(name, force):
+    assert quantity(scene_of(2), pushed(2, LAST_SECOND), name) == (pytest.approx(force), "")
+
+
+def test_forces_in_space_have_three_components():
+    trajectory = pushed(3, [[(0, 1, (1.0, 2.0, 3.0))]] * 16)
+    forces = [quantity(scene_of(3), trajectory, f"ball.{name}")[0] for name in ("fx", "fy", "fz")]
+    assert forces == pytest.approx([4.0, 8.0, 12.0])
+
+
+def test_a_force_that_is_not_there_says_why():
+    assert quantity(scene_of(2), moving(2), "ball.fy") == (None, "contacts were not recorded")
+    assert quantity(scene_of(2), pushed(2, []), "ball.fy") == (None, "contacts were not recorded")
+    blank = pushed(2, [[(0, 1, (math.nan, math.nan))]] * 16)
+    assert quantity(scene_of(2), blank, "ball.fy") == (None, UNAVAILABLE)
+    assert quantity(scene_of(2), blank, "top.fy") == (0.0, "")

@@ -1,0 +1,186 @@
+"""Bounds of the four scenes, worked out once more from their derivations, number by number, with units and sources."""
+
+import math
+
+import pytest
+
+from validation.scenes import CATALOGUE
+from validation.tolerances import impact_checks, incline_checks, stack_checks
+
+DT = 1 / 240
+#: What a thousand updates of one unit of round-off leave, with a factor of five.
+ROUND_OFF = 1e-12
+
+
+def checks_of(name, dimension=2, dt=DT, **params):
+    canonical = CATALOGUE[name]
+    return {check.metric: check for check in canonical.checks(canonical.scene(dimension, params), dt)}
+
+
+def bounds_of(name, **kwargs):
+    return {metric: check.bound for metric, check in checks_of(name, **kwargs).items()}
+
+
+def test_an_impact_is_exact_to_round_off_of_its_speed_and_momentum():
+    found = checks_of("impact", e=0.8, v=6.0, mass=0.5)
+    assert {m: (c.unit, c.bound, c.truth) for m, c in found.items()} == {
+        "rebound_ratio": ("1", ROUND_OFF, pytest.approx(0.8, abs=1e-15)),
+        "rebound_speed": ("m/s", ROUND_OFF * 6.0, pytest.approx(4.8, abs=1e-15)),
+        "velocity_change": ("m/s", ROUND_OFF * 6.0, pytest.approx(10.8, abs=1e-14)),
+        "impulse": ("N s", ROUND_OFF * 3.0, pytest.approx(5.4, abs=1e-14)),
+        "momentum_defect": ("1", ROUND_OFF, 0.0),
+    }
+    assert {c.source for m, c in found.items() if m != "momentum_defect"} == {
+        "Newton's law of restitution; one contact, no external force"
+    }
+    assert found["momentum_defect"].source == "conservation of momentum"
+
+
+def apex_bounds(e, height, g, dt):
+    """Every bounce costs (1 - e^2 + e (1 + e)/2) v dt, where v is the speed of that impact; what was lost before
+    shrinks by e^2 in the next."""
+    v0 = math.sqrt(2.0 * g * height)
+    cost = [(1.0 - e**2 + e * (1.0 + e) / 2.0) * v0 * e**k * dt for k in range(5)]
+    summed = [sum(c * e ** (2 * (n - k)) for k, c in enumerate(cost[: n + 1])) + g * dt**2 / 8.0 for n in range(5)]
+    speeds = [v0 * e ** (n + 1) for n in range(5)]
+    return {n + 1: bound for n, (bound, v) in enumerate(zip(summed, speeds, strict=True)) if v > 20.0 * g * dt}
+
+
+@pytest.mark.parametrize(("e", "height", "g"), [(0.5, 1.0, 9.81), (0.8, 1.25, 9.81), (0.95, 1.0, 3.7)])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 4000])
+def test_apexes_are_as_wrong_as_the_late_bounces_before_them(e, height, g, dt):
+    found = checks_of("bounce", dt=dt, e=e, height=height, g=g)
+    expected = {f"apex[{n}]": pytest.approx(bound, rel=1e-12) for n, bound in apex_bounds(e, height, g, dt).items()}
+    apexes = {m: c for m, c in found.items() if m.startswith("apex[")}
+    assert {m: c.bound for m, c in apexes.items()} == expected
+    assert {m: c.truth for m, c in apexes.items()} == {
+        f"apex[{n}]": pytest.approx(height * e ** (2 * n)) for n in apex_bounds(e, height, g, dt)
+    }
+    assert {c.unit for c in apexes.values()} <= {"m"}
+
+
+def test_the_first_bounce_in_numbers():
+    """e = 1/2 from 1 m under 8 m/s^2 at 1/256 s: 4 m/s, a cost of 9/8 v dt, and 8/65536/8 m of the first parabola."""
+    first = checks_of("bounce", dt=1 / 256, e=0.5, height=1.0, g=8.0)["apex[1]"]
+    assert first.bound == pytest.approx(9 / 8 * 4 / 256 + 1 / 65536, rel=1e-14)
+    assert first.source == "energy balance of a bounce found late by <= dt"
+
+
+def test_an_arc_counts_only_if_it_starts_faster_than_twenty_steps_of_gravity():
+    """From 1 m under 8 m/s^2 speeds are 4, 2, 1, 0.5 m/s at e = 1/2; at 1/160 s twenty steps of gravity are 1 m/s."""
+    assert {m for m in checks_of("bounce", dt=1 / 160, e=0.5, g=8.0) if m.startswith("apex[")} == {"apex[1]"}
+    assert {m for m in checks_of("bounce", dt=1 / 161, e=0.5, g=8.0) if m.startswith("apex[")} == {"apex[1]", "apex[2]"}
+
+
+def test_the_ratio_of_intervals_needs_three_arcs():
+    assert "apex_interval_ratio" not in checks_of("bounce", dt=1 / 161, e=0.5, g=8.0)
+    three = checks_of("bounce", dt=1 / 321, e=0.5, g=8.0)
+    assert "apex[3]" in three and "apex[4]" not in three and "apex_interval_ratio" in three
+
+
+@pytest.mark.parametrize(("e", "height", "g", "dt"), [(0.8, 1.0, 9.81, 1 / 240), (0.5, 2.0, 1.62, 1 / 960)])
+def test_intervals_carry_the_speed_errors_of_both_arcs_and_a_step(e, height, g, dt):
+    check = checks_of("bounce", dt=dt, e=e, height=height, g=g)["apex_interval_ratio"]
+    v = [math.sqrt(2.0 * g * height) * e**n for n in range(4)]
+    wrong_speed = {n: bound * g / v[n] for n, bound in apex_bounds(e, height, g, dt).items() if n < 4}
+    first, second = (v[1] + v[2]) / g, (v[2] + v[3]) / g
+    off_first = (wrong_speed[1] + wrong_speed[2]) / g + dt
+    off_second = (wrong_speed[2] + wrong_speed[3]) / g + dt
+    # The largest ratio that both errors allow: (second + off_second)/(first - off_first), less second/first.
+    assert check.bound == pytest.approx((second + off_second) / (first - off_first) - second / first, rel=1e-9)
+    assert check.truth == pytest.approx(e)
+    assert (check.unit, check.source) == ("1", "t_n = (v_n + v_(n+1))/g")
+
+
+@pytest.mark.parametrize(("height", "g", "dt"), [(1.0, 9.81, 1 / 240), (4.0, 8.0, 1 / 128)])
+def test_growth_allows_the_top_of_the_first_parabola_and_nothing_else(height, g, dt):
+    check = checks_of("bounce", dt=dt, height=height, g=g)["apex_growth"]
+    assert check.bound == pytest.approx(g * (dt / 2) ** 2 / 2 / height + ROUND_OFF, rel=1e-12)
+    assert (check.truth, check.unit, check.source) == (0.0, "1", "conservation of energy")
+
+
+@pytest.mark.parametrize(("e", "dt"), [(0.8, 1 / 240), (0.5, 1 / 60), (0.95, 1 / 1000)])
+def test_rest_allows_a_step_a_bounce_the_tail_and_the_scatter_of_phases(e, dt):
+    height, g = 1.0, 9.81
+    check = checks_of("bounce", dt=dt, e=e, height=height, g=g)["rest_time"]
+    v0, slow = math.sqrt(2.0 * g * height), 2.0 * g * dt
+    bounces = math.log(v0 / slow, 1.0 / e)
+    assert v0 * e**bounces == pytest.approx(slow)
+    tail = 2.0 * slow / g / (1.0 - e) / dt  # the series of flights 2 v/g from 2 g dt down
+    one_phase = (1.0 - e**2) / e * 0.289 * 2.0 / (1.0 - e)
+    assert check.bound == pytest.approx((bounces + tail + 4.0 * math.sqrt(bounces) * one_phase + 1.0) * dt, rel=1e-12)
+    assert (check.unit, check.source) == ("s", "geometric series of bounce times")
+    assert f"each of {bounces:.0f} bounces" in check.because
+
+
+def test_rest_of_a_ball_that_does_not_bounce_is_its_one_impact_and_a_tail_of_four_steps():
+    assert bounds_of("bounce", e=0.0)["rest_time"] == pytest.approx((1 + 4 + 1) * DT, rel=1e-14)
+
+
+def test_rest_of_a_ball_slower_than_two_steps_of_gravity_has_one_bounce():
+    """From g dt^2 the ball lands with sqrt(2) g dt, below the speed from which bounces are counted."""
+    e, g, dt = 0.5, 8.0, 1 / 64
+
+    def bound(bounces):
+        return (bounces + 4 / 0.5 + 4 * math.sqrt(bounces) * 2 / 0.5 * 0.75 / 0.5 * 0.289 + 1) * dt
+
+    found = bounds_of("bounce", e=e, g=g, height=g * dt * dt, dt=dt)["rest_time"]
+    assert found == pytest.approx(bound(1.0), rel=1e-12)
+    # From 3.125 g dt^2 it lands with 2.5 g dt, and log(1.25) to the base 2 bounces are above 2 g dt.
+    found = bounds_of("bounce", e=e, g=g, height=3.125 * g * dt * dt, dt=dt)["rest_time"]
+    assert found == pytest.approx(bound(math.log2(1.25)), rel=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("n", "mass", "g"), [(1, 1.0, 9.81), (5, 2.0, 3.7)])
+def test_a_stack_may_do_what_one_step_of_free_fall_adds(dimension, n, mass, g):
+    found = checks_of("stack", dimension, n=n, mass=mass, g=g, duration=5.0)
+    v1, top = g * DT, n - 0.5
+    assert {m: (c.unit, c.bound) for m, c in found.items()} == {
+        "settle_time": ("s", pytest.approx(100 * n * DT)),
+        "drift": ("m", pytest.approx(n * g * DT**2, rel=1e-12)),
+        "penetration": ("m", pytest.approx(g * DT**2 + ROUND_OFF * top, rel=1e-12)),
+        "kinetic_energy": ("J", pytest.approx(n * mass * v1**2 / 2e4, rel=1e-12)),
+        "impulse_scatter": ("1", 0.02),
+        **{f"interface_impulse[{i}]": ("1", pytest.approx(0.02 * DT)) for i in range(1, n + 1)},
+    }
+    assert {m: c.truth for m, c in found.items()} == {m: 1.0 if "[" in m else 0.0 for m in found}
+    assert {c.source for m, c in found.items() if "[" not in m} == {"static equilibrium"}
+    assert {c.source for m, c in found.items() if "[" in m} == {"weight above the interface"}
+
+
+def test_the_overlap_of_a_high_column_is_told_to_the_round_off_of_its_height():
+    """A step so short that free fall adds less than the round-off of the place of the top body."""
+    bound = checks_of("stack", n=1000, dt=1e-7, duration=5.0)["penetration"].bound
+    assert bound == pytest.approx(9.81e-14 + 999.5e-12, rel=1e-9)
+
+
+def test_a_stack_must_rest_in_its_last_second_however_short_the_run():
+    assert bounds_of("stack", n=5, duration=2.0)["settle_time"] == pytest.approx(1.0)
+    assert bounds_of("stack", n=2, duration=1.5)["settle_time"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("g", "duration"), [(9.81, 2.0), (3.7, 8.0)])
+def test_a_box_that_sticks_may_move_by_one_step_and_one_that_slides_misses_a_hundredth_of_a_step(g, duration):
+    (creep,) = checks_of("incline", ratio=0.9, g=g, duration=duration).values()
+    assert (creep.metric, creep.unit, creep.truth) == ("creep", "m/s", 0.0)
+    assert creep.bound == pytest.approx(g * DT**2 / duration, rel=1e-14)
+    assert creep.source == "Coulomb's law, static"
+    (slide,) = checks_of("incline", ratio=1.1, g=g, duration=duration).values()
+    assert (slide.metric, slide.unit) == ("acceleration", "m/s^2")
+    assert slide.bound == pytest.approx(0.01 * g * DT / (duration / 2.0), rel=1e-14)
+    assert slide.source == "Coulomb's law, kinetic"
+    assert "g dt/100" in slide.because
+    theta = math.atan(0.55)
+    assert slide.truth == pytest.approx(g * (math.sin(theta) - 0.5 * math.cos(theta)), rel=1e-12)
+
+
+@pytest.mark.parametrize("rule", [impact_checks, incline_checks, stack_checks])
+def test_rules_take_the_truth_they_are_given_and_no_other(rule):
+    """A rule that looked up a truth of its own would judge a scene by something else than its law."""
+    name = rule.__name__.removesuffix("_checks")
+    scene = CATALOGUE[name].scene(2)
+    truth = {metric: 10.0 + k for k, metric in enumerate(CATALOGUE[name].exact(scene))}
+    truth.pop("momentum_defect", None)  # a defect: its truth is 0 by what the word means
+    stated = {c.metric: c.truth for c in rule(scene, DT, truth) if c.metric in truth}
+    assert stated == truth
