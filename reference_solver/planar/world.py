@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Self
 
 import numpy as np
 
@@ -91,10 +92,17 @@ class World:
             copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
 
+    def copy(self) -> Self:
+        """Return a world of its own in the same state.
+
+        Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
+        and of another type, for which all kernels would be compiled anew.
+        """
+        return deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
+
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
-        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
-        trial = deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
+        trial = self.copy()
         trial._options = self._options._replace(scheme=FIXED_STEP)
         while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
             trial._grow()

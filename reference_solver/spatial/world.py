@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Self
 
 import numpy as np
 
@@ -92,11 +93,17 @@ class World:
             return _contacts(buffer, copy_ledger(self._ledger, buffer, 0))
         return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
 
+    def copy(self) -> Self:
+        """Return a world of its own in the same state.
+
+        Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
+        and of another type, for which all kernels would be compiled anew.
+        """
+        return deepcopy(self, {id(table): table for table in (self._detection.restitution, self._detection.friction)})
+
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step; the world stays what it is."""
-        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
-        tables = (self._detection.restitution, self._detection.friction)
-        trial, found = deepcopy(self, {id(table): table for table in tables}), -1
+        trial, found = self.copy(), -1
         while found < 0:
             found = pose_problem(trial._bodies, trial._detection, trial._manifolds, trial._memory, trial._options)
             if found < 0:

@@ -13,6 +13,7 @@ from typing import Any
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
+from reference_solver.linking import Carried
 
 
 def operation(function: Callable[..., Any]) -> Any:
@@ -27,7 +28,7 @@ def operation(function: Callable[..., Any]) -> Any:
         chosen.table = table  # type: ignore[attr-defined]
         return chosen
 
-    options: Any = INNER_OPTIONS
+    options: Any = INNER_OPTIONS | {"pipeline_class": Carried}
 
     @overload(function, jit_options=options, strict=False)
     def pick(first: Any, *others: Any) -> Any:
