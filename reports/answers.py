@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from reports.cures import decided_by
 from reports.findings import severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
@@ -23,6 +24,10 @@ Costs = Mapping[tuple[str, int, str, str], float]
 CLEAR = 0.8
 #: Values that differ by less than this share of what the truth spans are one value.
 SAME = 0.05
+
+
+#: Said of a scene of which no engine of the run gave anything that is judged.
+UNASKED = "no verdict: it cannot be asked of the engines of this run"
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Choice:
-    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest to it."""
+    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest, if any."""
 
     scene: str
     good: tuple[str, ...]
@@ -58,6 +63,8 @@ class Choice:
     @property
     def line(self) -> str:
         """``mujoco/tuned (0.2 ms/s), reference/reference``."""
+        if not self.good and not self.nearest:
+            return UNASKED
         return ", ".join(self.good) if self.good else f"nobody passes every row; nearest is {self.nearest}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -146,7 +153,11 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     others = {name: group for name, group in own.items() if name != profile}
     good = [name for name, group in others.items() if not _failing(group)]
     if good:
-        return f"{' or '.join(good)} cures it"
+        row = own[profile][0]
+        which = (row["engine"], row["engine_version"], row["scene"], profile)
+        by = {name: decided_by(*which, name) for name in good}
+        said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
+        return ", ".join([f"{' or '.join(good)} cures it", *said])
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):

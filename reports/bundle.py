@@ -5,6 +5,7 @@ environment.json     machine, Python, packages, commit, plan
 observations.jsonl   raw measurements, one cell per line; verdicts are derived from them
 rows.jsonl, rows.csv every judged value
 timings.csv          raw timings of the bench, if there is one
+scenes/              scene files that ran, as they were when it began
 report.html          the report
 CITATION.cff         how to cite, with run and commit
 SHA256SUMS           checksums, as ``sha256sum -c`` reads them
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zipfile
 from collections.abc import Mapping
 from importlib.metadata import distributions
@@ -56,7 +58,9 @@ def write_bundle(folder: Path, run: str, path: Path) -> list[str]:
     """
     source = load_source(folder, run)
     texts = _texts(source, folder)
-    contents = "\n".join(f"{name:<20} {what}" for name, what in CONTENTS.items() if name in texts)
+    listed = {name: what for name, what in CONTENTS.items() if name in texts}
+    listed |= {name: "a scene file that ran" for name in texts if name.startswith("scenes/")}
+    contents = "\n".join(f"{name:<20} {what}" for name, what in listed.items())
     texts = {"README.txt": README.format(run=source.run.id, contents=contents), **texts}
     sums = "".join(f"{hashlib.sha256(text.encode()).hexdigest()}  {name}\n" for name, text in texts.items())
     texts["SHA256SUMS"] = sums
@@ -80,7 +84,17 @@ def _texts(source: Source, folder: Path) -> dict[str, str]:
         store = Store(folder, create=False)
         texts["timings.csv"] = speed.raw_of(store, source.bench.run).map(cell).to_csv(index=False)
         store.close()
-    return texts | {"report.html": render(source), "CITATION.cff": citation(source.run)}
+    return texts | {"report.html": render(source), "CITATION.cff": citation(source.run)} | _scene_files(source)
+
+
+def _scene_files(source: Source) -> dict[str, str]:
+    """Texts of scene files as ``scenes/<hash>-<name>``: names of two folders do not meet, and none leads out of it."""
+    found = {}
+    for pinned, text in source.scenes_kept.items():
+        path, _, digest = pinned.rpartition("@")
+        name = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(path).name)
+        found[f"scenes/{digest}-{name}"] = text
+    return found
 
 
 def _environment(source: Source) -> dict[str, Any]:

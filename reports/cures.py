@@ -7,19 +7,31 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters import registry
+from reports.wording import params_text
 from validation.cells import Observation
+from validation.decisive import ALONE, COMPLETES, NEEDED, decisive
+from validation.experiments import belongs_of
 from validation.posed import resolve
 from validation.tracks import SHOWN
+
+#: What a setting's part in a cure is called.
+ROLES = {
+    ALONE: "enough alone",
+    NEEDED: "needed",
+    COMPLETES: "completes it; another might stand for it",
+    "": "not needed",
+}
 
 
 @dataclass(frozen=True)
 class Change:
-    """A setting that differs between two profiles of one engine."""
+    """A setting that differs between two profiles; ``role`` is whether it matters, where that was measured."""
 
     name: str
     before: str
     after: str
     because: str
+    role: str = ""
 
 
 def settings_of(
@@ -58,12 +70,32 @@ def changes(
     """Settings that profile ``after`` sets otherwise than ``before``, on this scene."""
     old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
     new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
+    measured = decisive(engine, scene, before, after)
+    roles = {part.setting: ROLES[part.decides] for part in measured.parts} if measured else {}
+    belongs = belongs_of(engine)
     found = []
     for name, setting in new.items():
         if name not in old or old[name]["value"] != setting["value"]:
             was = setting_text(old[name]["value"]) if name in old else "as shipped"
-            found.append(Change(name, was, setting_text(setting["value"]), setting["because"]))
+            role = roles.get(name) or (f"belongs to {belongs[name]}" if measured and name in belongs else "")
+            found.append(Change(name, was, setting_text(setting["value"]), setting["because"], role))
     return found
+
+
+def decided_by(engine: str, version: str, scene: str, before: str, after: str) -> str:
+    """Settings that decide a cure, as `validation.decisive` measured them; empty if nobody did with this release."""
+    measured = decisive(engine, scene, before, after)
+    return measured.text if measured is not None and measured.version == version else ""
+
+
+def how_measured(engine: str, scene: str, before: str, after: str) -> str:
+    """One sentence: what decides a cure, on which checks and cells, with which release; or that nobody measured."""
+    measured = decisive(engine, scene, before, after)
+    if measured is None:
+        return "Which of these matters was not measured, setting by setting: they are the profiles' difference."
+    cells = "; ".join(params_text(cell) or "defaults" for cell in measured.cells)
+    what = f"{', '.join(measured.metrics) or 'all checks'} of {scene} {measured.dimension}-D at {cells}"
+    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {measured.text}."
 
 
 def pasteable(

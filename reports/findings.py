@@ -17,6 +17,8 @@ from validation.posed import is_file
 Plain = Mapping[str, Any]
 #: Marks that make the command exit with 1.
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
+#: Outcomes of cells that were not run, and what they are called.
+REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
 #: Marks in the order in which findings are shown.
 ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
@@ -100,13 +102,17 @@ def families(rows: Iterable[Plain]) -> list[Family]:
     return found
 
 
-def refusals(rows: Iterable[Plain]) -> Iterator[str]:
-    """One line per engine and scene file that it cannot run, with its reason: no fault of either."""
+def refusals(rows: Sequence[Plain]) -> Iterator[str]:
+    """One line per engine and scene that it cannot run, with its reason: no fault of either.
+
+    Of the catalogue's scenes the matrix says enough, unless nothing else is there to be said.
+    """
     found: dict[tuple[Any, ...], None] = {}
+    nothing = all(row["outcome"] in REFUSED for row in rows)
     for row in rows:
-        if row["outcome"] == "unsupported" and is_file(row["scene"]):
-            found[row["engine"], row["scene"], row["reason"]] = None
-    return (f"UNSUPPORTED: {engine} {scene}: {reason}" for engine, scene, reason in found)
+        if row["outcome"] in REFUSED and (nothing or (is_file(row["scene"]) and row["outcome"] == "unsupported")):
+            found[REFUSED[row["outcome"]], row["engine"], row["scene"], row["reason"]] = None
+    return (f"{label}: {engine} {scene}: {reason}" for label, engine, scene, reason in found)
 
 
 def severity(row: Plain) -> float:

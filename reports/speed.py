@@ -261,6 +261,6 @@ def quality_line(timings: pd.DataFrame) -> str:
     narrow = (used["width"] < 0.05).mean()
     return (
         f"{len(used)} units timed, {int(used['rounds'].sum())} timings; interval of the median under 5 % for "
-        f"{narrow:.0%}, median {used['width'].median():.1%}; {int(used['drifts'].sum())} drift; "
+        f"{100 * narrow:.0f} %, median {100 * used['width'].median():.1f} %; {int(used['drifts'].sum())} drift; "
         f"wall / CPU time {used['load'].median():.2f} (median); {len(timings) - len(used)} void"
     )

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from reports.answers import Costs, answers, choices
-from reports.findings import alarms, families, refusals
+from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, versions_of
 
 Plain = Mapping[str, Any]
@@ -27,7 +27,8 @@ def show(rows: Sequence[Plain], console: Console, costs: Costs | None = None, fi
     matrix = matrix_of(rows)
     for table in tables_of(matrix, versions_of(rows), console.width):
         console.print(table)
-    console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
+    if any(row["outcome"] not in REFUSED for row in rows):
+        console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
     for line in sweeps_of(matrix):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
@@ -76,8 +77,12 @@ def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> No
 
 def _answers(rows: Sequence[Plain], console: Console) -> None:
     found = answers(rows)
-    fails = any(row["physics"] != "pass" for row in rows)
-    nothing = "Only rows at other iteration counts, or without a verdict, do not pass" if fails else "Every row passes"
+    if all(row["outcome"] in REFUSED for row in rows):
+        nothing = "Nothing was judged: no engine of this run can be asked any of it"
+    elif any(row["physics"] != "pass" for row in rows):
+        nothing = "Only rows at other iteration counts, or without a verdict, do not pass"
+    else:
+        nothing = "Every row passes"
     _heading("What is wrong, and what cures it" if found else nothing, console)
     for answer in found:
         console.print(_folded(answer.line, console))
@@ -87,13 +92,16 @@ def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> No
     found = families(rows)
     failing = sum(len(family.rows) for family in found)
     _heading("Where the details are", console)
-    engine = found[0].engine if found else "NAME"
-    for command, what in (
-        ("crosscheck findings", f"{failing} rows that fail, in {len(found)} families"),
-        (f"crosscheck findings --engine {engine}", "the same of one engine; --scene, --new"),
-        ("crosscheck explain ID", "one row: why, and what cures it"),
-        ("crosscheck report --open", "one page about all of it"),
-    ):
+    engine = found[0].engine if found else ""
+    commands = [("crosscheck report --open", "one page about all of it")]
+    if found:
+        commands = [
+            ("crosscheck findings", f"{failing} rows that fail, in {len(found)} families"),
+            (f"crosscheck findings --engine {engine}", "the same of one engine; --scene, --new"),
+            ("crosscheck explain ID", "one row: why, and what cures it"),
+            *commands,
+        ]
+    for command, what in commands:
         console.print(Text(f"  {command:<38} {what}"))
     written = [str(path) for path in files]
     if written:

@@ -83,6 +83,14 @@ def measured(row: Mapping[str, Any], digits: int = 4) -> str:
     return quantity(row["value"], row["unit"], digits)
 
 
+def missing_text(missing: int, planned: int) -> str:
+    """What is said of a run of which cells are missing."""
+    return (
+        f"{missing} of {planned} planned cells left no observation; nothing here speaks of them. The command that "
+        "began the run resumes it."
+    )
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """Sensible digits: plain between 1e-3 and 1e5, else with an exponent."""
     if value is None:

@@ -228,6 +228,12 @@ class Store:
             rows.sort(key=lambda row: order.get(row[0], len(order)))
             return [observation_from_dict(json.loads(body)) for _, body in rows]
 
+    def missing(self, run: Run) -> int:
+        """How many cells of the plan of a run left no observation: it was interrupted, or rows of it are gone."""
+        with self._guarded("read"):
+            rows = self._db.execute("SELECT slot FROM observations WHERE run = ?", (run.id,)).fetchall()
+            return len(set(run.plan) - {slot for (slot,) in rows})
+
     def scenes(self, run: Run) -> dict[str, str]:
         """Texts of the scene files of a run, by the name that its slots have for them."""
         with self._guarded("read"):

@@ -16,6 +16,7 @@ from rich.table import Table
 from adapters import registry
 from reports.command.group import AS_JSON, OUT, main
 from reports.progress import run_plan
+from reports.terminal import terminal
 from reports.wording import number
 from validation.acceptance import Change, Proposal, accepted, propose, slots_to_move
 from validation.cells import Observation, prepare
@@ -47,7 +48,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     finding is listed to be shown, not to be hidden.
     """
     registry.find(engine)
-    console = Console(stderr=True, markup=False)
+    console = terminal(stderr=True)
     proposal = propose(_rows_with_scatter(out, run, engine, jobs, console), engine, findings_of(engine))
     unknown = set(families) - {change.family.id for change in proposal.changes}
     if unknown:

@@ -26,6 +26,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from reports.stages import stage
+from reports.terminal import terminal
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.primary import PRIMARY
@@ -57,7 +58,7 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
     than 90 % of the ratios agree.
     """
-    console = Console(stderr=True, markup=False)
+    console = terminal(stderr=True)
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
     options["full"] = not options["quick"]

@@ -16,13 +16,13 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from reference_solver.certification import Gate
 from reference_solver.certification.orders import PHASES, RATES, orders
 from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, trials
 from reports.command.group import AS_JSON, main
+from reports.terminal import terminal
 from reports.wording import number
 
 #: Modules of `reference_solver.certification` that answer for gates, in the order in which they are measured and shown.
@@ -53,9 +53,9 @@ WIDTH = 150
 )
 def certify(as_json: bool, order: bool, self_test: bool) -> None:
     """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold."""
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     if not console.is_terminal:
-        console = Console(stderr=True, width=WIDTH)
+        console = terminal(stderr=True, width=WIDTH)
     if order:
         show_orders(console, as_json)
         return
@@ -82,7 +82,7 @@ def show_orders(console: Console, as_json: bool) -> None:
         table.add_column(heading, no_wrap=True)
     for row in found:
         slope = "round-off" if row.order is None else f"{row.order:.2f}"
-        table.add_row(escape(row.case), row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
+        table.add_row(row.case, row.made_by, slope, number(row.errors[0], 3), number(row.errors[-1], 3))
     console.print(table)
 
 
@@ -103,7 +103,7 @@ def show_self_test(console: Console, as_json: bool) -> int:
     for corruption, group in groupby(made, lambda trial: trial.corruption):
         seen = [trial.seen[0] if trial.seen else "MISSED" for trial in group]
         why = corruption.missed if "MISSED" in seen else ""
-        table.add_row(corruption.family, escape(corruption.name), corruption.scene, *seen, why)
+        table.add_row(corruption.family, corruption.name, corruption.scene, *seen, why)
     console.print(table)
     judged = [trial for trial in made if trial.size == JUDGED]
     caught = sum(bool(trial.seen) for trial in judged)
@@ -124,7 +124,7 @@ def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: C
         for job in as_completed(jobs):
             results[jobs[job]] = job.result()
             elapsed = time.perf_counter() - start
-            console.print(f"[dim]{len(results)}/{len(parts)} {jobs[job]}, {elapsed:.0f} s after the start[/dim]")
+            console.print(f"{len(results)}/{len(parts)} {jobs[job]}, {elapsed:.0f} s after the start", style="dim")
     return results
 
 
@@ -149,6 +149,6 @@ def _table(gates: Iterable[Gate]) -> Table:
         table.add_column(heading)
     for gate in gates:
         mark = "holds" if gate.holds else "FAILS"
-        words = (escape(gate.quantity), escape(gate.case))  # [m] is a unit, not a style
+        words = (gate.quantity, gate.case)
         table.add_row(*words, number(gate.measured), number(gate.gate), gate.made_by, mark)
     return table

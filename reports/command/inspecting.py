@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
 from adapters import registry
 from adapters.scene import SceneError
 from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
+from reports.terminal import terminal
 from validation.detection import Seen, detection, lines, only_by_receipts
 from validation.store import Store
 
@@ -48,9 +48,9 @@ def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool
     if as_json:
         click.echo(json.dumps(data, indent=1))
     elif sensitivity:
-        tables.sensitivity(data, only_by_receipts(seen), Console())
+        tables.sensitivity(data, only_by_receipts(seen), terminal())
     else:
-        tables.listed(what, data, Console())
+        tables.listed(what, data, terminal())
 
 
 @main.command()
@@ -62,7 +62,7 @@ def describe(name: str, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(data, indent=1, default=str))
     else:
-        tables.described(data, Console())
+        tables.described(data, terminal())
 
 
 @main.command()
@@ -73,7 +73,7 @@ def doctor(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(data, indent=1))
     else:
-        tables.health(data, Console())
+        tables.health(data, terminal())
     sys.exit(1 if any("is not ours" in problem for problem in data["problems"]) else 0)
 
 

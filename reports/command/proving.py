@@ -9,10 +9,10 @@ from dataclasses import asdict
 from typing import Any
 
 import click
-from rich.console import Console
 from rich.text import Text
 
 from adapters import registry
+from reports.terminal import terminal
 from reports.wording import number, params_text, reproduce
 from validation.experiments import Experiment, experiments_of
 from validation.findings import FindingsError
@@ -46,10 +46,10 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
 
 def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
     """Run the experiments, print what came out, and exit with 1 unless all show what they say."""
-    console = Console()
+    console = terminal()
     proofs: list[Proof] = []
     for engine, experiments in chosen(reason, engines).items():
-        with Console(stderr=True).status(f"{engine}: {len(experiments)} experiments"):
+        with terminal(stderr=True).status(Text(f"{engine}: {len(experiments)} experiments")):
             proofs += prove(engine, experiments)
     if as_json:
         click.echo(json.dumps([_plain(proof) for proof in proofs], indent=1))

@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from adapters.engine import EngineError
 from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.stages import stage
+from reports.terminal import terminal
+from reports.wording import missing_text
 from validation.store import Store
 
 
@@ -32,11 +33,16 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
     path = writable(output or out / "report.html", "output")
     with _extra("report"):
         from reports.page import load_source, render
-    with stage(Console(stderr=True), "report"):
+    with stage(terminal(stderr=True), "report"):
         source = load_source(out, run)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(render(source), encoding="utf-8")
-    click.echo(json.dumps({"run": source.run.id, "path": str(path)}) if as_json else str(path))
+    if source.missing:
+        said = missing_text(source.missing, len(source.run.plan))
+        click.echo(f"crosscheck: run {source.run.id}: {said}", err=True)
+    click.echo(
+        json.dumps({"run": source.run.id, "path": str(path), "missing": source.missing}) if as_json else str(path)
+    )
     if show and not webbrowser.open(path.resolve().as_uri()):
         click.echo(f"crosscheck: open: no browser was found; the report is {path}", err=True)
 

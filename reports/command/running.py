@@ -22,6 +22,7 @@ from reports.command.selection import JOBS, SECONDS, missing, request_from, sele
 from reports.progress import run_plan
 from reports.stages import warm_up
 from reports.summary import show
+from reports.terminal import terminal
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import pinned, resolve
@@ -47,7 +48,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
     if not all of it ran.
     """
-    console = Console(stderr=True, markup=False)
+    console = terminal(stderr=True)
     options["full"] = not options["quick"]
     for name in ("junit", "markdown"):
         if options[name]:
@@ -97,7 +98,7 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
     `run` and `bench` do so by themselves; tests that run side by side would each compile the same.
     """
     options["full"] = not options["quick"]
-    done = warm_up(slots(request_from(options)), 0, Console(stderr=True, markup=False))
+    done = warm_up(slots(request_from(options)), 0, terminal(stderr=True))
     if as_json:
         click.echo(json.dumps({"compiled": done}))
 

@@ -18,11 +18,12 @@ from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
-from reports.cures import Change, changes, pasteable
+from reports.cures import Change, changes, how_measured, pasteable
 from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
-from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from reports.terminal import terminal
+from reports.wording import LABELS, mark_of, measured, missing_text, number, params_text, quantity, reproduce, row_id
 from validation.bench import reading
 from validation.cells import Observation
 from validation.rows import rows_of
@@ -62,11 +63,24 @@ def show(run: str, as_json: bool, out: Path) -> None:
     if as_json:
         click.echo(json.dumps(_as_plain(rows, costs), indent=1))
         return
-    console = Console()
+    console = terminal()
     show_summary(rows, console, costs)
+    _say_missing(out, run)
     report = out / "report.html"
     if report.is_file():
         console.print(Text(f"  report: {report}"), soft_wrap=True)
+
+
+def _say_missing(out: Path, run: str) -> None:
+    """Say on stderr how many planned cells a run lacks, if any."""
+    store = Store(out, create=False)
+    try:
+        chosen = store.run(run)
+        missing = store.missing(chosen)
+    finally:
+        store.close()
+    if missing:
+        click.echo(f"crosscheck: run {chosen.id}: {missing_text(missing, len(chosen.plan))}", err=True)
 
 
 def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
@@ -115,13 +129,13 @@ def findings(
         if as_json:
             click.echo(json.dumps([{**row, "id": row_id(row)} for row in chosen], indent=1))
         else:
-            _print_rows(chosen, Console())
+            _print_rows(chosen, terminal())
         return
     found = families(rows)
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, Console())
+    _print_families(found, terminal())
 
 
 def _grid(*headings: str) -> Table:
@@ -186,13 +200,16 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
     found = find_row(rows, row)
     better, paste, differing = _cure(rows, observations, found)
     if as_json:
-        plain = [{"name": c.name, "before": c.before, "after": c.after, "because": c.because} for c in differing]
+        plain = [
+            {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
+            for c in differing
+        ]
         cure = {"profile": better, "changes": plain, "paste": paste}
         click.echo(
             json.dumps({**found, "id": row_id(found), "command": reproduce(found["slot"]), "cure": cure}, indent=1)
         )
         return
-    _print_explanation(found, better, paste, differing, Console())
+    _print_explanation(found, better, paste, differing, terminal())
 
 
 def find_row(rows: Sequence[Plain], name: str) -> Plain:
@@ -234,6 +251,10 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
     return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
 
 
+def _why(change: Change) -> str:
+    return f"{change.because}; {change.role}" if change.role else change.because
+
+
 def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[Change], console: Console) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
     asked = f"{row['scene']} {row['dimension']}-D, {params_text(row['params'])}"
@@ -255,9 +276,9 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("standing", row["reason"] or "-"),
     ]
     if better:
-        text = "; ".join(f"{c.name} {c.before} -> {c.after} ({c.because})" for c in differing)
+        text = "; ".join(f"{c.name} {c.before} -> {c.after} ({_why(c)})" for c in differing)
         lines.append(("cure", f"profile {better} passes this row. It differs in: {text}."))
-        lines.append(("", "Which of these matters was not measured here: they are the profiles' difference."))
+        lines.append(("", how_measured(row["engine"], row["scene"], row["profile"], better)))
     lines.append(("again", reproduce(row["slot"])))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))

@@ -9,12 +9,13 @@ from dataclasses import asdict
 from typing import Any
 
 import click
-from rich.console import Console
 
 from adapters.engine import EngineError
 from adapters.registry import load
 from reports.command.group import AS_JSON, main
-from validation.experiments import candidates_of
+from reports.terminal import terminal
+from validation.decisive import FILE, measure_all, measured_of, write
+from validation.experiments import candidates_of, cured_of
 from validation.tuning import SEARCHED, Score, Search, search
 
 
@@ -24,14 +25,23 @@ from validation.tuning import SEARCHED, Score, Search, search
 @click.option("--group", multiple=True, type=click.Choice(list(SEARCHED)), help="Scenes of one kind; all by default.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--decisive", "which", is_flag=True, help="Measure which settings of its cures matter, and keep it.")
 @AS_JSON
-def tune(engine: str, profile: str, group: tuple[str, ...], dim: tuple[int, ...], jobs: int, as_json: bool) -> None:
+def tune(
+    engine: str, profile: str, group: tuple[str, ...], dim: tuple[int, ...], jobs: int, which: bool, as_json: bool
+) -> None:
     """Search stock settings of ENGINE that do better than a profile of it on all scenes of a kind.
 
     Changes nothing: what is found is adopted in the adapter, with its reason. Exits with 1 if something better was
     found, so that a release of an engine that has better settings shows.
+
+    With --decisive: each setting that a cure changes is switched alone and left out, and what came out is written to
+    validation/experiments/decisive.csv, which the report and `explain` read. Exits with 1 if other settings decide
+    than were listed.
     """
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
+    if which:
+        sys.exit(0 if _decisive(engine, jobs, as_json) else 1)
     if not candidates_of(engine):
         raise EngineError(f"tune: nobody has named stock settings of {engine} to try (validation/experiments)")
     known = load(engine).facts.dimensions
@@ -50,6 +60,25 @@ def tune(engine: str, profile: str, group: tuple[str, ...], dim: tuple[int, ...]
     if as_json:
         click.echo(json.dumps([asdict(result) for result in found], indent=1))
     sys.exit(1 if any(result.changes for result in found) else 0)
+
+
+def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
+    """Measure and keep which settings decide the cures of an engine; whether the same do as were listed."""
+    if not cured_of(engine):
+        raise EngineError(f"tune: nobody has named cures of {engine} to measure (validation/experiments)")
+    listed = {(e.scene, e.shipped, e.better): e.text for e in measured_of(engine)}
+    try:
+        found = measure_all(engine, jobs)
+    except ValueError as error:
+        raise EngineError(f"tune: {error}") from None
+    write(found, FILE)
+    console = terminal()
+    if as_json:
+        click.echo(json.dumps([asdict(entry) for entry in found], indent=1))
+    else:
+        for entry in found:
+            console.print(f"{engine}/{entry.shipped} {entry.scene}: cured by {entry.text}", soft_wrap=True)
+    return listed == {(e.scene, e.shipped, e.better): e.text for e in found}
 
 
 def _score(score: Score) -> str:

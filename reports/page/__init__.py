@@ -19,12 +19,13 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from reports.answers import answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, symbol, symbols
 from reports.speed import duration
-from reports.wording import number
+from reports.wording import missing_text, number
 from validation.cells import format_dt
 
 __all__ = ["Bench", "Source", "load_source", "render"]
@@ -50,6 +51,7 @@ def render(source: Source) -> str:
             cite=cite(source),
             sentences=conclusions.sentences(source),
             matrix=verdicts.matrix(source),
+            answers=answers(source.rows),
             findings=conclusions.findings(source),
             choices=choosing.choices(source),
             scenes=scene_sections(source),
@@ -91,7 +93,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "dt": format_dt, "duration": duration, "data": as_data}
-    environment.globals |= {"slug": verdicts.slug, "symbol": symbol}
+    environment.globals |= {"slug": verdicts.slug, "symbol": symbol, "missing_text": missing_text}
     return environment
 
 
@@ -114,7 +116,8 @@ def facts(source: Source) -> dict[str, Any]:
         "engines": [(engine, versions[engine], profiles[engine]) for engine in source.engines],
         "steps": [format_dt(dt) for dt in steps],
         "cells": len(source.observations),
-        "checks": len(source.rows),
+        "checks": sum(row["physics"] is not None for row in source.rows),
+        "judged": {row["engine"] for row in source.rows if row["physics"] is not None},
         "machine": source.run.machine,
     }
 
@@ -125,7 +128,7 @@ def cite(source: Source) -> dict[str, str]:
     commit = f", commit {run.commit}" if run.commit else ""
     text = (
         f"contact-crosscheck {installed}{commit}, run {run.id} of {run.date[:10]} ({len(source.observations)} cells, "
-        f"{len(source.rows)} judged values). CITATION.cff has the authors and, with crosscheck bundle, this run."
+        f"{len(source.rows)} rows). CITATION.cff has the authors and, with crosscheck bundle, this run."
     )
     clean = run.commit.rstrip("+")
     lines = [

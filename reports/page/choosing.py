@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from reports.cures import Change, changes, pasteable
+from reports.cures import Change, changes, how_measured, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
-from reports.speed import duration
+from reports.speed import busy, duration
 from reports.wording import mark_of, number
 from validation.cells import format_dt
 from validation.plan import QUICK_DT
@@ -22,16 +22,38 @@ Line = tuple[str, int]
 
 
 @dataclass(frozen=True)
+class Cost:
+    """CPU time per simulated second [s/s], and the interval of its median."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Candidate:
-    """One engine and profile on one scene: the steps that ran, which of them pass every check, and the cost."""
+    """One engine and profile on one scene: the steps that ran, which of them pass every check, and the cost.
+
+    ``tied``: the interval of its cost overlaps that of the cheapest, so that neither is the cheaper one.
+    """
 
     engine: str
     profile: str
     steps: list[tuple[str, bool]]
     largest: str
-    cost: float
-    cost_text: str
+    price: Cost | None
     failing: str
+    tied: bool = False
+
+    @property
+    def cost(self) -> float:
+        """CPU time per simulated second [s/s] at the largest step that passes; infinite where it was not timed."""
+        return math.inf if self.price is None or math.isnan(self.price.value) else self.price.value
+
+    @property
+    def cost_text(self) -> str:
+        """The cost as people read it; empty where it was not timed."""
+        return duration(self.cost) if math.isfinite(self.cost) else ""
 
 
 @dataclass(frozen=True)
@@ -62,43 +84,59 @@ def choices(source: Source) -> list[Choice]:
     return [choice for choice in found if choice is not None]
 
 
-def _costs(source: Source) -> dict[tuple[Any, ...], float]:
-    """Cost [s/s] by scene, dimension, engine, profile, step, at the profile's own iterations."""
-    if source.bench is None:
+def _costs(source: Source) -> dict[tuple[Any, ...], Cost]:
+    """Cost by scene, dimension, engine, profile, step, at the profile's own iterations.
+
+    Empty where nothing was timed, or on a machine so busy that times rank nobody.
+    """
+    if source.bench is None or busy(source.bench.tables["timings"]):
         return {}
     points = source.bench.tables["work_points"].to_dict("records")
     own = [p for p in points if p["iterations"] is None or p["iterations"] != p["iterations"]]
-    return {(p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): p["cost"] for p in own}
+    return {
+        (p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): Cost(p["cost"], p["cost_low"], p["cost_high"])
+        for p in own
+    }
 
 
 def _choice(
     source: Source,
     line: Line,
     grouped: Mapping[tuple[Any, ...], Sequence[Plain]],
-    costs: Mapping[tuple[Any, ...], float],
+    costs: Mapping[tuple[Any, ...], Cost],
 ) -> Choice | None:
-    candidates = []
+    candidates: list[Candidate] = []
     for column in source.columns:
         steps = {key[4]: rows for key, rows in grouped.items() if key[:4] == (*line, *column)}
         if steps:
             candidates.append(_candidate(line, column, steps, costs))
     if not candidates:
         return None
-    candidates.sort(key=lambda c: (c.largest == "", math.inf if math.isnan(c.cost) else c.cost))
+    candidates.sort(key=lambda c: (c.largest == "", c.cost))
+    candidates = _with_ties(candidates)
     return Choice(*line, slug("choose", *line), _answer(candidates, source.bench is not None), candidates)
+
+
+def _with_ties(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates, the cheapest first, with those told that cannot be told apart from it."""
+    best, *others = candidates
+    if best.price is None:
+        return list(candidates)
+    high = best.price.high
+    return [best, *(replace(c, tied=c.price is not None and c.price.low <= high) for c in others)]
 
 
 def _candidate(
     line: Line,
     column: tuple[str, str],
     steps: Mapping[float, Sequence[Plain]],
-    costs: Mapping[tuple[Any, ...], float],
+    costs: Mapping[tuple[Any, ...], Cost],
 ) -> Candidate:
     passing = {dt: all(mark_of(r) in ("pass", "none") for r in rows) for dt, rows in steps.items()}
     order = sorted(passing, reverse=True)
     # A step counts only if every smaller one passes as well: what passes once by luck is no recommendation.
     safe = [dt for k, dt in enumerate(order) if all(passing[finer] for finer in order[k:])]
-    cost = costs.get((*line, *column, safe[0]), math.nan) if safe else math.nan
+    price = costs.get((*line, *column, safe[0])) if safe else None
     bad = [row for rows in steps.values() for row in rows if mark_of(row) not in ("pass", "none")]
     worst = max(bad, key=lambda row: (ratio_of(row) or 0.0, severity(row)), default=None)
     families = dict.fromkeys(family_of(row["metric"]) for row in bad)
@@ -110,8 +148,7 @@ def _candidate(
         *column,
         [(format_dt(dt), passing[dt]) for dt in order],
         format_dt(safe[0]) if safe else "",
-        cost,
-        "" if math.isnan(cost) else duration(cost),
+        price,
         failing,
     )
 
@@ -126,9 +163,10 @@ def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
         missing = "" if timed else "; run crosscheck bench for their cost"
         return f"{names} {'pass' if len(good) > 1 else 'passes'} every check{missing}."
     best = priced[0]
-    also = [f"{c.engine}/{c.profile} at {c.largest} s ({c.cost_text})" for c in priced[1:4]]
-    said = f"Use {best.engine}/{best.profile} at dt = {best.largest} s: the cheapest that passes every check, "
-    said += f"{best.cost_text} of CPU per simulated second."
+    also = [f"{c.engine}/{c.profile} at {c.largest} s ({c.cost_text})" for c in priced[1:] if not c.tied][:3]
+    cheap = " or ".join(f"{c.engine}/{c.profile}" for c in priced if c.tied or c is best)
+    said = f"Use {cheap} at dt = {best.largest} s: "
+    said += f"the cheapest that passes every check, {best.cost_text} of CPU per simulated second."
     return said + (f" Next: {joined(also)}." if also else "")
 
 
@@ -139,6 +177,7 @@ class Cure:
     scene: str
     dimension: int
     engine: str
+    before_profile: str
     profile: str
     before: Mark
     after: Mark
@@ -147,6 +186,7 @@ class Cure:
     after_text: str
     changes: list[Change]
     paste: str
+    measured: str
 
 
 def cures(source: Source, shipped: str = "default", better: str = "tuned") -> list[Cure]:
@@ -170,6 +210,8 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     known = [(a, b) for a, b in pairs if b is not None]
     if not known:
         return None
+    # What the better profile passes says more than what it still fails.
+    known = [pair for pair in known if pair[1]["physics"] == "pass"] or known
     # The default cell of the scene is the one that people know, and its first check the plainest; else the worst.
     plain = [pair for pair in known if not pair[0]["slot"]["params"]]
     plain.sort(key=lambda pair: abs(math.log(pair[0]["dt"] / QUICK_DT)))
@@ -178,10 +220,11 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
         return None
     where = " ".join(f"{name}={value:g}" for name, value in worst["slot"]["params"].items())
     return Cure(
-        scene, dimension, engine, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
+        scene, dimension, engine, shipped, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
         changes(source.observations, scene, dimension, engine, shipped, better),
         pasteable(source.observations, scene, dimension, engine, shipped, better),
+        how_measured(engine, scene, shipped, better),
     )  # fmt: skip
 
 

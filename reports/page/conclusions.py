@@ -43,6 +43,8 @@ def answering(source: Source) -> list[str]:
 def agreement(source: Source) -> str:
     """Where the engines agree."""
     engines = answering(source)
+    if not engines:
+        return "No engine gave an answer that is judged."
     clean = {scene: clean_profiles(source, scene) for scene in source.scenes}
     everywhere = [scene for scene in source.scenes if engines and all(e in clean[scene] for e in engines)]
     parts = []
@@ -108,6 +110,8 @@ def wrongs(source: Source) -> str:
         said = f"{joined(alarms)} rows need attention, first {_row_text(worst)}. "
     listed = [row for row in source.rows if mark_of(row) in ("known", "fail")]
     if not listed:
+        if not answering(source) and not alarms:
+            return "Nothing was judged."
         return said + ("Nothing else fails." if alarms else "No row fails without a law that explains it.")
     worst = max(listed, key=lambda row: ratio_of(row) or 0.0)
     unlisted = f" ({counts['fail']} of engines without a list)" if counts["fail"] else ""

@@ -36,12 +36,13 @@ Plain = Mapping[Hashable, Any]
 
 @dataclass(frozen=True)
 class LevelCell:
-    """What an engine needs for one error (or reaches for one cost)."""
+    """What an engine needs for one error (or reaches for one cost); ``ties`` are not told apart from it."""
 
     text: str
     detail: str
     best: bool
     title: str
+    ties: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,9 +125,9 @@ def _cheapest_cell(tied: Sequence[Plain]) -> LevelCell:
     if not tied:
         return LevelCell("none reaches it", "", False, "")
     row, *others = tied
-    also = "".join(f" = {other['engine']}/{other['profile']}" for other in others)
-    text = f"{row['engine']}/{row['profile']}{also}"
-    return LevelCell(text, f"{duration(row['cost'])}, {_setting(row)}", True, reproduce(row["slot"]))
+    ties = tuple(f"{other['engine']}/{other['profile']}" for other in others)
+    text = f"{row['engine']}/{row['profile']}"
+    return LevelCell(text, f"{duration(row['cost'])}, {_setting(row)}", True, reproduce(row["slot"]), ties)
 
 
 def _setting(row: Plain) -> str:

@@ -135,15 +135,16 @@ def _map(rows: Sequence[Plain], speed: float) -> Figure:
         for row in rows
     )  # fmt: skip
     x = alt.X("asked:Q", axis=alt.Axis(title="restitution asked for", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
-              scale=alt.Scale(domain=[-0.03, 1.03], nice=False))  # fmt: skip
+              scale=alt.Scale(domain=[-0.07, 1.07], nice=False))  # fmt: skip
     top = max(1.03, float(table["got"].max()) * 1.05)
     y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured"), scale=alt.Scale(domain=[-0.03, top], nice=False))
     ideal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
     line = ideal.mark_line(color="currentColor", opacity=0.18, strokeWidth=7, aria=False).encode(x=x, y=y)
     style = styled(table)
-    table = named(dodged(table, "asked", "got", logarithmic=False))
+    # Only marks stand side by side: a line that is moved would show another law.
+    table = named(table)
     thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7)
-    points = alt.Chart(table).mark_point(filled=True, size=48, opacity=0.9)
+    points = alt.Chart(dodged(table, "asked", "got", logarithmic=False)).mark_point(filled=True, size=48, opacity=0.9)
     chart = alt.layer(
         line,
         thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"], description="who:N"),

@@ -44,6 +44,10 @@ class Source:
         Recordings with the slots they show.
     bench
         The last bench of the same store; None if there is none.
+    missing
+        Cells that were planned and left no observation.
+    scenes_kept
+        Texts of the scene files of the run and of the bench, by pinned name.
     """
 
     run: Run
@@ -51,6 +55,8 @@ class Source:
     observations: Sequence[Observation]
     replays: Sequence[tuple[Slot, Recording]] = ()
     bench: Bench | None = None
+    missing: int = 0
+    scenes_kept: Mapping[str, str] = field(default_factory=dict)
     columns: tuple[tuple[str, str], ...] = field(init=False)
     lines: tuple[tuple[str, int], ...] = field(init=False)
 
@@ -91,7 +97,8 @@ def load_source(folder: Path, run: str = "latest") -> Source:
         observations = [observation for observation in every if observation.slot.ulp == 0]
         benches = reading.bench_runs(store)
         bench = _bench(store, benches[-1]) if benches else None
-        return Source(chosen, rows, observations, store.recordings(chosen), bench)
+        files = store.scenes(chosen) | (store.scenes(bench.run) if bench else {})
+        return Source(chosen, rows, observations, store.recordings(chosen), bench, store.missing(chosen), files)
     finally:
         store.close()
 

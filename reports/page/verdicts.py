@@ -103,9 +103,10 @@ class Mark:
 
 @dataclass(frozen=True)
 class MatrixLine:
-    """A line of the matrix: what it is, where it leads, a mark per engine and profile."""
+    """A line of the matrix: its scene, its dimension and whether it is swept, where it leads, a mark per column."""
 
-    label: str
+    scene: str
+    kind: str
     anchor: str
     marks: list[Mark]
 
@@ -120,7 +121,7 @@ def matrix(source: Source) -> list[MatrixLine]:
             own = [fields.get((line, column)) for column in source.columns]
             if any(own) or not label:
                 marks = [_matrix_mark(f, line, c) for f, c in zip(own, source.columns, strict=True)]
-                lines.append(MatrixLine(f"{scene} {dimension}-D{label}", slug(*line), marks))
+                lines.append(MatrixLine(scene, f"{dimension}-D{label}", slug(*line), marks))
     return lines
 
 

@@ -4,11 +4,26 @@ import hashlib
 import json
 import zipfile
 
+import pytest
 from click.testing import CliRunner
 
 from reports.bundle import citation
 from reports.command import main
-from validation.store import Run
+from validation.cells import Slot
+from validation.execution import execute
+from validation.posed import pinned
+from validation.store import Run, Store
+
+SCENE = """name = "drop"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.1
+[[bodies]]
+name = "ball"
+shape = {{ type = "disc", radius = 0.5 }}
+mass = 1.0
+pose = [0.0, {height}, 0.0]
+"""
 
 
 def test_the_bundle_holds_what_it_lists_and_its_checksums_hold(page_folder, page_source, tmp_path):
@@ -29,6 +44,33 @@ def test_the_bundle_holds_what_it_lists_and_its_checksums_hold(page_folder, page
     assert environment["packages_now"]["numpy"]
     assert texts["report.html"].startswith(b"<!doctype html>")
     assert f"run {page_source.run.id}" in texts["CITATION.cff"].decode()
+
+
+def test_scene_files_that_ran_are_in_the_bundle_as_they_were(tmp_path):
+    pytest.importorskip("pymunk")
+    texts = {}
+    for place, height in (("a", 2.0), ("b", 3.0)):
+        (tmp_path / place).mkdir()
+        file = tmp_path / place / "drop it.toml"
+        file.write_text(SCENE.format(height=height))
+        # A name that climbs: nothing in the archive may lie outside its folder.
+        texts[pinned(str(tmp_path / "a" / ".." / place / "drop it.toml"))] = SCENE.format(height=height)
+    slots = [Slot(name, (), 2, "chipmunk", "tuned", 1 / 240) for name in texts]
+    store = Store(tmp_path / "out")
+    run, _ = store.start("quick: files", slots)
+    for slot in slots:
+        store.add(run, execute(slot))
+    store.finish(run)
+    store.close()
+    for file in tmp_path.glob("*/*.toml"):
+        file.write_text("changed since")
+    path = tmp_path / "b.zip"
+    assert CliRunner().invoke(main, ["bundle", "-o", str(path), "--out", str(tmp_path / "out")]).exit_code == 0
+    with zipfile.ZipFile(path) as archive:
+        found = {n.partition("/")[2]: archive.read(n).decode() for n in archive.namelist() if "/scenes/" in n}
+        readme = archive.read(next(n for n in archive.namelist() if n.endswith("README.txt"))).decode()
+    assert found == {f"scenes/{name[-8:]}-drop-it.toml": text for name, text in texts.items()}
+    assert all(name in readme for name in found)
 
 
 def test_the_citation_names_run_and_commit():

@@ -19,14 +19,16 @@ import pytest
 from click.testing import CliRunner
 
 from reports.command import main
-from reports.page import Source, as_data, policy, render
+from reports.page import Source, as_data, load_source, policy, render
 from reports.page.choosing import choices, cures
 from reports.page.conclusions import findings, sentences
 from reports.page.explorer import explorer
 from reports.page.replay import replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import slug
-from validation.store import Run
+from validation.cells import Slot
+from validation.execution import execute
+from validation.store import Run, Store
 
 GOLDEN = Path(__file__).parent.parent / "data" / "golden"
 EVIL = "<script>window.hacked=1</script>"
@@ -224,6 +226,27 @@ def test_the_cheapest_engine_that_passes_stands_first(page_source):
     assert found.answer.startswith("Use chipmunk/default at dt = 1/60 s: the cheapest that passes every check, 1")
 
 
+@pytest.mark.parametrize(("low", "tied"), [(0.9, True), (1.2, False)])
+def test_who_cannot_be_told_apart_from_the_cheapest_is_a_tie(low, tied):
+    from reports.page.choosing import Candidate, Cost, _answer, _with_ties
+
+    steps = [("1/60", True)]
+    first = Candidate("a", "x", steps, "1/60", Cost(1.0, 0.9, 1.1), "")
+    second = Candidate("b", "y", steps, "1/60", Cost(1.3, low, 1.5), "")
+    untimed = Candidate("c", "z", steps, "1/60", None, "")
+    found = _with_ties([first, second, untimed])
+    assert [c.tied for c in found] == [False, tied, False]
+    assert ("a/x or b/y" in _answer(found, True)) is tied
+
+
+def test_times_of_a_busy_machine_rank_nobody(page_source, monkeypatch):
+    from reports.page import choosing
+
+    assert any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
+    monkeypatch.setattr(choosing, "busy", lambda timings: "This machine was busy.")
+    assert not any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
+
+
 def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     cure = next(c for c in cures(page_source) if (c.engine, c.scene, c.dimension) == ("bullet", "impact", 2))
     assert cure.before.mark != "pass" and cure.after.mark == "pass"
@@ -283,9 +306,50 @@ def test_a_page_is_made_of_whatever_there_is(page_source, missing):
     said = {
         "bench": "no bench in this store yet",
         "replays": "kept no recordings",
-        "everything": "within its tolerance",
+        "everything": "Nothing was judged",
     }
     assert said[missing] in page
+
+
+def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
+    pytest.importorskip("pymunk")
+    slots = [Slot("impact", (("e", e),), 2, "chipmunk", "tuned", 1 / 240) for e in (0.0, 0.5, 1.0)]
+    store = Store(tmp_path)
+    run, _ = store.start("quick: impact", slots)
+    store.add(run, execute(slots[0]))
+    store.close()
+    said = "2 of 3 planned cells left no observation"
+    shown = CliRunner().invoke(main, ["show", "--out", str(tmp_path)])
+    made = CliRunner().invoke(main, ["report", "--json", "--out", str(tmp_path)])
+    assert said in shown.stderr and said in made.stderr
+    assert json.loads(made.stdout)["missing"] == 2
+    assert said in (tmp_path / "report.html").read_text()
+    store = Store(tmp_path)
+    for slot in slots[1:]:
+        store.add(run, execute(slot))
+    store.close()
+    assert "left no observation" not in CliRunner().invoke(main, ["show", "--out", str(tmp_path)]).stderr
+    assert "left no observation" not in render(load_source(tmp_path))
+
+
+def test_the_page_of_a_run_in_which_nothing_could_be_asked_claims_nothing(tmp_path):
+    pytest.importorskip("pymunk")
+    slots = [Slot("impact", (), 3, "chipmunk", profile, 1 / 240) for profile in ("default", "tuned")]
+    store = Store(tmp_path)
+    run, _ = store.start("quick: impact", slots)
+    for slot in slots:
+        store.add(run, execute(slot))
+    store.finish(run)
+    store.close()
+    page = render(load_source(tmp_path))
+    assert "Nothing was judged" in page
+    for wrong in (
+        "is within its tolerance",
+        "passes every check that it was",
+        "pass every check",
+        "every engine has a",
+    ):
+        assert wrong not in page
 
 
 def test_a_picture_keeps_its_pixels_and_says_where_it_is_from():

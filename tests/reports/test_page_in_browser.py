@@ -149,6 +149,38 @@ def test_both_layouts_show_every_engine(browser, page_file):
         assert page.locator("#replay-series label").count() == 4
 
 
+@pytest.mark.parametrize("layout", ["over", "beside"])
+def test_the_replay_draws_at_every_width_and_when_nothing_of_it_is_seen(browser, page_file, layout):
+    with opened(browser, page_file, "#replay") as page:
+        until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
+        page.select_option("#replay-layout", layout)
+        scenes = page.locator("#replay-scene option").evaluate_all("nodes => nodes.map(node => node.value)")
+        for width in (320, 160, 120, 60, 40):
+            page.set_viewport_size({"width": width, "height": 60 if width < 100 else 800})
+            for scene in scenes:
+                page.select_option("#replay-scene", scene)
+                until(page, "document.getElementById('replay-time').max > 1")
+                page.locator("#replay-time").fill("3")
+        page.evaluate("document.getElementById('player').hidden = true; dispatchEvent(new Event('resize'))")
+
+
+def test_no_name_of_a_lane_is_cut_off_by_the_next_lane(browser, page_file):
+    """On a phone lanes stand in several rows: the name of each must fit beside its square."""
+    with opened(browser, page_file, "#replay", width=320) as page:
+        until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
+        found = page.evaluate(
+            "() => { const seen = [], pen = CanvasRenderingContext2D.prototype, rect = pen.rect, text = pen.fillText;"
+            "let lane = 0;"
+            "pen.rect = function (x, y, w, h) { lane = w; return rect.call(this, x, y, w, h); };"
+            "pen.fillText = function (said, x, y) { seen.push([said, x + this.measureText(said).width, lane]);"
+            "return text.call(this, said, x, y); };"
+            "const layout = document.getElementById('replay-layout'); layout.value = 'beside';"
+            "layout.dispatchEvent(new Event('change')); return seen; }"
+        )
+    assert {"chipmunk", "bullet", "default", "tuned"} <= {said for said, *_ in found}
+    assert [entry for entry in found if entry[1] > entry[2]] == []
+
+
 def test_a_spatial_replay_offers_three_views(browser, page_file):
     with opened(browser, page_file, "#replay") as page:
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
@@ -219,6 +251,33 @@ def test_no_width_scrolls_sideways(browser, page_file, width):
     with opened(browser, page_file, width=width) as page:
         page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
+def test_no_caption_is_wider_than_what_is_seen_of_its_table(browser, page_file, width):
+    with opened(browser, page_file, width=width) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+        said = page.evaluate(
+            "() => [...document.querySelectorAll('caption span')].map(node => [node.textContent.slice(0, 40),"
+            "node.getBoundingClientRect().right - node.closest('.scroll').getBoundingClientRect().right])"
+        )
+    assert len(said) > 5
+    assert [entry for entry in said if entry[1] > 1] == []
+
+
+def test_the_text_of_the_explorer_can_be_read_on_a_phone(browser, page_file):
+    with opened(browser, page_file, "#explorer", width=390) as page:
+        height = page.locator("#explorer-plot text").first.evaluate("node => node.getBoundingClientRect().height")
+    assert height > 10
+
+
+def test_on_a_phone_the_matrix_stands_before_the_filter_and_the_facts(browser, page_file):
+    with opened(browser, page_file, width=390) as page:
+        places = [
+            page.locator(f"#verdicts > {part}").first.bounding_box()["y"]
+            for part in ("h1", ".scroll", ".legend", "#filter", ".facts")
+        ]
+    assert places == sorted(places)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -150,6 +150,25 @@ def test_alarms_stand_before_the_answers():
     assert "NEW 1/143" in "\n".join(lines[:30])
 
 
+REFUSED = {"outcome": "unsupported", "reason": "chipmunk is planar", "value": None, "physics": None}
+
+
+def test_a_run_in_which_nothing_could_be_asked_says_so_and_why():
+    rows = [row("impact", 3, "chipmunk", profile, "unsupported") | REFUSED for profile in ("default", "tuned")]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert "UNSUPPORTED: chipmunk impact: chipmunk is planar" in text
+    assert "impact no verdict: it cannot be asked of the engines of this run" in text
+    assert "Nothing was judged" in text
+    for wrong in ("nearest is", "iteration counts", "Every row passes", "NAME", "within tolerance", "explain ID"):
+        assert wrong not in text
+
+
+def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
+    rows = [row("impact", 3, "chipmunk", "tuned", "unsupported") | REFUSED, row("impact", 3, "bullet", "tuned")]
+    text = "\n".join(shown(rows, 100))
+    assert "chipmunk is planar" not in text and "Nothing was judged" not in text
+
+
 # ---- a real run ----
 
 

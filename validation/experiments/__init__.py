@@ -1,7 +1,8 @@
-"""Experiments on engines, as data, one module per engine: what tuning tries, and what proves a reason.
+"""Experiments on engines, as data, one module per engine: what tuning tries, what proves a reason, what cures.
 
 An experiment switches off the mechanism that a reason names and says what must come of it; where nothing can be
-switched, a deviation law predicts the value independently. `validation.tuning` and `validation.proofs` run them.
+switched, a deviation law predicts the value independently. `validation.tuning`, `validation.proofs` and
+`validation.decisive` run them; what the last one measured stands in ``decisive.csv``.
 """
 
 from __future__ import annotations
@@ -52,6 +53,33 @@ class Experiment:
         return Slot(self.scene, params, self.dimension, engine, self.profile, QUICK_DT, self.iterations)
 
 
+@dataclass(frozen=True)
+class Cured:
+    """What fails as shipped and passes with a better profile: `validation.decisive` finds out by which settings.
+
+    Parameters
+    ----------
+    scene, cells
+        The cells that are asked, as what differs from the scene's defaults: an easy one and the hard ones.
+    metrics
+        Checks that are asked of them; all by default. Named where the better profile does not pass all.
+    """
+
+    scene: str
+    cells: tuple[Mapping[str, float], ...]
+    metrics: tuple[str, ...] = ()
+    dimension: int = 2
+    shipped: str = "default"
+    better: str = "tuned"
+
+    def slots(self, engine: str) -> list[Slot]:
+        """The cells as the shipped profile has them."""
+        return [
+            Slot(self.scene, tuple(sorted(cell.items())), self.dimension, engine, self.shipped, QUICK_DT)
+            for cell in self.cells
+        ]
+
+
 @cache
 def experiments_of(engine: str) -> tuple[Experiment, ...]:
     """All experiments of ``engine``; none for an engine without a module here."""
@@ -64,7 +92,19 @@ def candidates_of(engine: str) -> Mapping[str, tuple[Any, ...]]:
     return dict(_module(engine, "CANDIDATES"))
 
 
+@cache
+def cured_of(engine: str) -> tuple[Cured, ...]:
+    """Cures whose settings are measured one by one; none for an engine without a module here."""
+    return tuple(_module(engine, "CURED"))
+
+
+@cache
+def belongs_of(engine: str) -> Mapping[str, str]:
+    """Settings that mean nothing without another one, and which; they are switched with it."""
+    return dict(_module(engine, "BELONGS"))
+
+
 def _module(engine: str, name: str) -> Any:
     if not engine.isidentifier() or find_spec(f"{__name__}.{engine}") is None:
         return ()
-    return getattr(import_module(f"{__name__}.{engine}"), name)
+    return getattr(import_module(f"{__name__}.{engine}"), name, ())

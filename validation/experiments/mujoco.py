@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from validation.experiments import Experiment
+from validation.experiments import Cured, Experiment
 
 #: Iterations are left alone: Newton's count is a limit that is not reached.
 CANDIDATES: dict[str, tuple[Any, ...]] = {
@@ -15,6 +15,16 @@ CANDIDATES: dict[str, tuple[Any, ...]] = {
     "cone": ("elliptic", "pyramidal"),
     "integrator": ("Euler", "implicitfast"),
 }
+
+#: The stiffness that "reflect" makes solref from: neither of the two means anything without the other.
+BELONGS: dict[str, str] = {"kappa_elastic": "solref", "kappa_plastic": "solref"}
+#: Its tuned profile sticks where it should, and slides too slowly.
+CURED: tuple[Cured, ...] = (
+    Cured("impact", ({}, {"e": 0.0, "v": 1.0}, {"e": 1.0, "v": 50.0})),
+    Cured("bounce", ({}, {"e": 0.5}, {"e": 1.0})),
+    Cured("stack", ({}, {"n": 2.0}, {"n": 20.0})),
+    Cured("incline", ({}, {"ratio": 0.999}), ("creep",)),
+)
 
 EXPERIMENTS: tuple[Experiment, ...] = tuple(
     Experiment(

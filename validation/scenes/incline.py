@@ -1,11 +1,11 @@
 """A box on an incline sticks or slides.
 
-            g rotated by theta instead of a tilted floor (a tilted, touching start is not representable
-       +---+   exactly and costs some engines a transient)
-       |   | ->
-    ==============        sticks if tan(theta) <= mu, else a = g (sin(theta) - mu cos(theta))
+       +---+
+       |   | ->       sticks if tan(theta) <= mu,
+    ==============    else a = g (sin(theta) - mu cos(theta))
 
-``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
+Gravity is turned by theta, not the floor: a tilted, touching start is not representable exactly and costs some engines
+a transient. ``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
 """
 
 from __future__ import annotations

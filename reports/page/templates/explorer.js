@@ -5,6 +5,12 @@
   const data = JSON.parse(source.textContent), plot = document.getElementById("explorer-plot");
   const slider = document.getElementById("explorer-e"), logarithmic = document.getElementById("explorer-log");
   const box = { left: 64, right: 744, top: 14, bottom: 312 }, bounces = 8, lowest = 1e-4;
+  /* As many units as there are pixels, so that text keeps its size on a narrow screen. */
+  function fit() {
+    const width = Math.max(260, Math.min(760, live.clientWidth || 760));
+    box.right = width - 16;
+    plot.setAttribute("viewBox", `0 0 ${width} 360`);
+  }
   const x = (n) => box.left + (n / bounces) * (box.right - box.left);
   const share = (h) => (logarithmic.checked ? 1 - Math.log10(Math.max(h, lowest)) / Math.log10(lowest) : h);
   const y = (h) => box.bottom - Math.min(1.02, Math.max(0, share(h))) * (box.bottom - box.top);
@@ -41,7 +47,7 @@
     own.forEach((one, k) => one.heights[String(near)].forEach((h, i) => {
       if (i >= bounces) return;
       /* Side by side, so that equal answers do not hide each other. */
-      const at = x(i + 1) + (k - (own.length - 1) / 2) * 5.5;
+      const at = x(i + 1) + (k - (own.length - 1) / 2) * Math.min(5.5, (0.9 * (x(1) - x(0))) / own.length);
       const point = put("path", { d: shapes[one.shape], transform: `translate(${at},${y(h)})`, fill: one.colour, role: "graphics-symbol" });
       point.setAttribute("aria-label", `${one.name}: h${i + 1} = ${h} h0, exact ${(near ** (2 * i + 2)).toPrecision(4)}`);
     }));
@@ -51,6 +57,7 @@
     const e = Number(slider.value);
     document.getElementById("explorer-value").textContent = e.toFixed(2);
     plot.replaceChildren();
+    fit();
     axes();
     for (const faint of data.faint) curve(faint, 0.22, 1.5);
     curve(e, 0.85, 2);
@@ -67,6 +74,7 @@
   slider.addEventListener("input", draw);
   slider.addEventListener("change", () => remember("e", slider.value));
   addEventListener("filtered", draw);
+  addEventListener("resize", draw);
   logarithmic.addEventListener("change", draw);
   for (const preset of $$(".preset", live)) preset.addEventListener("click", () => { slider.value = preset.dataset.e; draw(); });
   draw();

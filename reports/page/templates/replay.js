@@ -115,8 +115,12 @@
     else {
       /* Lanes stand beside each other where the motion is upright, and above each other where it is level. */
       const tall = (high[1] - low[1]) / (high[0] - low[0]) > 0.6, n = shown.length || 1;
+      /* In several rows or columns where lanes would be narrower than their names or lower than two lines of text. */
+      const most = Math.max(1, Math.floor(tall ? width / 96 : height / 56));
+      const across = Math.ceil(n / Math.min(n, most)), along = Math.ceil(n / across);
+      const [columns, rows] = tall ? [along, across] : [across, along], w = width / columns, h = height / rows;
       shown.forEach((one, i) => {
-        const lane = tall ? [(i * width) / n, 0, width / n, height] : [0, (i * height) / n, width, height / n];
+        const lane = [(i % columns) * w, Math.floor(i / columns) * h, w, h];
         drawLane(data, [one], k, plane, low, high, lane, one.name);
       });
     }
@@ -131,7 +135,9 @@
     return (p) => [c * p[0] + s * p[1], c * p[1] - s * p[0]];
   }
   function drawLane(data, series, k, plane, low, high, [x0, y0, width, height], title) {
-    const d = data.dimension, ink = getComputedStyle(document.body).color, pad = title ? 18 : 28;
+    const d = data.dimension, ink = getComputedStyle(document.body).color;
+    /* At most a quarter of each side: what is drawn never has a negative size, however narrow the window. */
+    const pad = Math.min(title ? 18 : 28, width / 4, height / 4);
     pen.save();
     pen.beginPath();
     pen.rect(x0, y0, width, height);

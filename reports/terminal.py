@@ -1,0 +1,14 @@
+"""The console of every command: it shows text as it is.
+
+Names of scenes, reasons and settings come from files and plugins. Rich would read ``[red]`` in them as a style,
+``[/]`` as an error and ``:ok:`` as a picture; style is only ever given by us, as `rich.text.Text` or ``style=``.
+"""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+
+def terminal(stderr: bool = False, width: int | None = None) -> Console:
+    """Return a console on stdout, or on stderr, that reads no markup and no emoji codes in any text."""
+    return Console(stderr=stderr, width=width, markup=False, emoji=False)

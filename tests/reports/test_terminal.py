@@ -1,0 +1,129 @@
+"""Text from files and plugins is shown as it is: nothing in it is a style, a picture or an error of the terminal's."""
+
+import ast
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import reports
+from reports import listing
+from reports.command import main
+from validation.cells import Slot
+from validation.execution import execute
+from validation.posed import pinned
+from validation.store import Store
+
+NAME = "[bold]x[/bold] [red"
+FILE_NAME = "[bold]x[bold] [red.toml"
+BODY = "[blue]b :smile:"
+BECAUSE = "[red]wrong on purpose[/red] :boom:"
+SCENE = f"""
+name = "{NAME}"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.1
+[[bodies]]
+name = "[/floor]"
+shape = {{ type = "half_space", normal = [0.0, 1.0] }}
+motion = "fixed"
+[[bodies]]
+name = "{BODY}"
+shape = {{ type = "disc", radius = 0.5 }}
+mass = 1.0
+pose = [0.0, 2.0, 0.0]
+[[pairs]]
+restitution = 0.5
+[[checks]]
+quantity = "{BODY}.vy"
+value = 7.0
+tolerance = 0.1
+because = "{BECAUSE}"
+"""
+
+
+def call(*arguments):
+    return CliRunner(env={"COLUMNS": "300"}).invoke(main, [str(a) for a in arguments])
+
+
+def flat(text):
+    return " ".join(text.split())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run of a scene file that is named like markup, and whose own check fails."""
+    pytest.importorskip("pymunk")
+    out = tmp_path_factory.mktemp("out")
+    file = out / FILE_NAME
+    file.write_text(SCENE)
+    slot = Slot(pinned(str(file)), (), 2, "chipmunk", "tuned", 1 / 240)
+    store = Store(out)
+    run, _ = store.start(f"quick: {NAME}", [slot])
+    store.add(run, execute(slot))
+    store.finish(run)
+    store.close()
+    return out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "texts"),
+    [
+        (("list", "runs"), [NAME]),
+        (("show",), [FILE_NAME]),
+        (("findings",), [FILE_NAME, f"{BODY}.vy"]),
+        (("findings", "--all"), [FILE_NAME, f"{BODY}.vy"]),
+        (("explain", "ROW"), [FILE_NAME, f"{BODY}.vy", BECAUSE]),
+    ],
+)
+def test_commands_about_a_run_show_text_as_it_is(folder, arguments, texts):
+    if "ROW" in arguments:
+        rows = json.loads(call("findings", "--all", "--json", "--out", folder).stdout)
+        arguments = ("explain", next(row["id"] for row in rows if BODY in row["metric"]))
+    result = call(*arguments, "--out", folder)
+    assert result.exit_code == 0, result.output
+    for text in texts:
+        assert text in flat(result.stdout)
+
+
+def test_describe_shows_names_and_reasons_of_a_scene_file_as_they_are(folder):
+    result = call("describe", folder / FILE_NAME)
+    assert result.exit_code == 0, result.output
+    for text in (NAME, FILE_NAME, f"{BODY}.vy", BECAUSE):
+        assert text in flat(result.stdout)
+
+
+def test_lists_of_engines_and_doctor_show_what_plugins_say_as_it_is(monkeypatch):
+    said = "[bold]no[/bold] [/] [red :smile:"
+    engine = {"name": f"[i]{said}", "version": said, "status": "not installed", "profiles": [said], "reason": said}
+    found = listing.doctor()
+    found |= {"engines": [engine], "problems": [said], "packages": {said: said}, "commit": said}
+    monkeypatch.setattr(listing, "engines", lambda: [engine])
+    monkeypatch.setattr(listing, "doctor", lambda: found)
+    for command in (("list", "engines"), ("doctor",)):
+        result = call(*command)
+        assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+        assert result.stdout.count(said) >= 3, result.stdout
+
+
+def test_settings_and_habits_of_a_plugin_are_shown_as_they_are(monkeypatch):
+    said = "[bold]so[/bold] [/] [red :smile:"
+    data = listing.describe("chipmunk")
+    if data["status"] != "installed":
+        pytest.skip(f"chipmunk: {data['reason']}")
+    data["profiles"] = {said: {"impact": [{"name": said, "value": said, "because": said, "source": said}]}}
+    data["quirks"] = [{"what": said, "what_we_do": said, "source": said}]
+    monkeypatch.setattr(listing, "describe", lambda name: data)
+    result = call("describe", "chipmunk")
+    assert result.exit_code == 0, result.output
+    assert flat(result.stdout).count(said) >= 6
+
+
+def test_every_command_has_the_console_that_reads_no_markup():
+    made = []
+    for path in Path(reports.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) == "Console":
+                made.append(path.name)
+    assert made == ["terminal.py"]
