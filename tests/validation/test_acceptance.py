@@ -208,6 +208,13 @@ def test_a_draft_names_profile_scene_and_kind_of_metric_and_the_release_by_two_n
     )
 
 
+@pytest.mark.parametrize(
+    ("version", "releases"), [("4.1+5f3a", "==4.1.*"), ("7", "==7.*"), ("0.1.0+cbe56602", "==0.1.*")]
+)
+def test_a_draft_holds_for_its_release_whatever_was_built_locally(version, releases):
+    assert acceptance._draft(rows(version=version)[0]).releases == releases
+
+
 def test_a_proposal_is_of_its_engine_and_its_changes_hold_what_was_listed_and_what_is_found():
     old = Finding(FAMILY, 0.51, 1e-3)
     drifted = propose(rows(), "nameless", listed(FAMILY, creep=old))

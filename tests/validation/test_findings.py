@@ -411,11 +411,19 @@ def test_only_the_entry_of_that_engine_is_looked_at(package):
     assert files.findings_of("another") is None
 
 
-@pytest.mark.parametrize("value", ["nameless_crosscheck:nothing", "nameless_crosscheck", "not_there:findings", "a b:c"])
+@pytest.mark.parametrize(
+    "value",
+    ["nameless_crosscheck:nothing", "nameless_crosscheck", "not_there:findings", "a b:c",
+     "nameless_crosscheck.data:findings"],  # of a dotted name the package would be imported
+)  # fmt: skip
 def test_an_entry_point_that_names_no_folder_is_refused_in_one_line(package, value):
     package(value)
-    with pytest.raises(FindingsError, match="is not a folder of an installed package"):
+    with pytest.raises(FindingsError) as caught:
         files.findings_of("nameless")
+    assert str(caught.value) == (
+        f"entry point contact_crosscheck.findings.nameless: {value!r} is not a folder of an installed package "
+        "(mypackage:folder.inside.it)"
+    )
 
 
 def test_two_folders_for_one_engine_are_refused(package, findings):

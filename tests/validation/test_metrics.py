@@ -296,3 +296,41 @@ def test_the_load_of_an_interface_is_the_mean_and_scatter_of_its_last_window():
     assert metrics.interface_load(with_a_gap, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
     too_early = recorded(resting(11), [[(0, 1, (0.0, 1.0))]])
     assert metrics.interface_load(too_early, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "arcs"),
+    [
+        ([0.5, -1.0, 3.0, 1.0, -1.0, -1.0], 1),  # chatter does not hide the arc after it
+        ([5.0, 2.0, 0.0, 0.5, -1.0, -1.0], 1),  # a sample at rest ends an arc: the chatter after it is its own
+        ([5.0, -3.0, 0.5, -1.0, -1.0, -1.0], 1),  # and so does one sample that falls
+        ([5.0, 0.5, 0.0, -1.0, -1.0, -1.0], 1),  # the fastest sample may be the first of all
+    ],
+)
+def test_which_arcs_start_faster_than_the_least_speed(velocity, arcs):
+    heights = np.array([0.0, 0.5, 0.75, 1.0, 0.5, 0.0])
+    assert len(metrics.apexes(np.arange(6) / 8, heights, np.array(velocity), 1.0)[0]) == arcs
+
+
+@pytest.mark.parametrize(
+    ("height", "velocity", "time"),
+    [([1.0, 0.9, 0.7, 0.4, 0.0, 0.0], [1.0, 1.0, 1.0, -1.0, -1.0, -1.0], 0.0),
+     ([0.0, 0.7, 0.9, 1.0, 1.0, 1.0], [1.0, -1.0, -1.0, -1.0, -1.0, -1.0], 0.375)],
+)  # fmt: skip
+def test_a_top_lies_within_a_step_of_its_sample_though_the_parabola_says_more(height, velocity, time):
+    times, tops = metrics.apexes(np.arange(6) / 8, np.array(height), np.array(velocity))
+    assert list(times) == pytest.approx([time]) and list(tops) == pytest.approx([0.975])
+
+
+def test_the_drift_is_that_of_one_body_and_not_of_all():
+    pose = np.zeros((2, 3, 3))
+    pose[1, :, 0] = [0.0, 3.0, -4.0]
+    assert metrics.lateral_drift(Trajectory(np.arange(2.0), pose, np.zeros_like(pose), None, 1.0, "completed")) == 4.0
+
+
+def test_a_load_in_space_is_along_the_third_axis_and_a_window_leaves_out_its_first_instant():
+    t = np.arange(9) / 8
+    still = spatial(t)
+    trajectory = recorded(still, [[(0, 1, (7.0, 9.0, 64.0))]] * 4 + [[(0, 1, (7.0, 9.0, 3.0))]] * 4)
+    (mean, _), deviation = metrics.interface_load(trajectory, 0, 1, 1.0, 0.5)
+    assert (mean, deviation) == (3.0, 0.0)
