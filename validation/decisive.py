@@ -90,8 +90,13 @@ class Decisive:
         """``a or b`` where each is enough by itself; ``a and b with c``: not without a and b, and enough with c."""
         if self._so(ALONE):
             return " or ".join(self._so(ALONE))
-        needed, others = " and ".join(self._so(NEEDED)), " and ".join(self._so(COMPLETES))
+        needed, others = _joined(self._so(NEEDED)), _joined(self._so(COMPLETES))
         return f"{needed} with {others}" if needed and others else needed or others
+
+
+def _joined(names: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def measure(engine: str, target: Cured, jobs: int = 1) -> Decisive:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from reports.cures import Change, changes, how_measured, pasteable
+from reports.cures import ROLES, Change, changes, how_measured, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
@@ -218,11 +218,12 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     worst, same = plain[0] if plain else max(known, key=lambda pair: ratio_of(pair[0]) or 0.0)
     if (ratio_of(same) or 0.0) >= (ratio_of(worst) or 0.0):
         return None
+    found = changes(source.observations, scene, dimension, engine, shipped, better)
     where = " ".join(f"{name}={value:g}" for name, value in worst["slot"]["params"].items())
     return Cure(
         scene, dimension, engine, shipped, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
-        changes(source.observations, scene, dimension, engine, shipped, better),
+        sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # what matters stands first
         pasteable(source.observations, scene, dimension, engine, shipped, better),
         how_measured(engine, scene, shipped, better),
     )  # fmt: skip

@@ -265,6 +265,18 @@ def test_no_caption_is_wider_than_what_is_seen_of_its_table(browser, page_file, 
     assert [entry for entry in said if entry[1] > 1] == []
 
 
+def test_on_a_phone_no_line_of_a_table_is_mostly_empty(browser, page_file):
+    """What lies outside the picture makes no line taller than a screen."""
+    with opened(browser, page_file, width=390) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+        tall = page.evaluate(
+            "() => [...document.querySelectorAll('.wrongs tr, .findings tr, #own-failures tr')]"
+            ".filter(row => row.cells[row.cells.length - 1].getBoundingClientRect().left > 390)"
+            ".map(row => row.textContent.slice(0, 60))"
+        )
+    assert tall == []
+
+
 def test_the_text_of_the_explorer_can_be_read_on_a_phone(browser, page_file):
     with opened(browser, page_file, "#explorer", width=390) as page:
         height = page.locator("#explorer-plot text").first.evaluate("node => node.getBoundingClientRect().height")

@@ -58,6 +58,7 @@ def test_what_is_kept_is_enough_and_nothing_of_it_can_be_left_out(enough, kept):
         ({"a": NEEDED, "b": NEEDED, "c": ""}, "a and b"),
         ({"a": NEEDED, "b": COMPLETES, "c": COMPLETES}, "a with b and c"),
         ({"a": COMPLETES, "b": COMPLETES}, "a and b"),
+        ({"a": NEEDED, "b": NEEDED, "c": NEEDED, "d": COMPLETES}, "a, b and c with d"),
     ],
 )
 def test_what_decides_is_said_in_words(roles, text):

@@ -143,8 +143,11 @@
     pen.rect(x0, y0, width, height);
     pen.clip();
     pen.translate(x0, y0);
-    const zoom = Math.min((width - 2 * pad) / (high[0] - low[0]), (height - 2 * pad) / (high[1] - low[1]));
-    const left = width / 2 - zoom * (low[0] + high[0]) / 2, base = height / 2 + zoom * (low[1] + high[1]) / 2;
+    /* A lane keeps its three lines of text free. */
+    const top = title ? Math.min(50, height / 4) : pad;
+    const zoom = Math.min((width - 2 * pad) / (high[0] - low[0]), (height - top - pad) / (high[1] - low[1]));
+    const left = width / 2 - zoom * (low[0] + high[0]) / 2;
+    const base = (height + top - pad) / 2 + zoom * (low[1] + high[1]) / 2;
     const upright = uprightOf(data, plane);
     const to = (p) => { const q = upright(p); return [left + zoom * q[0], base - zoom * q[1]]; };
     const path = (body, pose) => {
