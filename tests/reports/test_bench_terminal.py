@@ -122,7 +122,7 @@ def test_the_quality_of_the_timings_is_one_line():
         "drifts": [True, False, False], "load": np.array([1.0, 1.5, math.nan]),
     })  # fmt: skip
     assert speed.quality_line(table) == (
-        "2 units timed, 12 timings; interval of the median under 5 % for 50%, median 6.0%; 1 drift; "
+        "2 units timed, 12 timings; interval of the median under 5 % for 50 %, median 6.0 %; 1 drift; "
         "wall / CPU time 1.25 (median); 1 void"
     )
     assert speed.quality_line(table[table["void"] != ""]) == "nothing was timed"

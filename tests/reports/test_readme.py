@@ -83,6 +83,7 @@ NOT_RUN = {
     "crosscheck compile": "minutes where the kernels are not there yet: `make test` begins with it",
     "crosscheck findings --prove ID": "runs an engine again with one setting switched: run by test_proving_command.py",
     "crosscheck tune ENGINE": "minutes: its search is run by tests/validation/test_tuning.py",
+    "crosscheck tune ENGINE --decisive": "minutes: its measurement is run by tests/validation/test_decisive.py",
 }
 
 
