@@ -17,6 +17,8 @@ from typing import Any, TypeVar
 import numba
 from numba.core import config as numba_config
 
+from reference_solver.linking import Carried, Whole
+
 F = TypeVar("F", bound=Callable[..., object])
 
 # numba's type hints know neither its configuration's attributes nor all options of njit.
@@ -79,7 +81,8 @@ def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
     try:
         result: F = njit(
             function,
-            cache=CACHE_FOLDER is not None,
+            cache=CACHE_FOLDER is not None and not inner,
+            pipeline_class=Carried if inner else Whole,
             **(INNER_OPTIONS | {"no_cpython_wrapper": inner}),
             inline="always" if inline else "never",
         )

@@ -10,7 +10,6 @@ from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
-from reference_solver.planar.state import LOCATED, options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.located import copy_ledger, run_located
@@ -30,6 +29,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.options import LOCATED, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -43,7 +43,7 @@ class World:
         self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
-        self._sub_step = allocate_sub_step()
+        self._sub_step = allocate_sub_step(n)
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))

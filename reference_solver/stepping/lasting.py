@@ -15,10 +15,17 @@ Indices = NDArray[np.int64]
 CONTACTS, BODIES, VELOCITIES, TANGENTS = 0, 1, 2, 3
 SIZES = 4
 #: Modes of a contact. OPEN: it parts. STICK: its tangents are held. SLIP: friction mu times the load against the slip.
-
 OPEN, STICK, SLIP = 0, 1, 2
 #: Rows of the dense matrix of a phase; islands with more rows are stepped by the impulse-level scheme.
-MOST_ROWS = 96
+MOST_ROWS = 64
+#: Contacts of a phase: each pressed one has a row at least.
+MOST_CONTACTS = MOST_ROWS
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a feature.
+LOAD, GRIP, ONWARD, FEATURE = 0, 1, 2, 3
+MONITORS = 4
+#: Places in `Lasting.monitor`: start of the phase; near and far end of a search; the step made last; its stages.
+START, NEAR, FAR, LAST, BETWEEN = 0, 1, 2, 3, 4
+PLACES_WATCHED = 5
 #: Stages of the Dormand-Prince step.
 STAGES = 7
 #: Numbers that a dimension may keep of the features of a contact.
@@ -35,7 +42,11 @@ class Lasting(NamedTuple):
     kind: Indices  # (k, KINDS): which features, the dimension's own
     place: Array  # (k, PLACES): features in body axes, the dimension's own
     friction: Array  # (k,): mu
-    noise: Array  # (k, 2): gap [m] and velocity [m/s] that are round-off
+    slides: Indices  # (k,): 1 where it slips at the start of the phase, 0 where it may begin to
+    speeds: Array  # (k,): reference speed [m/s], `noise.NOISE` of which is round-off
+    extent: Array  # (k,): smaller half width of its bodies [m]
+    scale: Array  # (k,): size of the accelerations that meet in its rows [m/s^2]
+    usual: Array  # (k, 1 + T): forces at the start of the phase, from which redundant ones are told [N]
     gap: Array  # (k,) [m]
     frame: Array  # (k, 1 + T, D): normal, tangents, world axes
     jacobian: Array  # (k, 2, 1 + T, V): u = J_A v_A + J_B v_B
@@ -44,7 +55,9 @@ class Lasting(NamedTuple):
     gamma: Array  # (k, 1 + T): (dJ/dt) v [m/s^2]
     force: Array  # (k, 1 + T): lambda [N]
     direction: Array  # (k, T): unit vector of the slip, where it slips
+    begun: Array  # (k, T): the same at the start of the phase
     impulse: Array  # (k, D): integral of the force on B over the phase, world axes [N s]
+    moment: Array  # (k, V - D): of it about the world's origin [N m s]
     work: Array  # (k, 2): work on the relative motion and of moving surfaces [J]
     base: Array  # (n, P): poses at the start of the phase
     before: Array  # (n, V): twists there
@@ -59,14 +72,21 @@ class Lasting(NamedTuple):
     right: Array  # (R,)
     answer: Array  # (R,)
     spare: Array  # (R,)
+    other: Array  # (R,)
+    weight: Array  # (R,)
+    wanted: Array  # (T,)
     order: Indices  # (R,)
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
-    monitor: Array  # (3, k, 4): what must not fall below zero, at the start, the near and the far end of the search
+    monitor: Array  # (PLACES_WATCHED, k, MONITORS): what must not fall below zero while modes are held
+    length: Array  # (1,): of the step being made [s]
+    early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
+    spin: Array  # (V,)
+    trial: Array  # (k, 2, 1 + T, V): rows at the start of a path
 
 
 def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
     """Return room for phases of ``bodies`` bodies and ``contacts`` contacts."""
-    n, k, v, t, p = bodies, contacts, 3 * (dimension - 1), dimension - 1, 3 if dimension == 2 else 7
+    n, k, v, t, p = bodies, min(contacts, MOST_CONTACTS), 3 * (dimension - 1), dimension - 1, 3 if dimension == 2 else 7
     r = min(k * (1 + t), MOST_ROWS)
     return Lasting(
         size=np.array([0, n, v, t], np.int64),
@@ -76,7 +96,11 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         kind=np.zeros((k, KINDS), np.int64),
         place=np.zeros((k, PLACES)),
         friction=np.zeros(k),
-        noise=np.zeros((k, 2)),
+        slides=np.zeros(k, np.int64),
+        speeds=np.zeros(k),
+        extent=np.zeros(k),
+        scale=np.zeros(k),
+        usual=np.zeros((k, 1 + t)),
         gap=np.zeros(k),
         frame=np.zeros((k, 1 + t, dimension)),
         jacobian=np.zeros((k, 2, 1 + t, v)),
@@ -85,7 +109,9 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         gamma=np.zeros((k, 1 + t)),
         force=np.zeros((k, 1 + t)),
         direction=np.zeros((k, t)),
+        begun=np.zeros((k, t)),
         impulse=np.zeros((k, dimension)),
+        moment=np.zeros((k, v - dimension)),
         work=np.zeros((k, 2)),
         base=np.zeros((n, p)),
         before=np.zeros((n, v)),
@@ -100,7 +126,14 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         right=np.zeros(r),
         answer=np.zeros(r),
         spare=np.zeros(r),
+        other=np.zeros(r),
+        weight=np.zeros(r),
+        wanted=np.zeros(t),
         order=np.zeros(r, np.int64),
         unknown=np.zeros((r, 2), np.int64),
-        monitor=np.zeros((3, k, 4)),
+        monitor=np.zeros((PLACES_WATCHED, k, MONITORS)),
+        length=np.zeros(1),
+        early=np.ones(1),
+        spin=np.zeros(v),
+        trial=np.zeros((k, 2, 1 + t, v)),
     )

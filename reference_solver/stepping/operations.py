@@ -8,11 +8,15 @@ that the caller's machine code is found on disk again by the next process. Uncom
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
+from reference_solver.linking import Carried
+
+#: The bodies of either dimension: what operations are chosen by.
+Bodies: TypeAlias = Any
 
 
 def operation(function: Callable[..., Any]) -> Any:
@@ -27,7 +31,7 @@ def operation(function: Callable[..., Any]) -> Any:
         chosen.table = table  # type: ignore[attr-defined]
         return chosen
 
-    options: Any = INNER_OPTIONS
+    options: Any = INNER_OPTIONS | {"pipeline_class": Carried}
 
     @overload(function, jit_options=options, strict=False)
     def pick(first: Any, *others: Any) -> Any:

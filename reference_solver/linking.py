@@ -1,0 +1,100 @@
+"""How kernels become machine code: what only kernels call is carried to them as it is, and optimised there once.
+
+numba makes machine code of every function by itself, all that it calls included and optimised anew. For kernels of some
+four hundred functions, ten calls deep, this costs several times what compiling does. Here a function that only kernels
+call ends as a module of its own that is neither linked, optimised nor translated; a kernel links all modules it needs,
+directly or not, and is optimised as a whole.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class Module(JITCodeLibrary):  # type: ignore[misc]
+    """The code of one function, to be linked into others."""
+
+    def finalize(self) -> None:
+        """Keep the module as it is."""
+        self._raise_if_finalized()
+        self._finalized = True
+
+
+class Program(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a kernel with all that it calls."""
+
+    def finalize(self) -> None:
+        """Link what is called by what is called as well."""
+        known = set(self._linking_libraries)
+        for library in self._linking_libraries:  # grows meanwhile
+            if isinstance(library, Module):
+                more = [other for other in library._linking_libraries if other not in known]
+                known.update(more)
+                self._linking_libraries.extend(dict.fromkeys(more))
+        super().finalize()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class ModuleLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function to a `Module`."""
+
+    _name = "module_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower without making the function callable from Python."""
+        state.library = Module(state.targetctx.codegen(), state.func_id.func_qualname)
+        context, state.targetctx = state.targetctx, copy.copy(state.targetctx)
+        state.targetctx.get_executable = not_callable
+        try:
+            return bool(super().run_pass(state))
+        finally:
+            state.targetctx = context
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class ProgramLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function to a `Program`."""
+
+    _name = "program_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower with all code that is called."""
+        state.library = Program(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+def not_callable(library: Any, description: Any, environment: Any) -> Any:
+    """Return what stands for the machine code: a builtin of its own, as numba demands, that refuses any arguments."""
+    return f"{description.qualname} is called by kernels only".index
+
+
+class Carried(CompilerBase):  # type: ignore[misc]
+    """Compiles functions that only kernels call."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's own passes, the lowering apart."""
+        return [with_lowering(self.state, ModuleLowering)]
+
+
+class Whole(CompilerBase):  # type: ignore[misc]
+    """Compiles kernels."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return numba's own passes, the lowering apart."""
+        return [with_lowering(self.state, ProgramLowering)]
+
+
+def with_lowering(state: Any, lowering: type) -> Any:
+    """Return numba's passes with another lowering."""
+    passes = DefaultPassBuilder.define_nopython_pipeline(state)
+    passes.passes = [(lowering, text) if step is NativeLowering else (step, text) for step, text in passes.passes]
+    passes._finalized = False
+    passes.finalize()
+    return passes
