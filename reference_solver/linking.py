@@ -17,7 +17,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
 
-class Module(JITCodeLibrary):  # type: ignore[misc]
+class Module(JITCodeLibrary):
     """The code of one function, to be linked into others."""
 
     def finalize(self) -> None:
@@ -26,22 +26,34 @@ class Module(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
 
-class Program(JITCodeLibrary):  # type: ignore[misc]
+class Program(JITCodeLibrary):
     """The code of a kernel with all that it calls."""
 
     def finalize(self) -> None:
-        """Link what is called by what is called as well."""
-        known = set(self._linking_libraries)
-        for library in self._linking_libraries:  # grows meanwhile
+        """Link what is called by what is called as well, callers first: what nobody asked for yet is not linked."""
+        known: set[Any] = set()
+        ordered: list[Any] = []
+
+        def visit(library: Any) -> None:
+            if library in known:
+                return
+            known.add(library)
             if isinstance(library, Module):
-                more = [other for other in library._linking_libraries if other not in known]
-                known.update(more)
-                self._linking_libraries.extend(dict.fromkeys(more))
+                for other in library._linking_libraries:
+                    visit(other)
+            ordered.append(library)
+
+        for library in self._linking_libraries:
+            visit(library)
+        self._linking_libraries = ordered[::-1]
         super().finalize()
+        missing = [f.name for f in self._final_module.functions if f.is_declaration and f.name.startswith("_ZN")]
+        if missing:
+            raise AssertionError(f"{self.name}: not linked: {', '.join(missing)}")
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class ModuleLowering(NativeLowering):  # type: ignore[misc]
+class ModuleLowering(NativeLowering):
     """Lower a function to a `Module`."""
 
     _name = "module_lowering"
@@ -58,7 +70,7 @@ class ModuleLowering(NativeLowering):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class ProgramLowering(NativeLowering):  # type: ignore[misc]
+class ProgramLowering(NativeLowering):
     """Lower a function to a `Program`."""
 
     _name = "program_lowering"
@@ -75,7 +87,7 @@ def not_callable(library: Any, description: Any, environment: Any) -> Any:
     return f"{description.qualname} is called by kernels only".index
 
 
-class Carried(CompilerBase):  # type: ignore[misc]
+class Carried(CompilerBase):
     """Compiles functions that only kernels call."""
 
     def define_pipelines(self) -> list[Any]:
@@ -83,7 +95,7 @@ class Carried(CompilerBase):  # type: ignore[misc]
         return [with_lowering(self.state, ModuleLowering)]
 
 
-class Whole(CompilerBase):  # type: ignore[misc]
+class Whole(CompilerBase):
     """Compiles kernels."""
 
     def define_pipelines(self) -> list[Any]:

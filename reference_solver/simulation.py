@@ -17,9 +17,8 @@ The two dimensions are two packages behind one interface, chosen from one table.
 
 from __future__ import annotations
 
-from copy import deepcopy
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -43,6 +42,9 @@ class World(Protocol):
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Make ``steps`` steps."""
+
+    def copy(self) -> Self:
+        """Return a world of its own in the same state."""
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
@@ -155,7 +157,7 @@ class Simulation:
         """Run once with pieces recorded; again from the start, with twice the room, while there was too little."""
         n, room = len(self.model.bodies), 2 * steps + 16
         while True:
-            trial = deepcopy(self._world)
+            trial = self._world.copy()
             trial.journal = allocate_journal(self.model.dimension, n, room)
             frames = trial.run(steps, stride, contacts)
             if not is_full(trial.journal):

@@ -53,7 +53,7 @@ def painleve(share: float, spin: float, dt: float = 1e-6, speed: float = 1.0) ->
         forces = coulomb_solutions(w, np.array([lift, 0.0]), [mu], sliding=[-1.0])
         steps = coulomb_solutions(w, np.array([-GRAVITY * run.settings.dt, -speed]), [mu])
         impulse = run.impulse(-1, 0, 1)
-        found = np.array([impulse[1], -impulse[0]])
+        found = np.array([impulse[1], -impulse[0]])  # nothing where the end lifts: it has no contact
         misses = [float(np.abs(found - s.impulse[0]).max()) for s in steps]
         # g dt: what the ends of the step may differ by between schemes that solve at its start or locate events
         if not misses or min(misses) > 4.0 * GRAVITY * run.settings.dt:

@@ -5,7 +5,18 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.model import Array
-from reference_solver.pieces import BODIES, CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
+from reference_solver.pieces import (
+    BODIES,
+    CONTACTS,
+    FIFTH_ORDER,
+    FIXED,
+    FORCES,
+    FROZEN,
+    IMPACT,
+    IMPULSE_LEVEL,
+    RELEASE,
+    Journal,
+)
 from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
 from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
 from reference_solver.planar.state import Bodies, Rows, SubStep
@@ -54,11 +65,11 @@ def enter_moments(journal: Journal, lasting: Lasting, first: int) -> None:
 
 @inner_kernel
 def enter_settled(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> None:
-    """Enter the impact that takes out the approach of contacts that were frozen while they turned (E28)."""
+    """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
     if is_kept(sub.journal):
-        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, IMPACT, FROZEN)
+        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
         enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
-        enter_contact_rows(sub.journal, bodies, bodies.pose, rows, PN, PT)
+        enter_contact_rows(sub.journal, bodies, sub.journal.pose, rows, IMPACT_N, IMPACT_T)
 
 
 @inner_kernel
@@ -84,7 +95,7 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
         enter_numbered(journal, bodies, sub.pose, sub.start)
         enter_contact_rows(journal, bodies, sub.pose, rows, IMPACT_N, IMPACT_T)
     keep_state(journal, sub.pose, sub.start)
-    scheme = FIXED if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    scheme = IMPULSE_LEVEL if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
     open_piece(journal, begin, length, FORCES, scheme)
     enter_numbered(journal, bodies, bodies.pose, bodies.twist)
     first = journal.used[CONTACTS]

@@ -9,11 +9,21 @@ from reference_solver.planar.broadphase import bound_bodies
 from reference_solver.planar.columns import COS, EXTENT, GAP, MOTION, PN, REACH, SIN, SPEED, A, B
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.state import CONTACTS, FIXED, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.noise import DRIFT
 from reference_solver.stepping.options import Options
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
 AT_REST = 1e-14
+
+
+@inner_kernel
+def keep_start(bodies: Bodies, sub: SubStep) -> None:
+    """Keep the poses that the sub-step begins with."""
+    for i in range(len(bodies.kind)):
+        for k in range(3):
+            sub.pose[i, k] = bodies.pose[i, k]
+        sub.turn[i, 0], sub.turn[i, 1] = bodies.real[i, COS], bodies.real[i, SIN]
 
 
 @inner_kernel
@@ -23,10 +33,9 @@ def begin_flight(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> Non
         sub.closing[i] = 0
         for k in range(3):
             sub.gain[i, k] = (bodies.twist[i, k] - sub.start[i, k]) / length
-            sub.pose[i, k] = bodies.pose[i, k]
             sub.after[i, k] = bodies.twist[i, k]
-        sub.turn[i, 0], sub.turn[i, 1] = bodies.real[i, COS], bodies.real[i, SIN]
-    for c in range(rows.counts[CONTACTS]):
+    keep_start(bodies, sub)
+    for c in range(rows.counts[CONTACTS] if sub.clock[HELD] == 0.0 else 0):
         drift = max(abs(normal_velocity(sub.start, rows, c)), rows.real[c, GAP] / length)
         if rows.real[c, PN] > 0.0 and drift > DRIFT * rows.real[c, SPEED]:
             sub.closing[rows.integer[c, A]] = sub.closing[rows.integer[c, B]] = 1

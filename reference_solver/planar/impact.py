@@ -127,6 +127,7 @@ def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
                 copy_row(rows, c, kept)
                 rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.real[kept, RESTITUTION] = 0.0
+                rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.old_impulse[old, 0], rows.old_impulse[old, 1]
                 kept += 1
         if kept > first:
             rows.manifold[manifolds] = first

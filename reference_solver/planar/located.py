@@ -14,22 +14,14 @@ from reference_solver.direct.problem import Problem
 from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import certify, open_solve, row_work
+from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import (
-    APPROACH,
     FORCE_N,
     FORCE_T,
-    IMPACT_N,
-    IMPACT_T,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LOAD,
     MOTION,
     PN,
     PT,
     RELEASE,
-    SPEED,
-    TARGET,
 )
 from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
@@ -39,10 +31,11 @@ from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
+from reference_solver.planar.midpoint import close_gaps, keep_change, misses_end, take_back
 from reference_solver.planar.position import correct_positions
-from reference_solver.planar.rows import measure_speed
-from reference_solver.planar.slide import go_back, keep, press_until_stick
-from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
+from reference_solver.planar.rows import warm_start
+from reference_solver.planar.slide import cut_work, go_back, keep, press_until_stick
+from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.clock import (
@@ -55,15 +48,16 @@ from reference_solver.stepping.clock import (
     REBOUND,
     UNSETTLED,
     count_event,
+    hold_rest,
     open_step,
     weigh_event,
     weigh_jam,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
-from reference_solver.stepping.noise import NOISE, NOTHING_LEFT, SHORT
-from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
+from reference_solver.stepping.options import BLOCK, MIDPOINT, Options
 from reference_solver.stepping.phase import SHORTENED
-from reference_solver.tally import CONTACT_WORK, CONTRADICTED_A, EXHAUSTED, LOAD_WORK, SURFACE_WORK
+from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
 
 
 @spliced_kernel
@@ -100,6 +94,15 @@ def free_bodies(bodies: Bodies) -> int:
     count = 0
     for i in range(len(bodies.kind)):
         count += 1 if bodies.kind[i, MOTION] == FREE else 0
+    return count
+
+
+@inner_kernel
+def independent_rows(rows: Rows, options: Options) -> int:
+    """Number of rows, of flush faces no more than hold two bodies together: all others follow from them."""
+    count = 0
+    for m in range(rows.counts[MANIFOLDS]):
+        count += min((1 + options.friction) * (rows.manifold[m + 1] - rows.manifold[m]), 2 + options.friction)
     return count
 
 
@@ -146,7 +149,9 @@ def sub_step(
         return False
     if sub.clock[LEFT] == options.dt:
         free = free_bodies(bodies)
-        weigh_jam(sub.clock, (1 + options.friction) * rows.counts[CONTACTS], 3 * free, free)
+        weigh_jam(sub.clock, independent_rows(rows, options), 3 * free, free)
+        if options.scheme == MIDPOINT:
+            sub.clock[JAMMED] = 1.0
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
@@ -154,12 +159,15 @@ def sub_step(
     if tally[CONTRADICTED_A] > 0.0:
         return True
     begin_flight(bodies, rows, sub, length)
-    curved, frozen = 0.0, sub.clock[HELD] > 0.0
-    if not frozen and turns(bodies, rows, sub, length):
+    curved = 0.0
+    if sub.clock[HELD] == 0.0 and turns(bodies, rows, sub, length):
         if sub.clock[JAMMED] == 0.0:
             curved = curve(bodies, rows, sub, tally)
-        frozen = curved == 0.0
-    sub.clock[UNSETTLED] = 1.0 if frozen and rows.counts[CONTACTS] > 0 else 0.0
+        if curved == 0.0:
+            hold_rest(sub.clock, tally)
+            go_back(tally, sub.tally[0])
+            copy_vectors(sub.before, bodies.twist)
+            return True
     length = curved if curved > 0.0 else length
     end = next_impact(bodies, pairs, rows, sub, options, length)
     if end < 0.0:
@@ -180,6 +188,7 @@ def sub_step(
     remember_forces(bodies, rows, length, options.dt)
     if end < length:
         cut_work(bodies, rows, sub, tally, end, end / length)
+    sub.clock[UNSETTLED] = end if sub.clock[HELD] > 0.0 and rows.counts[CONTACTS] > 0 else 0.0
     enter_contacts(bodies, rows, ledger)
     enter_sub_step(bodies, rows, sub, options, end, curved > 0.0)
     if options.restitution and release(bodies, rows, problem, options, tally):
@@ -202,10 +211,11 @@ def settle(
     options: Options,
     tally: Array,
 ) -> bool:
-    """Take out the approach of contacts that were frozen while they turned: an impact with e = 0 (E28).
+    """Take out what the impulse-level scheme leaves of the velocities and gaps of contacts that it held (E28).
 
-    Otherwise it would be an impact in the sub-step that follows, which knows nothing of this one. False if an array is
-    too small; called again, it starts anew.
+    Their impulses are found anew with the rows of the end, by a solve that starts from them: what was too much is taken
+    back. Otherwise it would be an impact in the sub-step that follows, which knows nothing of this one. False if an
+    array is too small; called again, it starts anew.
     """
     if not detect(bodies, pairs, rows, options):
         return False
@@ -216,39 +226,21 @@ def settle(
         return False
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
-    approaches = False
-    for c in range(rows.counts[CONTACTS]):
-        measure_speed(bodies, rows, c, options.dt)
-        approaches = approaches or rows.real[c, APPROACH] < -NOISE * rows.real[c, SPEED]
-        rows.real[c, TARGET] = rows.real[c, PN] = rows.real[c, PT] = 0.0
-        rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
-    if approaches:
-        keep_state(sub.journal, bodies.pose, bodies.twist)
+    time = sub.clock[UNSETTLED]
+    misses = misses_end(bodies, rows, options, time)
+    keep_state(sub.journal, bodies.pose, bodies.twist)
+    if misses:
+        take_back(bodies, rows, options)
         open_solve(bodies, 0.0, tally)
+        warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+        keep_change(rows, time)
         enter_contacts(bodies, rows, ledger)
+    if close_gaps(bodies, rows, problem, sub, options, tally) or misses:
         enter_settled(bodies, rows, sub, options)
     sub.clock[UNSETTLED] = 0.0
     return True
-
-
-@inner_kernel
-def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float, share: float) -> None:
-    """Impulses, and work in the tally, of a sub-step that was solved at full length and cut at ``end``."""
-    for entry in range(CONTACT_WORK, LOAD_WORK + 1):
-        tally[entry] = sub.tally[1, entry]
-    for i in range(len(bodies.kind)):
-        for k in range(3):
-            bodies.start[i, k] = sub.start[i, k] + end * bodies.real[i, LOAD + k]
-            inverse = bodies.real[i, INVERSE_MASS if k < 2 else INVERSE_INERTIA]
-            if bodies.kind[i, MOTION] == FREE and inverse > 0.0:
-                mean = 0.5 * (bodies.start[i, k] + sub.start[i, k])
-                tally[LOAD_WORK] += end * bodies.real[i, LOAD + k] / inverse * mean
-    for c in range(rows.counts[CONTACTS]):
-        rows.real[c, PN], rows.real[c, PT] = share * rows.real[c, PN], share * rows.real[c, PT]
-        done, moved, _ = row_work(bodies, rows, c)
-        tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
 
 
 @spliced_kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Self
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.stepping.lasting import allocate_lasting
-from reference_solver.stepping.options import FIXED_STEP, LOCATED, options, uses_direct
+from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -83,7 +84,7 @@ class World:
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
-        located = self._options.scheme == LOCATED
+        located = self._options.scheme != FIXED_STEP
         count = int(self._ledger.used[0] if located else self._rows.counts[CONTACTS])
         buffer = self._buffer(0, count)
         if located:
@@ -92,10 +93,17 @@ class World:
             copy_contacts(self._rows, buffer, 0)
         return _contacts(buffer, count)
 
+    def copy(self) -> Self:
+        """Return a world of its own in the same state.
+
+        Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
+        and of another type, for which all kernels would be compiled anew.
+        """
+        return deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
+
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
-        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
-        trial = deepcopy(self, {id(table): table for table in (self._pairs.restitution, self._pairs.friction)})
+        trial = self.copy()
         trial._options = self._options._replace(scheme=FIXED_STEP)
         while not pose_problem(trial._bodies, trial._pairs, trial._rows, trial._options):
             trial._grow()
@@ -103,7 +111,7 @@ class World:
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
         state = (self._bodies, self._pairs, self._rows, self._problem)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             sub = self._sub._replace(journal=self.journal)
             own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
             return int(run_located(*(*state, sub, *own)))

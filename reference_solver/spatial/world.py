@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Self
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
-from reference_solver.stepping.options import LOCATED, options, uses_direct
+from reference_solver.stepping.options import FIXED_STEP, MIDPOINT, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -46,6 +47,8 @@ class World:
         self._sub_step = allocate_sub_step(n)
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
+        if self._options.scheme == MIDPOINT:
+            raise ValueError("scheme: 'midpoint' exists in the plane only")
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
         self.journal = allocate_journal(3, n, 0)
@@ -80,7 +83,7 @@ class World:
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
             return int(run_located(*state, sub, self._ledger, self._options, self.tally, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
@@ -88,15 +91,21 @@ class World:
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
         buffer = self._buffer(0, self._most_points)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             return _contacts(buffer, copy_ledger(self._ledger, buffer, 0))
         return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
 
+    def copy(self) -> Self:
+        """Return a world of its own in the same state.
+
+        Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
+        and of another type, for which all kernels would be compiled anew.
+        """
+        return deepcopy(self, {id(table): table for table in (self._detection.restitution, self._detection.friction)})
+
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step; the world stays what it is."""
-        # A copy of a table with strides of zero would be one number per pair; nothing writes to the tables.
-        tables = (self._detection.restitution, self._detection.friction)
-        trial, found = deepcopy(self, {id(table): table for table in tables}), -1
+        trial, found = self.copy(), -1
         while found < 0:
             found = pose_problem(trial._bodies, trial._detection, trial._manifolds, trial._memory, trial._options)
             if found < 0:

@@ -8,8 +8,8 @@ from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD
 
 #: Entries of a clock: what is left of the step [s] (0: a new one begins), events located in it, how many of them were
-#: soft, how many soft ones it may have, 1 where what is left of it goes by the fixed-step law (E28), what the last
-#: phase of turning rows was, and 1 where contacts that were frozen while they turned are yet to be settled.
+#: soft, how many soft ones it may have, 1 where what is left of it goes at impulse level (E28), what the last
+#: phase of turning rows was, and the length of a sub-step at impulse level that is yet to be settled [s].
 LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
 #: 1 where bodies may not leave their bounds in the step, and 1 where one has.
 CONFINED, ESCAPED = 7, 8
@@ -57,10 +57,16 @@ def count_event(clock: Array, tally: Array) -> None:
     clock[SOFT] += 1.0
     tally[EVENTS_LOCATED] += 1.0
     if clock[HELD] == 0.0 and clock[SOFT] > clock[PATIENCE]:
-        clock[HELD] = 1.0
-        tally[STEPS_HELD] += 1.0
+        hold_rest(clock, tally)
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
+
+
+@kernel
+def hold_rest(clock: Array, tally: Array) -> None:
+    """Let what is left of the step go by the impulse-level scheme."""
+    clock[HELD] = 1.0
+    tally[STEPS_HELD] += 1.0
 
 
 @kernel

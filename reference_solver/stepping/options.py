@@ -8,7 +8,7 @@ from reference_solver.needs import Needs
 from reference_solver.settings import Settings
 
 SCALAR, BLOCK = 0, 1
-FIXED_STEP, LOCATED = 0, 1
+FIXED_STEP, LOCATED, MIDPOINT = 0, 1, 2
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 
@@ -58,5 +58,5 @@ def options(settings: Settings, needs: Needs) -> Options:
         friction=int(needs.friction),
         restitution=int(needs.restitution),
         broadphase=int(needs.broadphase),
-        scheme={"fixed": FIXED_STEP, "located": LOCATED}[settings.scheme],
+        scheme={"fixed": FIXED_STEP, "located": LOCATED, "midpoint": MIDPOINT}[settings.scheme],
     )
