@@ -53,6 +53,8 @@ ALONE = [
     (rotation.angular_momentum, "reference"),
     *[(turning.errors, name) for name in turning.CASES],
     *[(turning.order, name) for name in turning.CASES],
+    *[(turning.impulse_order, name) for name in turning.SMOOTH],
+    (turning.long_board,),
     *[(turning_in_space.errors, name) for name in turning_in_space.CASES],
     *[(turning_in_space.order, name) for name in turning_in_space.CASES],
     (detection.seams, SPACES[0], "polygon"),
