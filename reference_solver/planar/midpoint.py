@@ -20,6 +20,7 @@ from reference_solver.planar.columns import (
     ARM_A,
     ARM_B,
     COS,
+    EXTENT,
     FORCE_N,
     FORCE_T,
     FRICTION,
@@ -32,9 +33,12 @@ from reference_solver.planar.columns import (
     NY,
     PN,
     PT,
+    REACH,
     SIN,
     SPEED,
     TARGET,
+    A,
+    B,
 )
 from reference_solver.planar.flight import keep_start, put_back
 from reference_solver.planar.impact import gap_noise
@@ -52,6 +56,10 @@ from reference_solver.stepping.options import BLOCK, Options
 GAP_SHARE = 0.25
 #: Impulses of a solve for displacements start from this multiple of what its widest gap alone would take.
 FAR_ABOVE = 1e3
+#: Largest gap, as a share of the smaller half width, that the scheme may have left: (w h)^3 of a turn of .1 rad.
+LEFT_OVER = 1e-4
+#: Farthest that closing gaps may move a body, in multiples of the widest: a lever of a slender body.
+LEVERAGE = 100.0
 
 
 @inner_kernel
@@ -126,12 +134,17 @@ def misses_end(bodies: Bodies, rows: Rows, options: Options, time: float) -> boo
 
 @inner_kernel
 def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> bool:
-    """Move bodies until the gaps of all rows are closed, by M^-1 J^T; False if they are.
+    """Move bodies until the gaps of all rows are closed, by M^-1 J^T; False if they are, or cannot be.
 
-    A solve for displacements, whose impulses are counted from far above zero: contacts push and pull.
+    A solve for displacements, whose impulses are counted from far above zero: contacts push and pull. Gaps and overlaps
+    that the scheme cannot have left are not its own to close, nor those that contradict each other: then bodies stay.
     """
-    widest = 0.0
+    widest, smallest = 0.0, math.inf
     for c in range(rows.counts[CONTACTS]):
+        extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
+        if abs(rows.real[c, GAP]) > LEFT_OVER * extent:
+            return False
+        smallest = min(smallest, extent)
         if abs(rows.real[c, GAP]) > GAP_SHARE * gap_noise(bodies, rows, c):
             widest = max(widest, abs(rows.real[c, GAP]))
     if widest == 0.0:
@@ -144,6 +157,13 @@ def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, optio
         rows.real[c, PN], rows.real[c, PT] = FAR_ABOVE * widest * rows.real[c, NORMAL_MASS], 0.0
         rows.real[c, TARGET], rows.real[c, SPEED], rows.real[c, FRICTION] = -rows.real[c, GAP], widest, 0.0
     solve_velocities(bodies, rows, problem, options, tally)
+    farthest = 0.0
+    for i in range(len(bodies.kind)):
+        way = abs(bodies.twist[i, 0]) + abs(bodies.twist[i, 1]) + bodies.real[i, REACH] * abs(bodies.twist[i, 2])
+        farthest = max(farthest, way if bodies.kind[i, MOTION] == FREE else 0.0)
+    if farthest > LEVERAGE * widest:
+        copy_vectors(sub.after, bodies.twist)
+        return False
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FREE:
             for d in range(3):
