@@ -4,6 +4,9 @@ numba makes machine code of every function by itself, all that it calls included
 four hundred functions, ten calls deep, this costs several times what compiling does. Here a function that only kernels
 call ends as a module of its own that is neither linked, optimised nor translated; a kernel links all modules it needs,
 directly or not, and is optimised as a whole.
+
+numba has no public way to say so: this rests on its lowering pass and its code library, as of the release that
+`constraints.txt` names. A release in which they differ fails here, at import or with what is not linked, never silently.
 """
 
 from __future__ import annotations
