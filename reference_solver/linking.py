@@ -6,7 +6,7 @@ call ends as a module of its own that is neither linked, optimised nor translate
 directly or not, and is optimised as a whole.
 
 numba has no public way to say so: this rests on its lowering pass and its code library, as of the release that
-`constraints.txt` names. A release in which they differ fails here, at import or with what is not linked, never silently.
+`constraints.txt` names. Where another release differs it fails here, at import or with what is not linked.
 """
 
 from __future__ import annotations
