@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver import tally as entries
 from reference_solver.model import Array
+from reference_solver.stepping.noise import EVENT_BUDGET
 
 
 class Gate(NamedTuple):
@@ -86,4 +87,9 @@ def reasons(tally: Array) -> tuple[str, ...]:
     found = [f"{gate.meaning}: {gate.name} {tally[gate.entry]:.3g}, at most {gate.limit:.3g}" for gate in missed]
     if tally[entries.NOT_FINITE] > 0.0:
         found.append(f"velocities are no numbers after {int(tally[entries.NOT_FINITE])} contact solves")
+    if tally[entries.EXHAUSTED] > 0.0:
+        found.append(f"a step has more than {EVENT_BUDGET} events: the run ended there")
+    if tally[entries.CONTRADICTED_A] > 0.0:
+        pair = [int(tally[entry]) - 1 for entry in (entries.CONTRADICTED_A, entries.CONTRADICTED_B)]
+        found.append(f"no impulses keep bodies {pair[0]} and {pair[1]} apart: the run ended there")
     return tuple(found)

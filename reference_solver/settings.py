@@ -8,7 +8,7 @@ from typing import Literal
 
 Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
-Scheme = Literal["fixed", "located"]
+Scheme = Literal["fixed", "located", "midpoint"]
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ class Settings:
         close it, not more (E8). Pairs with e > 0 are in contact only where they touch.
     scheme
         ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
-        steps are cut where bodies meet and where a slide ends (E19 to E24).
+        steps are cut where bodies meet and where a slide ends (E19 to E24). ``midpoint``: located impacts, and phases
+        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28).
 
     Raises
     ------
@@ -80,8 +81,10 @@ class Settings:
         _require("beta", self.beta, 0.0 < self.beta <= 1.0, "in (0, 1]")
         _require("slop", self.slop, math.isfinite(self.slop) and self.slop >= 0.0, "a length of at least 0")
         _require("solver", self.solver, self.solver in ("scalar", "block"), "'scalar' or 'block'")
-        _require("scheme", self.scheme, self.scheme in ("fixed", "located"), "'fixed' or 'located'")
-        if self.scheme == "located":
+        _require(
+            "scheme", self.scheme, self.scheme in ("fixed", "located", "midpoint"), "'fixed', 'located' or 'midpoint'"
+        )
+        if self.scheme != "fixed":
             allowed = ("split", "none")
             _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")

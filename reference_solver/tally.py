@@ -55,8 +55,12 @@ START_OVERLAP = 26
 OPENED = 27
 #: Coarsest last place of a body's coordinates, as a share of its smallest half width.
 RESOLUTION = 28
+#: Steps that ended the run because their events were more than the budget (E28).
+EXHAUSTED = 29
+#: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
+CONTRADICTED_A, CONTRADICTED_B = 30, 31
 
-SIZE = 29
+SIZE = 32
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (
@@ -73,6 +77,7 @@ SUMS = (
     EVENTS_LOCATED,
     STEPS_HELD,
     UNIQUE,
+    EXHAUSTED,
 )
 
 

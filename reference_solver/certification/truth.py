@@ -130,8 +130,13 @@ def _horizon(model: Model, settings: Settings, record: Record, steps: int, strid
 
 
 def distance(model: Model, one: Array, other: Array) -> Array:
-    """Return how far (s,) any point of a free body is from where it is in another run, at most [m]."""
+    """Return how far (s,) any point of a free body is from where it is in another run, at most [m].
+
+    Infinite where either is no number: a run that ended (E28) is as far from any other as can be.
+    """
     d = model.dimension
+    known = np.asarray(np.isfinite(one).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2)))
+    one, other = one[known], other[known]
     worst = np.zeros(len(one))
     for i, body in enumerate(model.bodies):
         if body.motion != "free":
@@ -139,4 +144,6 @@ def distance(model: Model, one: Array, other: Array) -> Array:
         apart = np.linalg.norm(one[:, i, :d] - other[:, i, :d], axis=1)
         turned = rotation(one[:, i]) - rotation(other[:, i])
         worst = np.maximum(worst, apart + reach(body.shape) * np.linalg.norm(turned, ord=2, axis=(1, 2)))
-    return worst
+    found = np.full(len(known), np.inf)
+    found[known] = worst
+    return found

@@ -13,7 +13,7 @@ from reference_solver.hard_cases.case import HardCase, Run, Verdict
 from reference_solver.hard_cases.collisions import PLACES, elastic_pile, simultaneous
 from reference_solver.hard_cases.extremes import deep_overlap, far_origin, many_sizes, thin_wall
 from reference_solver.hard_cases.masonry import arch
-from reference_solver.hard_cases.rods import card_tent, kane, painleve
+from reference_solver.hard_cases.rods import card_tent, crossed_capsules, kane, painleve
 from reference_solver.hard_cases.stacks import heavy_on_light, overhang
 
 __all__ = ["HARD_CASES", "HardCase", "Run", "Verdict"]
@@ -24,6 +24,7 @@ _CASES = (
     *(painleve(share, spin) for share in (0.98, 1.02) for spin in (0.0, 5.0)),
     *(kane(slide) for slide in (0.727, -0.727)),
     rocking(),
+    crossed_capsules(),
     edge_drop(),
     *(arch(share) for share in (1.02, 0.98)),
     *(card_tent(share) for share in (1.01, 0.99)),

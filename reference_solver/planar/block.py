@@ -22,7 +22,8 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
 from reference_solver.planar.pair_modes import FALLBACK_PASSES, IMPULSE, PARALLEL, VELOCITY, coulomb_point, solve_modes
-from reference_solver.planar.state import MANIFOLDS, Bodies, Options, Rows
+from reference_solver.planar.state import MANIFOLDS, Bodies, Rows
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

@@ -6,18 +6,9 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.columns import COS, EXTENT, MOTION, REACH, SHAPE, SIN, SIZE
-from reference_solver.planar.state import (
-    BOX,
-    CANDIDATES,
-    CAPSULE,
-    FREE,
-    HALF_SPACE,
-    Bodies,
-    Indices,
-    Options,
-    Pairs,
-    Rows,
-)
+from reference_solver.planar.state import BOX, CANDIDATES, CAPSULE, FREE, HALF_SPACE, Bodies, Pairs, Rows
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.sorting import sift_down
 
 
 @inner_kernel
@@ -130,16 +121,3 @@ def sort_candidates(pairs: Pairs, count: int) -> None:
     for end in range(count - 1, 0, -1):
         key[0], key[end] = key[end], key[0]
         sift_down(key, 0, end)
-
-
-@inner_kernel
-def sift_down(key: Indices, root: int, end: int) -> None:
-    """Restore the heap below ``root``."""
-    while 2 * root + 1 < end:
-        child = 2 * root + 1
-        if child + 1 < end and key[child + 1] > key[child]:
-            child += 1
-        if key[root] >= key[child]:
-            return
-        key[root], key[child] = key[child], key[root]
-        root = child

@@ -10,6 +10,7 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.cone import cone_defect
+from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
 from reference_solver.planar.columns import (
     ARM_A,
@@ -40,15 +41,15 @@ from reference_solver.planar.kinematics import (
     normal_velocity,
     tangent_velocity,
 )
-from reference_solver.planar.residual import IMPULSE_SHARE, row_residual
-from reference_solver.planar.state import CONTACTS, FREE, Bodies, Options, Rows
+from reference_solver.planar.residual import row_residual
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows
+from reference_solver.stepping.accounting import LAST_PLACE, enter_creation, enter_share
+from reference_solver.stepping.options import Options
 from reference_solver.tally import (
     CONE,
     CONTACT_WORK,
-    CREATED,
     ENERGY,
     EXCESS,
-    KANE,
     LOAD_WORK,
     MOMENTUM,
     NATURAL,
@@ -56,19 +57,12 @@ from reference_solver.tally import (
     OPENED,
     PENETRATION,
     PULL,
-    PUMPED,
     RESOLUTION,
     SOLVES,
     START_OVERLAP,
     SURFACE_WORK,
     UNIQUE,
 )
-
-#: Created energy up to this share of a solve's work is round-off of its impulses: 1e4 units in the last place, what
-#: cancels where thousands of contacts each do their work.
-CREATED_NOISE = 1e-12
-#: Unit in the last place of a number, as a share of it.
-LAST_PLACE = 2.0**-52
 
 
 @kernel
@@ -146,23 +140,6 @@ def is_finite(bodies: Bodies) -> bool:
             if not math.isfinite(bodies.twist[i, k]):
                 return False
     return True
-
-
-@inner_kernel
-def enter_share(tally: Array, entry: int, defect: float, scale: float) -> None:
-    """Keep the larger share; where nothing acts any defect is a whole one."""
-    if defect > tally[entry] * scale:
-        tally[entry] = defect / scale if scale > 0.0 else max(tally[entry], 1.0)
-
-
-@inner_kernel
-def enter_creation(work: float, effort: float, restored: bool, tally: Array) -> None:
-    """Energy that contacts create (E63): a property of the law under a positive target, an error without one."""
-    if work <= CREATED_NOISE * effort:
-        return
-    enter_share(tally, CREATED if restored else PUMPED, work, effort)
-    if restored:
-        tally[KANE] += 1.0
 
 
 @inner_kernel

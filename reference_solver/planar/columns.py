@@ -12,7 +12,9 @@ SHAPE = 0
 MOTION = 1
 #: First vertex of the body's core in `Bodies.vertex`, and how many (0: half-space, 1: disc, 2: capsule).
 FIRST_VERTEX, VERTICES = 2, 3
-BODY_INTEGERS = 4
+#: Number of the body in the world: bodies of an island are gathered.
+NUMBER = 4
+BODY_INTEGERS = 5
 
 # Bodies.real.
 #: Cosine and sine of the angle.
@@ -40,13 +42,11 @@ A, B = 0, 1
 FEATURE = 2
 #: 1 where bodies meet or part faster than the loads of one step explain.
 IMPACT = 3
-#: 1 where the contact carried load in the sub-step before: it lasts (E20).
-LASTS = 4
 #: How a rebound ends: OPEN_ENDED, SERIES_ENDS or RELEASED, see impact.py (E22).
-ENDING = 5
+ENDING = 4
 #: 1 where the points touch, 0 where a gap is left to close.
-MEETS = 6
-ROW_INTEGERS = 7
+MEETS = 5
+ROW_INTEGERS = 6
 
 # Rows.real.
 #: Normal from A to B; the tangent is the normal turned by +90 degrees.

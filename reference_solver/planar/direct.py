@@ -26,11 +26,9 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.kinematics import add_pressure, apply_normal, apply_tangent, copy_vectors
 from reference_solver.planar.state import CONTACTS as ROW_COUNT
-from reference_solver.planar.state import Bodies, Options, Rows
-
-#: Velocities that differ from those the impulses give by more than this share of all that these can do are mended: some
-#: fifty units in the last place, which is what summing the impulses of a body costs itself.
-MENDED = 1e-14
+from reference_solver.planar.state import Bodies, Rows
+from reference_solver.stepping.noise import MENDED
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

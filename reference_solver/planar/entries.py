@@ -5,17 +5,34 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.model import Array
-from reference_solver.pieces import FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
-from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NX, NY, PN, PT, A, B
-from reference_solver.planar.state import CONTACTS, HELD, LEFT, Bodies, Options, Rows, SubStep
+from reference_solver.pieces import (
+    BODIES,
+    CONTACTS,
+    FIFTH_ORDER,
+    FIXED,
+    FORCES,
+    FROZEN,
+    IMPACT,
+    IMPULSE_LEVEL,
+    RELEASE,
+    Journal,
+)
+from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
+from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
+from reference_solver.planar.state import Bodies, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
+from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel
-def enter_contact_rows(journal: Journal, pose: Array, rows: Rows, normal: int, tangent: int) -> None:
+def enter_contact_rows(journal: Journal, bodies: Bodies, pose: Array, rows: Rows, normal: int, tangent: int) -> None:
     """Enter all rows with the impulses of columns ``normal`` and ``tangent``; ``pose`` as the piece began."""
-    for c in range(rows.counts[CONTACTS]):
+    for c in range(rows.counts[ROW_CONTACTS]):
         b = rows.integer[c, B]
-        k = next_contact(journal, rows.integer[c, A], b, rows.integer[c, FEATURE])
+        first, second = bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[b, NUMBER]
+        k = next_contact(journal, first, second, rows.integer[c, FEATURE])
         if k < 0:
             continue
         x, y = pose[b, 0] + rows.real[c, ARM_B], pose[b, 1] + rows.real[c, ARM_B + 1]
@@ -25,6 +42,34 @@ def enter_contact_rows(journal: Journal, pose: Array, rows: Rows, normal: int, t
         journal.wrench[k, 2], journal.wrench[k, 3] = nx, ny
         journal.wrench[k, 4], journal.wrench[k, 5] = px, py
         journal.wrench[k, 6] = x * py - y * px
+
+
+@inner_kernel
+def enter_numbered(journal: Journal, bodies: Bodies, pose: Array, twist: Array) -> None:
+    """Enter all bodies by their numbers in the world."""
+    first = journal.used[BODIES]
+    enter_bodies(journal, pose, twist)
+    for k in range(first, min(journal.used[BODIES], len(journal.body))):
+        journal.body[k] = bodies.kind[journal.body[k], NUMBER]
+
+
+@inner_kernel
+def enter_moments(journal: Journal, lasting: Lasting, first: int) -> None:
+    """Impulses and moments of lasting contacts, whose frames turned within the piece."""
+    for j in range(lasting.size[HELD_CONTACTS]):
+        k = first + lasting.row[j]
+        if k < len(journal.wrench):
+            journal.wrench[k, 4], journal.wrench[k, 5] = lasting.impulse[j, 0], lasting.impulse[j, 1]
+            journal.wrench[k, 6] = lasting.moment[j, 0]
+
+
+@inner_kernel
+def enter_settled(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> None:
+    """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
+    if is_kept(sub.journal):
+        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
+        enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
+        enter_contact_rows(sub.journal, bodies, sub.journal.pose, rows, IMPACT_N, IMPACT_T)
 
 
 @inner_kernel
@@ -38,7 +83,7 @@ def differ(one: Array, other: Array) -> bool:
 
 
 @inner_kernel
-def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> None:
+def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float, curved: bool) -> None:
     """Enter a located sub-step of ``length``: its impacts where they changed a velocity, then its force phase."""
     journal = sub.journal
     if not is_kept(journal):
@@ -47,12 +92,16 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
     keep_state(journal, sub.pose, sub.before)
     if differ(sub.before, sub.start):
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
-        enter_bodies(journal, sub.pose, sub.start)
-        enter_contact_rows(journal, sub.pose, rows, IMPACT_N, IMPACT_T)
+        enter_numbered(journal, bodies, sub.pose, sub.start)
+        enter_contact_rows(journal, bodies, sub.pose, rows, IMPACT_N, IMPACT_T)
     keep_state(journal, sub.pose, sub.start)
-    open_piece(journal, begin, length, FORCES, FIXED if sub.clock[HELD] > 0.0 else FROZEN)
-    enter_bodies(journal, bodies.pose, bodies.twist)
-    enter_contact_rows(journal, sub.pose, rows, PN, PT)
+    scheme = IMPULSE_LEVEL if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    open_piece(journal, begin, length, FORCES, scheme)
+    enter_numbered(journal, bodies, bodies.pose, bodies.twist)
+    first = journal.used[CONTACTS]
+    enter_contact_rows(journal, bodies, sub.pose, rows, PN, PT)
+    if curved:
+        enter_moments(journal, sub.lasting, first)
     keep_state(journal, bodies.pose, bodies.twist)
 
 
@@ -61,8 +110,8 @@ def enter_release(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, le
     """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
     if is_kept(sub.journal):
         open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
-        enter_bodies(sub.journal, bodies.pose, bodies.twist)
-        enter_contact_rows(sub.journal, bodies.pose, rows, PN, PT)
+        enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
+        enter_contact_rows(sub.journal, bodies, bodies.pose, rows, PN, PT)
 
 
 @inner_kernel
@@ -71,4 +120,4 @@ def enter_fixed_step(journal: Journal, bodies: Bodies, rows: Rows, options: Opti
     if is_kept(journal):
         open_piece(journal, 0.0, options.dt, FORCES, FIXED)
         enter_bodies(journal, bodies.pose, bodies.twist)
-        enter_contact_rows(journal, journal.pose, rows, PN, PT)
+        enter_contact_rows(journal, bodies, journal.pose, rows, PN, PT)

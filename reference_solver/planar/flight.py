@@ -8,13 +8,22 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import bound_bodies
 from reference_solver.planar.columns import COS, EXTENT, GAP, MOTION, PN, REACH, SIN, SPEED, A, B
 from reference_solver.planar.kinematics import normal_velocity
-from reference_solver.planar.state import CONTACTS, FIXED, Bodies, Options, Pairs, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, FIXED, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.options import Options
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
 AT_REST = 1e-14
-#: A gap drifts if its rate is more than this share of the contact's reference speed. What drifts less, by round-off or
-#: the least disturbance, leaves a gap that the next sub-step closes.
-DRIFT = 1e-6
+
+
+@inner_kernel
+def keep_start(bodies: Bodies, sub: SubStep) -> None:
+    """Keep the poses that the sub-step begins with."""
+    for i in range(len(bodies.kind)):
+        for k in range(3):
+            sub.pose[i, k] = bodies.pose[i, k]
+        sub.turn[i, 0], sub.turn[i, 1] = bodies.real[i, COS], bodies.real[i, SIN]
 
 
 @inner_kernel
@@ -24,18 +33,17 @@ def begin_flight(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> Non
         sub.closing[i] = 0
         for k in range(3):
             sub.gain[i, k] = (bodies.twist[i, k] - sub.start[i, k]) / length
-            sub.pose[i, k] = bodies.pose[i, k]
-        sub.turn[i, 0], sub.turn[i, 1] = bodies.real[i, COS], bodies.real[i, SIN]
-    for c in range(rows.counts[CONTACTS]):
+            sub.after[i, k] = bodies.twist[i, k]
+    keep_start(bodies, sub)
+    for c in range(rows.counts[CONTACTS] if sub.clock[HELD] == 0.0 else 0):
         drift = max(abs(normal_velocity(sub.start, rows, c)), rows.real[c, GAP] / length)
         if rows.real[c, PN] > 0.0 and drift > DRIFT * rows.real[c, SPEED]:
             sub.closing[rows.integer[c, A]] = sub.closing[rows.integer[c, B]] = 1
-
-
-@inner_kernel
-def curvature(sub: SubStep, i: int, k: int) -> float:
-    """Second derivative of body i's path in coordinate k (E24): a, twice a where `closing`."""
-    return 2.0 * sub.gain[i, k] if sub.closing[i] else sub.gain[i, k]
+    for i in range(len(bodies.kind)):
+        for k in range(3):
+            sub.path[i, k, 1] = sub.start[i, k]
+            sub.path[i, k, 2] = sub.gain[i, k] if sub.closing[i] else 0.5 * sub.gain[i, k]
+            sub.path[i, k, 3] = sub.path[i, k, 4] = sub.path[i, k, 5] = 0.0
 
 
 @inner_kernel
@@ -44,9 +52,24 @@ def place(bodies: Bodies, sub: SubStep, i: int, t: float) -> None:
     if bodies.kind[i, MOTION] == FIXED:
         return
     for k in range(3):
-        bodies.pose[i, k] = sub.pose[i, k] + t * (sub.start[i, k] + 0.5 * t * curvature(sub, i, k))
+        c = sub.path[i, k]
+        bodies.pose[i, k] = sub.pose[i, k] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
     if bodies.pose[i, 2] != sub.pose[i, 2]:
         bodies.real[i, COS], bodies.real[i, SIN] = math.cos(bodies.pose[i, 2]), math.sin(bodies.pose[i, 2])
+
+
+@inner_kernel
+def rate(sub: SubStep, i: int, k: int, t: float) -> float:
+    """Speed of body i along coordinate k at time t of the sub-step."""
+    c = sub.path[i, k]
+    return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5]))))
+
+
+@inner_kernel
+def bending(sub: SubStep, i: int, k: int, t: float) -> float:
+    """Bound of what the higher terms of a path add to a speed until t; 0 where accelerations are constant."""
+    c = sub.path[i, k]
+    return t * t * (3.0 * abs(c[3]) + t * (4.0 * abs(c[4]) + t * (5.0 * abs(c[5]))))
 
 
 @inner_kernel
@@ -74,8 +97,9 @@ def move_along(bodies: Bodies, sub: SubStep, t: float, whole: bool) -> None:
 
 @inner_kernel
 def fastest(sub: SubStep, i: int, k: int, t: float) -> float:
-    """Largest speed along coordinate k on body i's path until t: at an end, since it changes linearly."""
-    return max(abs(sub.start[i, k]), abs(sub.start[i, k] + t * curvature(sub, i, k)))
+    """Bound of the speed along coordinate k on body i's path until t: where it changes linearly that at an end."""
+    c = sub.path[i, k]
+    return max(abs(c[1]), abs(c[1] + t * (2.0 * c[2]))) + bending(sub, i, k, t)
 
 
 @inner_kernel

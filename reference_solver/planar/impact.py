@@ -18,8 +18,8 @@ from reference_solver.planar.columns import (
     IMPACT,
     IMPACT_N,
     IMPACT_T,
-    LASTS,
     MEETS,
+    NUMBER,
     PN,
     POINT,
     PT,
@@ -34,25 +34,23 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
-from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, measure_speed, prepare_masses
-from reference_solver.planar.state import CONTACTS, HELD, LEFT, MANIFOLDS, Bodies, Options, Pairs, Rows, SubStep
-from reference_solver.tally import RELEASED_SPEED
-
-#: Normal and tangential velocities below this share of a contact's reference speed are round-off of the solve, whose
-#: residual is 1e-13 of it: neither an approach, nor a parting, nor a slip.
-NOISE = 1e-11
-#: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
-#: the time of impact.
-LATE = 1e-15
-
-#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
-#: sub-step and released there.
-OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
-#: What an instant brings: nothing, contacts whose normals turned, impacts no faster than what loads do in a step with
-#: e = 0, such with e > 0, faster ones.
-NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
-#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
-BOUNCES = 32
+from reference_solver.planar.manifolds import row_key
+from reference_solver.planar.rows import measure_speed, prepare_masses
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.impacts import (
+    BOUNCES,
+    LANDED,
+    NO_IMPACT,
+    OPEN_ENDED,
+    REBOUNDED,
+    RELEASED,
+    SERIES_ENDS,
+    STRUCK,
+)
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NOISE, ROUND_OFF, UNSOLVED
+from reference_solver.stepping.options import Options
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 
 @inner_kernel
@@ -61,6 +59,18 @@ def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
     a, b = rows.integer[c, A], rows.integer[c, B]
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     return ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
+
+
+@inner_kernel
+def restitution(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """E of row c; tables go by numbers in the world."""
+    return pairs.restitution[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
+
+
+@inner_kernel
+def friction(bodies: Bodies, pairs: Pairs, rows: Rows, c: int) -> float:
+    """Coefficient mu of row c."""
+    return pairs.friction[bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]]
 
 
 @inner_kernel
@@ -75,7 +85,7 @@ def describe(bodies: Bodies, rows: Rows, c: int) -> None:
 
 @inner_kernel
 def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> None:
-    """Drop all rows but those that touch, and those that carried load a moment ago: they may close their gap (E20).
+    """Drop all rows but those that touch (E20).
 
     Where what is left goes by the fixed-step law, all gaps with e = 0 may be closed (E28).
     """
@@ -85,13 +95,12 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
         first = kept
         for c in range(rows.manifold[m], rows.manifold[m + 1]):
             describe(bodies, rows, c)
-            rows.real[c, RESTITUTION] = pairs.restitution[rows.integer[c, A], rows.integer[c, B]]
+            rows.real[c, RESTITUTION] = restitution(bodies, pairs, rows, c)
             reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
-            may_close = rows.real[c, PN] > 0.0 or (sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0)
+            may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
             if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
-                rows.real[kept, FRICTION] = pairs.friction[rows.integer[kept, A], rows.integer[kept, B]]
-                rows.integer[kept, LASTS] = 1 if rows.real[kept, PN] > 0.0 else 0
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.integer[kept, MEETS] = 1 if rows.real[kept, GAP] <= reach else 0
                 rows.integer[kept, ENDING] = OPEN_ENDED
                 rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.real[kept, PN], rows.real[kept, PT]
@@ -101,6 +110,31 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
             manifolds += 1
     rows.manifold[manifolds] = kept
     rows.counts[CONTACTS], rows.counts[MANIFOLDS] = kept, manifolds
+
+
+@inner_kernel
+def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
+    """Drop all rows but those that carried load in the sub-step that has ended; False if none is left."""
+    kept, manifolds, old = 0, 0, 0
+    for m in range(rows.counts[MANIFOLDS]):
+        first = kept
+        for c in range(rows.manifold[m], rows.manifold[m + 1]):
+            key = row_key(bodies, rows, c)
+            while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
+                old += 1
+            if old < rows.counts[REMEMBERED] and rows.old_key[old] == key and rows.old_impulse[old, 0] > 0.0:
+                describe(bodies, rows, c)
+                copy_row(rows, c, kept)
+                rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
+                rows.real[kept, RESTITUTION] = 0.0
+                rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.old_impulse[old, 0], rows.old_impulse[old, 1]
+                kept += 1
+        if kept > first:
+            rows.manifold[manifolds] = first
+            manifolds += 1
+    rows.manifold[manifolds] = kept
+    rows.counts[CONTACTS], rows.counts[MANIFOLDS] = kept, manifolds
+    return kept > 0
 
 
 @inner_kernel
@@ -115,11 +149,7 @@ def copy_row(rows: Rows, source: int, target: int) -> None:
 
 @inner_kernel
 def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float) -> int:
-    """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve.
-
-    A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
-    but what it approaches with goes at once, and is no force.
-    """
+    """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve."""
     found = NO_IMPACT
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN] = rows.real[c, PT] = 0.0
@@ -129,9 +159,6 @@ def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float
         measure_speed(bodies, rows, c, options.dt)
         rows.integer[c, IMPACT] = 0
         if u >= -NOISE * rows.real[c, SPEED]:
-            continue
-        if rows.integer[c, LASTS]:
-            found = max(found, TURNED)
             continue
         if rows.integer[c, MEETS] == 0:
             continue
@@ -156,10 +183,24 @@ def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, opti
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
+        doubt(bodies, rows, tally)
         for c in range(rows.counts[CONTACTS]):
             rows.real[c, IMPACT_N], rows.real[c, IMPACT_T] = rows.real[c, PN], rows.real[c, PT]
     copy_vectors(bodies.twist, sub.start)
     return found
+
+
+@inner_kernel
+def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
+    """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
+
+    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    """
+    for c in range(rows.counts[CONTACTS]):
+        missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
+        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * rows.real[c, SPEED]:
+            tally[CONTRADICTED_A] = 1.0 + rows.integer[c, A]
+            tally[CONTRADICTED_B] = 1.0 + rows.integer[c, B]
 
 
 @inner_kernel

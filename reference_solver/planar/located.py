@@ -7,68 +7,60 @@ What is left of the step after a cut is the next sub-step. A step without events
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel, kernel
+import math
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
-from reference_solver.journal import close_step
+from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.certificate import row_work
-from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
+from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import (
     FORCE_N,
     FORCE_T,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LOAD,
     MOTION,
     PN,
     PT,
     RELEASE,
 )
-from reference_solver.planar.entries import enter_release, enter_sub_step
+from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
+from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import (
-    LANDED,
-    NO_IMPACT,
-    REBOUNDED,
-    collide_now,
-    end_series,
-    keep_touching,
-    release,
-)
+from reference_solver.planar.impact import collide_now, end_series, keep_loaded, keep_touching, release
+from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
+from reference_solver.planar.midpoint import close_gaps, keep_change, misses_end, take_back
 from reference_solver.planar.position import correct_positions
-from reference_solver.planar.slide import go_back, keep, press_until_stick
-from reference_solver.planar.state import (
-    BLOCK,
-    CONTACTS,
-    EVENTS,
-    FREE,
-    LEFT,
-    REMEMBERED,
-    Bodies,
-    Buffer,
-    Ledger,
-    Options,
-    Pairs,
-    Rows,
-    SubStep,
-)
+from reference_solver.planar.rows import warm_start
+from reference_solver.planar.slide import cut_work, go_back, keep, press_until_stick
+from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
-from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
+from reference_solver.stepping.clock import (
+    CONFINED,
+    ESCAPED,
+    HELD,
+    JAMMED,
+    LEFT,
+    OUTCOME,
+    REBOUND,
+    UNSETTLED,
+    count_event,
+    hold_rest,
+    open_step,
+    weigh_event,
+    weigh_jam,
+)
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
+from reference_solver.stepping.options import BLOCK, MIDPOINT, Options
+from reference_solver.stepping.phase import SHORTENED
+from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
 
-#: What is left of a step below this share of it is nothing.
-NOTHING_LEFT = 1e-14
-#: A sub-step shorter than this share of a step tells nothing about forces.
-SHORT = 1e-3
-#: Passes that mark ending series of rebounds; each marks at least one row more.
-SERIES_PASSES = 4
 
-
-@inner_kernel
+@spliced_kernel
 def located_step(
     bodies: Bodies,
     pairs: Pairs,
@@ -79,17 +71,65 @@ def located_step(
     options: Options,
     tally: Array,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
-    if sub.clock[LEFT] == 0.0:
-        open_step(sub.clock, len(bodies.kind), options.dt)
-        ledger.used[0] = 0
-    while sub.clock[LEFT] > 0.0:
-        if not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
+    """One step of an island; False if an array is too small, with the step unfinished."""
+    open_step(sub.clock, len(bodies.kind), options.dt)
+    while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
+        if sub.clock[UNSETTLED] > 0.0:
+            if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
+                return False
+        elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
             return False
+        if sub.clock[ESCAPED] > 0.0:
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
+            return True
+        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
+            end_run(bodies)
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
 
 
 @inner_kernel
+def free_bodies(bodies: Bodies) -> int:
+    """Number of bodies that forces move."""
+    count = 0
+    for i in range(len(bodies.kind)):
+        count += 1 if bodies.kind[i, MOTION] == FREE else 0
+    return count
+
+
+@inner_kernel
+def independent_rows(rows: Rows, options: Options) -> int:
+    """Number of rows, of flush faces no more than hold two bodies together: all others follow from them."""
+    count = 0
+    for m in range(rows.counts[MANIFOLDS]):
+        count += min((1 + options.friction) * (rows.manifold[m + 1] - rows.manifold[m]), 2 + options.friction)
+    return count
+
+
+@inner_kernel
+def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
+    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] != FREE:
+            continue
+        for k in range(2):
+            c = sub.path[i, k]
+            way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
+            if not (sub.limit[i, k] <= sub.pose[i, k] - way and sub.pose[i, k] + way <= sub.limit[i, 2 + k]):
+                return True
+    return False
+
+
+@inner_kernel
+def end_run(bodies: Bodies) -> None:
+    """Leave no state that could be taken for an answer."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            for k in range(3):
+                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
+
+
+@spliced_kernel
 def sub_step(
     bodies: Bodies,
     pairs: Pairs,
@@ -107,18 +147,40 @@ def sub_step(
     keep_touching(bodies, pairs, rows, sub)
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
+    if sub.clock[LEFT] == options.dt:
+        free = free_bodies(bodies)
+        weigh_jam(sub.clock, independent_rows(rows, options), 3 * free, free)
+        if options.scheme == MIDPOINT:
+            sub.clock[JAMMED] = 1.0
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
     length = solve_sub_step(bodies, rows, problem, sub, options, tally)
+    if tally[CONTRADICTED_A] > 0.0:
+        return True
     begin_flight(bodies, rows, sub, length)
-    end = length
-    if sub.clock[EVENTS] < most_events(len(bodies.kind)):
-        end = next_impact(bodies, pairs, rows, sub, options, length)
-        if end < 0.0:
+    curved = 0.0
+    if sub.clock[HELD] == 0.0 and turns(bodies, rows, sub, length):
+        if sub.clock[JAMMED] == 0.0:
+            curved = curve(bodies, rows, sub, tally)
+        if curved == 0.0:
+            hold_rest(sub.clock, tally)
+            go_back(tally, sub.tally[0])
             copy_vectors(sub.before, bodies.twist)
-            return False
-    if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
+            return True
+    length = curved if curved > 0.0 else length
+    end = next_impact(bodies, pairs, rows, sub, options, length)
+    if end < 0.0:
+        copy_vectors(sub.before, bodies.twist)
+        return False
+    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
+        sub.clock[ESCAPED] = 1.0
+        return True
+    if curved > 0.0:
+        end = follow_curve(bodies, pairs, rows, sub, options, length, end)
+        enter_curve(bodies, rows, sub, tally)
+        length = end
+    elif rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
         move_along(bodies, sub, end, end == length)
         move(bodies, bodies.pseudo, options.dt)
     else:
@@ -126,36 +188,62 @@ def sub_step(
     remember_forces(bodies, rows, length, options.dt)
     if end < length:
         cut_work(bodies, rows, sub, tally, end, end / length)
+    sub.clock[UNSETTLED] = end if sub.clock[HELD] > 0.0 and rows.counts[CONTACTS] > 0 else 0.0
     enter_contacts(bodies, rows, ledger)
-    enter_sub_step(bodies, rows, sub, options, end)
+    enter_sub_step(bodies, rows, sub, options, end, curved > 0.0)
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
         enter_release(bodies, rows, sub, options, end)
-    if end < left:
-        count_event(sub.clock, len(bodies.kind), tally)
+    if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
+        count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
 
 @inner_kernel
-def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float, share: float) -> None:
-    """Impulses, and work in the tally, of a sub-step that was solved at full length and cut at ``end``."""
-    for entry in range(CONTACT_WORK, LOAD_WORK + 1):
-        tally[entry] = sub.tally[1, entry]
-    for i in range(len(bodies.kind)):
-        for k in range(3):
-            bodies.start[i, k] = sub.start[i, k] + end * bodies.real[i, LOAD + k]
-            inverse = bodies.real[i, INVERSE_MASS if k < 2 else INVERSE_INERTIA]
-            if bodies.kind[i, MOTION] == FREE and inverse > 0.0:
-                mean = 0.5 * (bodies.start[i, k] + sub.start[i, k])
-                tally[LOAD_WORK] += end * bodies.real[i, LOAD + k] / inverse * mean
-    for c in range(rows.counts[CONTACTS]):
-        rows.real[c, PN], rows.real[c, PT] = share * rows.real[c, PN], share * rows.real[c, PT]
-        done, moved, _ = row_work(bodies, rows, c)
-        tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
+def settle(
+    bodies: Bodies,
+    pairs: Pairs,
+    rows: Rows,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+) -> bool:
+    """Take out what the impulse-level scheme leaves of the velocities and gaps of contacts that it held (E28).
+
+    Their impulses are found anew with the rows of the end, by a solve that starts from them: what was too much is taken
+    back. Otherwise it would be an impact in the sub-step that follows, which knows nothing of this one. False if an
+    array is too small; called again, it starts anew.
+    """
+    if not detect(bodies, pairs, rows, options):
+        return False
+    if not keep_loaded(bodies, pairs, rows):
+        sub.clock[UNSETTLED] = 0.0
+        return True
+    if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
+        return False
+    if options.solver == BLOCK:
+        prepare_blocks(bodies, rows)
+    time = sub.clock[UNSETTLED]
+    misses = misses_end(bodies, rows, options, time)
+    keep_state(sub.journal, bodies.pose, bodies.twist)
+    if misses:
+        take_back(bodies, rows, options)
+        open_solve(bodies, 0.0, tally)
+        warm_start(bodies, rows, options)
+        solve_velocities(bodies, rows, problem, options, tally)
+        certify(bodies, rows, options, tally)
+        keep_change(rows, time)
+        enter_contacts(bodies, rows, ledger)
+    if close_gaps(bodies, rows, problem, sub, options, tally) or misses:
+        enter_settled(bodies, rows, sub, options)
+    sub.clock[UNSETTLED] = 0.0
+    return True
 
 
-@inner_kernel
+@spliced_kernel
 def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> float:
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
@@ -165,9 +253,8 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         if k > 0:
             go_back(tally, sub.tally[0])
         found = collide_now(bodies, rows, problem, sub, options, tally)
-        struck = found >= LANDED
-        length = press_until_stick(bodies, rows, problem, sub, options, tally, left, struck)
-        if not (struck and options.restitution and end_series(bodies, rows, sub, length)):
+        length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
+        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
             break
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
@@ -191,53 +278,3 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
             rows.old_impulse[c, 0] = lasts * rows.real[c, PN] / max(length, SHORT * dt)
             rows.old_impulse[c, 1] = lasts * rows.real[c, PT] / max(length, SHORT * dt)
     rows.counts[REMEMBERED] = rows.counts[CONTACTS]
-
-
-@kernel
-def run_located(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Like `run_steps` in step.py, for located steps."""
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(ledger.real) > len(buffer.real):
-            return k
-        if not located_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
-            return k
-        close_step(sub.journal)
-        if sampled:
-            sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    copy_vectors(bodies.pose, buffer.pose[s])
-    copy_vectors(bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + ledger.used[0]
-        copy_ledger(ledger, buffer, start)
-
-
-@kernel
-def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> None:
-    """Contacts of the last step, from index ``start`` on."""
-    for c in range(ledger.used[0]):
-        for d in range(3):
-            buffer.integer[start + c, d] = ledger.integer[c, d]
-        for d in range(7):
-            buffer.real[start + c, d] = ledger.real[c, d]

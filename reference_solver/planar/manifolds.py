@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import find_candidates
-from reference_solver.planar.columns import FEATURE, IMPACT, PN, PT, A, B
+from reference_solver.planar.columns import FEATURE, IMPACT, NUMBER, PN, PT, A, B
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import (
-    BLOCK,
     CANDIDATES,
     CONTACTS,
     FEATURES,
-    FIXED_STEP,
+    KEPT,
     MANIFOLDS,
+    MOST_BODIES,
+    PAST,
     REMEMBERED,
     Bodies,
-    Options,
+    Indices,
     Pairs,
     Rows,
 )
-
-#: A gap below this fraction of the smaller half width is touching. Far above round-off, far below what a body
-#: moves in a step.
-TOUCHING = 1e-9
+from reference_solver.stepping.noise import TOUCHING
+from reference_solver.stepping.options import BLOCK, FIXED_STEP, Options
 
 
 @inner_kernel
@@ -56,23 +55,75 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
 
 
 @inner_kernel
+def contact_key(a: int, b: int, feature: int) -> int:
+    """(a, b, feature), by numbers in the world, as one integer that sorts like the triple."""
+    return (a * MOST_BODIES + b) * FEATURES + feature
+
+
+@inner_kernel
 def row_key(bodies: Bodies, rows: Rows, c: int) -> int:
-    """(a, b, feature) as one integer that sorts like the triple."""
-    return (rows.integer[c, A] * len(bodies.kind) + rows.integer[c, B]) * FEATURES + rows.integer[c, FEATURE]
+    """`contact_key` of row c."""
+    a, b = bodies.kind[rows.integer[c, A], NUMBER], bodies.kind[rows.integer[c, B], NUMBER]
+    return contact_key(a, b, rows.integer[c, FEATURE])
+
+
+@inner_kernel
+def place_of(keys: Indices, count: int, key: int) -> int:
+    """First of ``count`` ascending keys that is not less than ``key``: halving."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @inner_kernel
 def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
-    """Give each row the impulse of the same feature one step before: a merge of two sorted key lists."""
-    old = 0
+    """Give each row the impulse of the same feature one sub-step or one step before."""
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN] = rows.real[c, PT] = 0.0
+        if not options.warm_starting:
+            continue
         key = row_key(bodies, rows, c)
-        while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
-            old += 1
-        if options.warm_starting and old < rows.counts[REMEMBERED] and rows.old_key[old] == key:
+        old = place_of(rows.old_key, rows.counts[REMEMBERED], key)
+        if old < rows.counts[REMEMBERED] and rows.old_key[old] == key:
             rows.real[c, PN] = rows.old_impulse[old, 0]
             rows.real[c, PT] = rows.old_impulse[old, 1]
+            continue
+        past = place_of(rows.past_key, rows.counts[PAST], key)
+        if past < rows.counts[PAST] and rows.past_key[past] == key:
+            rows.real[c, PN] = rows.past_impulse[past, 0]
+            rows.real[c, PT] = rows.past_impulse[past, 1]
+
+
+@inner_kernel
+def keep_remembered(rows: Rows) -> None:
+    """Add what is remembered of one island to what is kept for the next step, in ascending order."""
+    for old in range(rows.counts[REMEMBERED]):
+        k = rows.counts[KEPT]
+        while k > 0 and rows.kept_key[k - 1] > rows.old_key[old]:
+            rows.kept_key[k] = rows.kept_key[k - 1]
+            for d in range(2):
+                rows.kept_impulse[k, d] = rows.kept_impulse[k - 1, d]
+            k -= 1
+        rows.kept_key[k] = rows.old_key[old]
+        for d in range(2):
+            rows.kept_impulse[k, d] = rows.old_impulse[old, d]
+        rows.counts[KEPT] += 1
+    rows.counts[REMEMBERED] = 0
+
+
+@inner_kernel
+def pass_on(rows: Rows) -> None:
+    """What was kept is the past of the next step."""
+    for k in range(rows.counts[KEPT]):
+        rows.past_key[k] = rows.kept_key[k]
+        for d in range(2):
+            rows.past_impulse[k, d] = rows.kept_impulse[k, d]
+    rows.counts[PAST], rows.counts[KEPT] = rows.counts[KEPT], 0
 
 
 @inner_kernel

@@ -7,9 +7,10 @@ from reference_solver.model import Array
 from reference_solver.planar.block import sweep_block_pushes
 from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, A, B
 from reference_solver.planar.kinematics import normal_velocity
-from reference_solver.planar.rows import ROUND_OFF
 from reference_solver.planar.sequential_impulses import sweep_pushes
-from reference_solver.planar.state import BLOCK, CONTACTS, FIXED_STEP, SPLIT, Bodies, Options, Rows
+from reference_solver.planar.state import CONTACTS, Bodies, Rows
+from reference_solver.stepping.noise import ROUND_OFF
+from reference_solver.stepping.options import BLOCK, FIXED_STEP, SPLIT, Options
 from reference_solver.tally import PROJECTED
 
 #: With a residual stop, sweeps end when no row misses its correction by more than this share of the largest.

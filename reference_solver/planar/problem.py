@@ -21,9 +21,10 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.manifolds import detect
 from reference_solver.planar.rows import prepare
-from reference_solver.planar.state import CONTACTS, Bodies, Options, Pairs, Rows
+from reference_solver.planar.state import CONTACTS, Bodies, Pairs, Rows
 from reference_solver.planar.step import accelerate
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.options import Options
 
 
 @kernel

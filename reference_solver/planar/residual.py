@@ -6,7 +6,8 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, SPEED, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
-from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
+from reference_solver.planar.state import CONTACTS, Bodies, Rows
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

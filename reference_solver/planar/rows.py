@@ -40,17 +40,9 @@ from reference_solver.planar.kinematics import (
     speed_at,
     tangent_velocity,
 )
-from reference_solver.planar.state import BAUMGARTE, CONTACTS, Bodies, Options, Pairs, Rows
-
-#: Round-off floor of a contact's reference speed, as a share of the speeds of its two points: with a residual of
-#: 1e-13 it allows 5e-15 of them, about 20 units in the last place.
-SPEED_SHARE = 0.05
-
-#: Gaps and overlaps below this fraction of the smaller half width are round-off, not geometry; they are neither
-#: closed nor corrected.
-ROUND_OFF = 1e-12
-#: The same for coordinates far from the origin: some ten units in their last place.
-COORDINATE_NOISE = 2e-15
+from reference_solver.planar.state import CONTACTS, Bodies, Pairs, Rows
+from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
+from reference_solver.stepping.options import BAUMGARTE, Options
 
 
 @inner_kernel

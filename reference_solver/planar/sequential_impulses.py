@@ -5,7 +5,8 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, PUSH, PUSH_TARGET, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
-from reference_solver.planar.state import CONTACTS, Bodies, Options, Rows
+from reference_solver.planar.state import CONTACTS, Bodies, Rows
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

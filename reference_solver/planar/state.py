@@ -35,6 +35,7 @@ from reference_solver.planar.columns import (
     INVERSE_MASS,
     LOAD,
     MOTION,
+    NUMBER,
     REACH,
     ROUNDING,
     ROW_INTEGERS,
@@ -45,8 +46,11 @@ from reference_solver.planar.columns import (
     VERTICES,
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
-from reference_solver.settings import Settings
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.clock import CLOCK_SIZE
+from reference_solver.stepping.islands import Islands, allocate_islands
+from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -54,21 +58,16 @@ Indices = NDArray[np.int64]
 #: Shape codes; a pair of different shapes is handled in this order.
 HALF_SPACE, DISC, BOX, CAPSULE, POLYGON = 0, 1, 2, 3, 4
 FIXED, FREE, PRESCRIBED = 0, 1, 2
-SCALAR, BLOCK = 0, 1
-FIXED_STEP, LOCATED = 0, 1
-NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 #: Features per pair: bound of the feature numbers in core_core.py (edge on edge, then vertex on vertex), to pack
 #: (a, b, feature) into one key.
 FEATURES = 5 * MOST_VERTICES**2
 
-#: Entries of `SubStep.clock`: what is left of the step [s] (0: a new one begins), events located in it, how many of
-#: them were soft, how many soft ones it may have, and 1 where what is left of it goes by the fixed-step law (E28).
-LEFT, EVENTS, SOFT, PATIENCE, HELD = 0, 1, 2, 3, 4
-CLOCK_SIZE = 5
-
-#: Entries of `Rows.counts`.
-CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES = 0, 1, 2, 3
+#: Entries of `Rows.counts`: PAST and KEPT count what is known of the step before, and what is kept for the next.
+CONTACTS, MANIFOLDS, REMEMBERED, CANDIDATES, PAST, KEPT = 0, 1, 2, 3, 4, 5
+COUNTS = 6
+#: More than any number of bodies, so that (a, b, feature) is one key of 63 bits.
+MOST_BODIES = 1 << 24
 
 
 class Bodies(NamedTuple):
@@ -97,30 +96,49 @@ class Pairs(NamedTuple):
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
-    counts: Indices  # (4,): see CONTACTS .. CANDIDATES
+    counts: Indices  # (COUNTS,): see CONTACTS .. KEPT
     integer: Indices  # (c, ROW_INTEGERS)
     real: Array  # (c, ROW_REALS)
     manifold: Indices  # (m + 1,): first row of each manifold
     block: Array  # (m, 4, 4): W of a two-point manifold, rows n1, t1, n2, t2 (E12)
     local: Array  # (LOCAL_ROWS, LOCAL_COLUMNS): scratch of the block being solved, see pair_modes.py
-    old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
+    old_key: Indices  # (c,): (a, b, feature) of the step or sub-step before, ascending
     old_impulse: Array  # (c, 2)
+    past_key: Indices  # (c,): the same of the whole step before, for located steps
+    past_impulse: Array  # (c, 2)
+    kept_key: Indices  # (c,): and for the next one
+    kept_impulse: Array  # (c, 2)
 
 
 class SubStep(NamedTuple):
-    """One sub-step of the located scheme, in which accelerations are constant (E19)."""
+    """One sub-step of the located scheme: frozen, with constant accelerations (E19), or a phase of turning rows."""
 
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD
     before: Array  # (n, 3): velocities at its start
     start: Array  # (n, 3): after its impacts
-    gain: Array  # (n, 3): accelerations in it
+    after: Array  # (n, 3): velocities at its end
+    gain: Array  # (n, 3): accelerations in it where it is frozen
+    path: Array  # (n, 3, 6): displacement as a polynomial of the time in it
     pose: Array  # (n, 3): poses at its start
     turn: Array  # (n, 2): cosine and sine of the angle there
-    tally: Array  # (2, SIZE): tallies to go back to where a solve is made again
+    final: Array  # (n, 3): poses at its end where rows turn
+    tally: Array  # (3, SIZE): tallies to go back to where a solve is made again
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
+    lasting: Lasting
     meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
+    limit: Array  # (n, 4): lower and upper bounds of the centres, where they are confined [m]
     journal: Journal
+
+
+class World(NamedTuple):
+    """Islands of the whole world, and room for the bodies of one of them."""
+
+    islands: Islands
+    bodies: Bodies  # (n,)
+    limit: Array  # (n, 4): see `SubStep`
+    order: Indices  # (n,): see `Pairs`
+    tally: Array  # (SIZE,): to go back to where a step is made again
 
 
 class Ledger(NamedTuple):
@@ -129,28 +147,6 @@ class Ledger(NamedTuple):
     used: Indices  # (1,): number of contacts
     integer: Indices  # (k, 3): body A, body B, feature
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-
-
-class Options(NamedTuple):
-    """Numbers and flags of `Settings` and `Needs`."""
-
-    dt: float
-    iterations: int
-    residual: float  # < 0: exactly `iterations` sweeps
-    max_sweeps: int
-    relaxation: float  # <= 0: estimated
-    correction: int
-    beta: float
-    slop: float
-    margin: float
-    warm_starting: int
-    solver: int
-    direct: int
-    rotation: int
-    friction: int
-    restitution: int
-    broadphase: int
-    scheme: int
 
 
 class Buffer(NamedTuple):
@@ -189,6 +185,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     real[:, REACH] = np.array(far) + real[:, ROUNDING]
     kind = np.zeros((n, BODY_INTEGERS), np.int64)
     kind[:, FIRST_VERTEX], kind[:, VERTICES] = np.cumsum(count) - count, count
+    kind[:, NUMBER] = np.arange(n)
     kind[:, SHAPE] = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
     kind[:, MOTION] = [_MOTION_CODE[body.motion] for body in model.bodies]
     twist = np.array([body.twist for body in model.bodies], dtype=np.float64)
@@ -233,7 +230,7 @@ def allocate_pairs(model: Model, capacity: int) -> Pairs:
 def allocate_rows(capacity: int) -> Rows:
     """Return room for ``capacity`` contact points."""
     return Rows(
-        counts=np.zeros(4, np.int64),
+        counts=np.zeros(COUNTS, np.int64),
         integer=np.zeros((capacity, ROW_INTEGERS), np.int64),
         real=np.zeros((capacity, ROW_REALS)),
         manifold=np.zeros(capacity + 1, np.int64),
@@ -241,16 +238,41 @@ def allocate_rows(capacity: int) -> Rows:
         local=np.zeros((LOCAL_ROWS, LOCAL_COLUMNS)),
         old_key=np.zeros(capacity, np.int64),
         old_impulse=np.zeros((capacity, 2)),
+        past_key=np.zeros(capacity, np.int64),
+        past_impulse=np.zeros((capacity, 2)),
+        kept_key=np.zeros(capacity, np.int64),
+        kept_impulse=np.zeros((capacity, 2)),
     )
 
 
-def allocate_sub_step(n: int, meeting: Any) -> SubStep:
-    """Return room for the sub-steps of ``n`` bodies, that of their pairs included."""
-    before, start, gain, pose = (np.zeros((n, 3)) for _ in range(4))
-    turn, closing = np.zeros((n, 2)), np.zeros(n, np.int64)
-    tally = np.zeros((2, TALLY_SIZE))
-    clock, probe, journal = np.zeros(CLOCK_SIZE), allocate_rows(4), allocate_journal(2, n, 0)
-    return SubStep(clock, before, start, gain, pose, turn, tally, closing, probe, meeting, journal)
+def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
+    """Return room for the sub-steps of ``n`` bodies with ``contacts`` contacts."""
+    return SubStep(
+        clock=np.zeros(CLOCK_SIZE),
+        before=np.zeros((n, 3)),
+        start=np.zeros((n, 3)),
+        after=np.zeros((n, 3)),
+        gain=np.zeros((n, 3)),
+        path=np.zeros((n, 3, COEFFICIENTS)),
+        pose=np.zeros((n, 3)),
+        turn=np.zeros((n, 2)),
+        final=np.zeros((n, 3)),
+        tally=np.zeros((3, TALLY_SIZE)),
+        closing=np.zeros(n, np.int64),
+        probe=allocate_rows(4),
+        lasting=allocate_lasting(2, n, contacts),
+        meeting=meeting,
+        limit=np.zeros((n, 4)),
+        journal=allocate_journal(2, n, 0),
+    )
+
+
+def allocate_world(bodies: Bodies, candidates: int) -> World:
+    """Return room for the islands of ``bodies``."""
+    n = len(bodies.pose)
+    local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
+    islands = allocate_islands(2, n, candidates)
+    return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE))
 
 
 def allocate_ledger(capacity: int) -> Ledger:
@@ -264,32 +286,6 @@ def grown(rows: Rows) -> Rows:
     bigger.counts[:] = rows.counts
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse
+    bigger.past_key[: len(rows.past_key)] = rows.past_key
+    bigger.past_impulse[: len(rows.past_impulse)] = rows.past_impulse
     return bigger
-
-
-def uses_direct(settings: Settings) -> bool:
-    """Whether the direct solver may be called, and needs room."""
-    return settings.direct and settings.solver == "block" and settings.residual is not None
-
-
-def options(settings: Settings, needs: Needs) -> Options:
-    """Return settings and needs as plain numbers."""
-    return Options(
-        dt=float(settings.dt),
-        iterations=settings.iterations,
-        residual=-1.0 if settings.residual is None else float(settings.residual),
-        max_sweeps=settings.max_sweeps,
-        relaxation=0.0 if settings.relaxation is None else float(settings.relaxation),
-        correction={"none": NO_CORRECTION, "split": SPLIT, "baumgarte": BAUMGARTE}[settings.position_correction],
-        beta=float(settings.beta),
-        slop=float(settings.slop),
-        margin=float(settings.margin),
-        warm_starting=int(settings.warm_starting),
-        solver={"scalar": SCALAR, "block": BLOCK}[settings.solver],
-        direct=int(uses_direct(settings)),
-        rotation=int(needs.rotation),
-        friction=int(needs.friction),
-        restitution=int(needs.restitution),
-        broadphase=int(needs.broadphase),
-        scheme={"fixed": FIXED_STEP, "located": LOCATED}[settings.scheme],
-    )

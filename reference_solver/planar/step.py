@@ -20,7 +20,8 @@ from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import prepare, warm_start
-from reference_solver.planar.state import BLOCK, CONTACTS, FIXED, FREE, Bodies, Buffer, Options, Pairs, Rows
+from reference_solver.planar.state import CONTACTS, FIXED, FREE, Bodies, Buffer, Pairs, Rows
+from reference_solver.stepping.options import BLOCK, Options
 
 
 @inner_kernel

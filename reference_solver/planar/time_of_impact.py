@@ -7,20 +7,14 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.columns import GAP, NX, NY, PN, TARGET, A, B
-from reference_solver.planar.flight import bound_flight, curvature, place, put_back
+from reference_solver.planar.flight import bound_flight, place, put_back
 from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.rows import prepare_masses
-from reference_solver.planar.state import (
-    CANDIDATES,
-    HELD,
-    MANIFOLDS,
-    Bodies,
-    Options,
-    Pairs,
-    Rows,
-    SubStep,
-)
+from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
 
 #: Margin with which every pair of shapes answers with its points, however far apart they are.
@@ -35,8 +29,8 @@ def begin_paths(bodies: Bodies, sub: SubStep, end: float) -> None:
         paths.begin[i], paths.end[i] = 0.0, end
         for k in range(3):
             paths.pose[i, k] = sub.pose[i, k]
-            paths.coefficient[i, k, 1] = sub.start[i, k]
-            paths.coefficient[i, k, 2] = 0.5 * curvature(sub, i, k)
+            for j in range(1, COEFFICIENTS):
+                paths.coefficient[i, k, j] = sub.path[i, k, j]
 
 
 @inner_kernel

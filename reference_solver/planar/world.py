@@ -11,28 +11,28 @@ from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
-from reference_solver.planar.located import copy_ledger, run_located
+from reference_solver.planar.ledger import copy_ledger
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
+from reference_solver.planar.run import run_located
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
-    FIXED_STEP,
-    LOCATED,
     Buffer,
     allocate_bodies,
     allocate_ledger,
     allocate_pairs,
     allocate_rows,
     allocate_sub_step,
+    allocate_world,
     grown,
-    options,
-    uses_direct,
 )
 from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.lasting import allocate_lasting
+from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -46,8 +46,9 @@ class World:
         # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
         self._pairs = allocate_pairs(model, 8 * n + 64)
         self._rows = allocate_rows(8 * n + 64)
-        self._sub = allocate_sub_step(n, allocate_meeting(self._bodies))
+        self._sub = allocate_sub_step(n, len(self._rows.real), allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(8 * n + 64)
+        self._world = allocate_world(self._bodies, len(self._pairs.candidate))
         self._options = options(settings, needs)
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
@@ -83,7 +84,7 @@ class World:
 
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
-        located = self._options.scheme == LOCATED
+        located = self._options.scheme != FIXED_STEP
         count = int(self._ledger.used[0] if located else self._rows.counts[CONTACTS])
         buffer = self._buffer(0, count)
         if located:
@@ -110,9 +111,10 @@ class World:
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
         state = (self._bodies, self._pairs, self._rows, self._problem)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             sub = self._sub._replace(journal=self.journal)
-            return int(run_located(*state, sub, self._ledger, self._options, self.tally, buffer, done, steps, stride))
+            own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
+            return int(run_located(*(*state, sub, *own)))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def _most_contacts(self) -> int:
@@ -135,6 +137,7 @@ class World:
         """Double whatever was found too small; the step that stopped goes on from where it was."""
         if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
             self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
+            self._world = allocate_world(self._bodies, len(self._pairs.candidate))
         elif self._ledger.used[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
             bigger = allocate_ledger(2 * len(self._ledger.real))
             for old, new in zip(self._ledger, bigger, strict=True):
@@ -142,6 +145,7 @@ class World:
             self._ledger = bigger
         else:
             self._rows = grown(self._rows)
+            self._sub = self._sub._replace(lasting=allocate_lasting(2, len(self.pose), len(self._rows.real)))
             self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))
 
 

@@ -9,13 +9,13 @@ redundant: their impulses are not unique, but the wrench on the bodies, and with
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.state import Options
 from reference_solver.spatial.block_newton import solve_by_newton
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
 from reference_solver.spatial.one_contact import coulomb_impulse, into_disc
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.sticking import stick
 from reference_solver.spatial.vector import Vector, add, cross, length, row, sub
+from reference_solver.stepping.options import Options
 
 #: Failures of Newton's method after which a block is left to `solve_in_turn` for the rest of the step: each failure
 #: costs as much as a hundred inner sweeps.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.broadphase import sift_down
-from reference_solver.planar.state import Options
 from reference_solver.spatial.state import BOX, CANDIDATES, CAPSULE, FREE, HALF_SPACE, Bodies, Detection, Indices
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.sorting import sift_down
 
 
 @inner_kernel

@@ -11,10 +11,8 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.cone import cone_defect
+from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
-from reference_solver.planar.certificate import LAST_PLACE, enter_creation, enter_share
-from reference_solver.planar.residual import IMPULSE_SHARE
-from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import add_pressure, apply_wrench, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.residual import point_residual
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
@@ -30,6 +28,8 @@ from reference_solver.spatial.vector import (
     times,
     times_transposed,
 )
+from reference_solver.stepping.accounting import LAST_PLACE, enter_creation, enter_share
+from reference_solver.stepping.options import Options
 from reference_solver.tally import (
     CONE,
     CONTACT_WORK,

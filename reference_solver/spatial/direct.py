@@ -5,11 +5,11 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import CONTACTS, Problem
 from reference_solver.direct.rounds import solve_problem
-from reference_solver.planar.direct import MENDED
-from reference_solver.planar.state import Options
 from reference_solver.spatial.kinematics import add_pressure, apply_wrench
 from reference_solver.spatial.state import FREE, Bodies, Manifolds
 from reference_solver.spatial.vector import ZERO, add, cross, row, scale, sub, times
+from reference_solver.stepping.noise import MENDED
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
-from reference_solver.pieces import FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
-from reference_solver.planar.state import HELD, LEFT, Options
-from reference_solver.spatial.state import Bodies, Manifolds, SubStep
+from reference_solver.pieces import CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
+from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import add, cross, row, times_transposed
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel
@@ -31,6 +34,20 @@ def enter_points(journal: Journal, manifolds: Manifolds, hit: bool) -> None:
 
 
 @inner_kernel
+def enter_moments(journal: Journal, manifolds: Manifolds, lasting: Lasting, first: int) -> None:
+    """Moments of lasting contacts, whose levers turned within the piece; ``first``: row of the first point."""
+    before = 0
+    for m in range(len(manifolds)):
+        for k in range(lasting.size[LASTING]):
+            entry = first + before + lasting.row[k] % POINTS
+            if lasting.row[k] // POINTS == m and entry < len(journal.name):
+                for d in range(3):
+                    journal.wrench[entry, 6 + d] = lasting.impulse[k, d]
+                    journal.wrench[entry, 9 + d] = lasting.moment[k, d]
+        before += manifolds.points[m]
+
+
+@inner_kernel
 def struck(bodies: Bodies) -> bool:
     """Whether impacts changed a velocity."""
     for i in range(len(bodies)):
@@ -51,10 +68,17 @@ def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: 
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
         enter_bodies(journal, journal.pose, bodies.first)
         enter_points(journal, manifolds, True)
+    curved = False
+    for i in range(len(bodies)):
+        curved = curved or bodies.curved[i] != 0
     keep_state(journal, journal.pose, bodies.first)
-    open_piece(journal, begin, length, FORCES, FIXED if sub.clock[HELD] > 0.0 else FROZEN)
+    scheme = FIXED if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    open_piece(journal, begin, length, FORCES, scheme)
     enter_bodies(journal, bodies.pose, bodies.twist)
+    first = journal.used[CONTACTS]
     enter_points(journal, manifolds, False)
+    if curved:
+        enter_moments(journal, manifolds, sub.lasting, first)
     keep_state(journal, bodies.pose, bodies.twist)
 
 

@@ -5,20 +5,6 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.impact import (
-    BOUNCES,
-    LANDED,
-    NO_IMPACT,
-    NOISE,
-    OPEN_ENDED,
-    REBOUNDED,
-    RELEASED,
-    SERIES_ENDS,
-    STRUCK,
-    TURNED,
-)
-from reference_solver.planar.rows import SPEED_SHARE
-from reference_solver.planar.state import LEFT, Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
@@ -27,6 +13,20 @@ from reference_solver.spatial.prepare import measure_speed, set_response
 from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, length, row
+from reference_solver.stepping.clock import LEFT
+from reference_solver.stepping.impacts import (
+    BOUNCES,
+    LANDED,
+    NO_IMPACT,
+    OPEN_ENDED,
+    REBOUNDED,
+    RELEASED,
+    SERIES_ENDS,
+    STRUCK,
+    TURNED,
+)
+from reference_solver.stepping.noise import NOISE, SPEED_SHARE
+from reference_solver.stepping.options import Options
 from reference_solver.tally import RELEASED_SPEED
 
 

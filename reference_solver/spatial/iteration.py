@@ -5,7 +5,13 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
-from reference_solver.planar.iteration import (
+from reference_solver.spatial.block import sweep_blocks
+from reference_solver.spatial.direct import mend_velocities, solve_directly
+from reference_solver.spatial.residual import natural_map
+from reference_solver.spatial.sequential_impulses import sweep_points
+from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.sweeps import (
     CHECK_INTERVAL,
     DIRECT_AFTER,
     DIRECT_BUDGET,
@@ -19,12 +25,6 @@ from reference_solver.planar.iteration import (
     enter_direct,
     sweeps_ahead,
 )
-from reference_solver.planar.state import BLOCK, Options
-from reference_solver.spatial.block import sweep_blocks
-from reference_solver.spatial.direct import mend_velocities, solve_directly
-from reference_solver.spatial.residual import natural_map
-from reference_solver.spatial.sequential_impulses import sweep_points
-from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.tally import UNCONVERGED
 
 

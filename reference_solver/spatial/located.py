@@ -11,10 +11,6 @@ from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
-from reference_solver.planar.clock import REBOUND, count_event, most_events, open_step, weigh_event
-from reference_solver.planar.impact import LANDED, NO_IMPACT, REBOUNDED
-from reference_solver.planar.located import NOTHING_LEFT, SERIES_PASSES, SHORT
-from reference_solver.planar.state import EVENTS, HELD, LEFT, Options
 from reference_solver.spatial.certificate import open_solve, point_work
 from reference_solver.spatial.entries import enter_release, enter_sub_step
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
@@ -22,6 +18,7 @@ from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
 from reference_solver.spatial.next_impact import begin_flight, move_along, next_impact, undo
+from reference_solver.spatial.phase import cut_phase, end_phase, enter_phase, part_points
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.slide import certify_press, press_until_stick
 from reference_solver.spatial.state import (
@@ -39,12 +36,16 @@ from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
+from reference_solver.stepping.clock import EVENTS, HELD, LEFT, OUTCOME, REBOUND, count_event, open_step, weigh_event
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.noise import EVENT_BUDGET, NOTHING_LEFT, SHORT
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import (
     CONTACT_WORK,
     LOAD_WORK,
     SURFACE_WORK,
     SWEEPS,
-    UNCONVERGED,
     WORST_SWEEPS,
 )
 
@@ -90,28 +91,40 @@ def sub_step(
         return False
     manifolds = room[:found]
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
-    pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
+    smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
+    pushed = False
+    if smooth > 0.0:
+        length = smooth
+        part_points(bodies, manifolds, options, length)
+    else:
+        certify_press(bodies, manifolds, options, tally, length)
+        pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
     begin_flight(bodies, manifolds, options, length)
     end = length
-    if sub.clock[EVENTS] < most_events(len(bodies)):
+    if sub.clock[EVENTS] < EVENT_BUDGET:
         end = next_impact(bodies, detection, manifolds, sub, options, length)
         if end < 0.0:
             undo(bodies)
             return False
+    if smooth > 0.0 and end < length:
+        cut_phase(bodies, manifolds, sub, end)
+        length = end
     remember_forces(bodies, detection, manifolds, memory, length, options.dt)
     if end < length:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
     enter_contacts(manifolds, ledger)
     keep_state(sub.journal, bodies.pose, bodies.before)
-    move_along(bodies, end, end == length)
+    move_along(bodies, end, end == length and smooth == 0.0)
+    if smooth > 0.0:
+        end_phase(bodies, sub, tally, end)
     if pushed:
         displace(bodies, options.dt)
     enter_sub_step(bodies, manifolds, sub, options, end)
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
         enter_release(bodies, manifolds, sub, options, end)
-    if end < left:
-        count_event(sub.clock, len(bodies), tally)
+    if end < left and not (smooth == end and sub.clock[OUTCOME] == SHORTENED):
+        count_event(sub.clock, tally)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -137,9 +150,11 @@ def solve_sub_step(
         sub.saved[k] = tally[k]
     for _ in range(SERIES_PASSES):
         for k in range(len(tally)):
-            if k != SWEEPS and k != WORST_SWEEPS and k != UNCONVERGED:
+            if k != SWEEPS and k != WORST_SWEEPS:
                 tally[k] = sub.saved[k]
         found = collide_now(bodies, detection, manifolds, problem, options, tally)
+        for k in range(len(tally)):
+            sub.struck[k] = tally[k]
         struck, held = found >= LANDED, sub.clock[HELD] > 0.0
         length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck, held)
         if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
@@ -148,7 +163,7 @@ def solve_sub_step(
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
     for k in range(len(tally)):
         sub.saved[k] = tally[k]
-    certify_press(bodies, manifolds, options, tally, length)
+    copy_twists(bodies.twist, bodies.last)
     return length
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.manifolds import TOUCHING
-from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import (
@@ -17,6 +15,8 @@ from reference_solver.spatial.state import (
     Memory,
 )
 from reference_solver.spatial.vector import dot, row, tangents
+from reference_solver.stepping.noise import TOUCHING
+from reference_solver.stepping.options import BLOCK, Options
 
 #: Heights of a manifold's points over their centre below this fraction of the smaller half width count as none.
 #: Points at different height cannot all stick while the bodies turn about a tangent: they would slip at that fraction

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.flight import DRIFT
-from reference_solver.planar.state import HELD, Options
 from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
-from reference_solver.spatial.flight import place_at, reach_of
+from reference_solver.spatial.flight import path_bound, place_at, reach_of
 from reference_solver.spatial.impact import carries
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import momentum_of, spin_of
@@ -16,6 +14,9 @@ from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import CANDIDATES, FIXED, FREE, HALF_SPACE, Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.time_of_impact import return_of_corners, strikes_hard, time_of_impact
 from reference_solver.spatial.vector import add_scaled, row, sub
+from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.options import Options
 
 #: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
 AT_REST = 1e-14
@@ -116,6 +117,8 @@ def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
         for k in range(3):
             v = bodies.twist[i, k]
             way = t * max(abs(v), abs(v + t * share * bodies.rate[i, k]))
+            if bodies.curved[i]:
+                way = path_bound(bodies, i, 0, 1, t) * t
             moves = moves or way > AT_REST * bodies.extent[i]
             if turns and bodies.kind[i] != HALF_SPACE:
                 far = reach_of(bodies, i) + radius_of(bodies, i)

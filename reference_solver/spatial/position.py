@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.rows import ROUND_OFF
-from reference_solver.planar.state import FIXED_STEP, SPLIT, Options
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.sequential_impulses import sweep_pushes
 from reference_solver.spatial.state import Bodies, Manifolds
+from reference_solver.stepping.noise import ROUND_OFF
+from reference_solver.stepping.options import FIXED_STEP, SPLIT, Options
 from reference_solver.tally import PROJECTED
 
 #: With a residual stop, sweeps end when no row misses its law by more than this share of the largest target. Tighter

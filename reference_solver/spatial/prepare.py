@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
-from reference_solver.planar.state import BAUMGARTE, Options
 from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
+from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
+from reference_solver.stepping.options import BAUMGARTE, Options
 
 #: Approach speeds below this fraction of what the loads of one step bring about are a resting body's noise. As
 #: targets they would differ from point to point and lift a corner of a face: all its weight would change places.

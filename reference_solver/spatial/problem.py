@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from reference_solver.compilation import kernel
-from reference_solver.planar.state import Options
 from reference_solver.spatial.manifolds import detect, recall
 from reference_solver.spatial.motion import accelerate
 from reference_solver.spatial.prepare import prepare
 from reference_solver.spatial.state import Bodies, Detection, Manifolds, Memory
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.options import Options
 
 #: Rows of a manifold's frame are t1, t2, n; a problem has n first.
 NORMAL_FIRST = (2, 0, 1)

@@ -7,9 +7,6 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.impact import NOISE
-from reference_solver.planar.slide import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
-from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.impact import clear_point, copy_twists, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
@@ -19,6 +16,10 @@ from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
+from reference_solver.stepping.noise import NOISE
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
+from reference_solver.tally import RESIDUAL, UNCONVERGED
 
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.
 AT_END = 1e-13
@@ -159,6 +160,7 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
+    residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
     press(bodies, manifolds, problem, options, tally, left, left, struck, held)
     length, slipped = left, 0.0
     for _ in range(STICK_SOLVES if options.friction and not held else 0):
@@ -170,5 +172,6 @@ def press_until_stick(
         slipped = max(slipped, length) if end > length else slipped
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
+        tally[RESIDUAL], tally[UNCONVERGED] = residual, unconverged  # of the solve that is used, as in the plane
         press(bodies, manifolds, problem, options, tally, length, left, struck, held)
     return length

@@ -28,7 +28,8 @@ from reference_solver.model import (
 )
 from reference_solver.needs import Needs
 from reference_solver.pieces import Journal, allocate_journal
-from reference_solver.planar.state import CLOCK_SIZE
+from reference_solver.stepping.clock import CLOCK_SIZE
+from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -65,6 +66,8 @@ BODY = np.dtype(
         ("last", "f8", 6),
         ("momentum_before", "f8", 3),  # angular momentum at its start
         ("closing", "i8"),  # 1 where positions follow the velocity at the end of a sub-step, not the mean (E24)
+        ("curved", "i8"),  # 1 where the path of the sub-step is a polynomial: held by contacts whose rows change
+        ("path", "f8", (6, 6)),  # its coefficients: displacement, and rotation vector in world axes (E39)
         ("rate", "f8", 6),  # constant in a sub-step: acceleration, torque or angular acceleration (E30)
         ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
         ("turning", "i8"),  # 1 where the quaternion can change
@@ -227,6 +230,12 @@ class SubStep(NamedTuple):
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD of planar.state
     trial: Bodies  # (2,): a pair of bodies at another time
     saved: Array  # (SIZE,): the tally before an attempt
+    struck: Array  # (SIZE,): the tally after the impacts
+    lasting: Lasting  # contacts of a force phase whose rows change
+    held: Indices  # (n,): 1 where one of them holds the body
+    rows: Array  # (k, 2, 3, 6): their rows at its start
+    end_pose: Array  # (n, 7): poses at its end
+    end_twist: Array  # (n, 6)
     journal: Journal
 
 
@@ -238,10 +247,20 @@ class Ledger(NamedTuple):
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
 
 
-def allocate_sub_step() -> SubStep:
-    """Return the room for a sub-step."""
-    trial = np.zeros(2, BODY).view(np.recarray)
-    return SubStep(np.zeros(CLOCK_SIZE), trial, np.zeros(TALLY_SIZE), allocate_journal(3, 0, 0))
+def allocate_sub_step(bodies: int) -> SubStep:
+    """Return the room for a sub-step of so many bodies."""
+    return SubStep(
+        clock=np.zeros(CLOCK_SIZE),
+        trial=np.zeros(2, BODY).view(np.recarray),
+        saved=np.zeros(TALLY_SIZE),
+        struck=np.zeros(TALLY_SIZE),
+        lasting=allocate_lasting(3, bodies, MOST_ROWS),
+        held=np.zeros(bodies, np.int64),
+        rows=np.zeros((MOST_ROWS, 2, 3, 6)),
+        end_pose=np.zeros((bodies, 7)),
+        end_twist=np.zeros((bodies, 6)),
+        journal=allocate_journal(3, 0, 0),
+    )
 
 
 def allocate_ledger(capacity: int) -> Ledger:

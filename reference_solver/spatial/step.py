@@ -9,7 +9,6 @@ from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
-from reference_solver.planar.state import Options
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.entries import enter_fixed_step
 from reference_solver.spatial.iteration import solve_velocities
@@ -19,6 +18,7 @@ from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
 from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Buffer, Detection, Manifolds, Memory
 from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

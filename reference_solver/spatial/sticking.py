@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.state import BLOCK, Options
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import ZERO, Vector, add, cross, dot, row, scale, times
+from reference_solver.stepping.options import BLOCK, Options
 
 #: Points whose spread in the plane has a smaller determinant than this share of its trace squared are on a line.
 COLLINEAR = 1e-6

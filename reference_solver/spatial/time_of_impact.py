@@ -16,7 +16,15 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
-from reference_solver.spatial.flight import copy_body, curvature, first_fall, place_at, reach_of, turning_bounds
+from reference_solver.spatial.flight import (
+    bend_of_path,
+    copy_body,
+    curvature,
+    first_fall,
+    place_at,
+    reach_of,
+    turning_bounds,
+)
 from reference_solver.spatial.separation import core_width, separation
 from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, SPHERE, Bodies
 from reference_solver.spatial.vector import ZERO, Vector, axis, cross, dot, length, row, scale, sub, times
@@ -43,7 +51,7 @@ def time_of_impact(bodies: Bodies, trial: Bodies, a: int, b: int, duration: floa
     f, s = (a, b) if bodies.kind[a] <= bodies.kind[b] else (b, a)
     if bodies.kind[s] == HALF_SPACE:
         return math.inf
-    if bodies.kind[f] == HALF_SPACE and bodies.kind[s] == SPHERE and not bodies.turning[f]:
+    if bodies.kind[f] == HALF_SPACE and bodies.kind[s] == SPHERE and not (bodies.turning[f] or bodies.curved[s]):
         time = plane_sphere_time(bodies, f, s)
     elif bodies.kind[f] == SPHERE and bodies.kind[s] == SPHERE and same_acceleration(bodies, f, s):
         time = sphere_sphere_time(bodies, f, s)
@@ -94,7 +102,8 @@ def relative_curvature(bodies: Bodies, f: int, s: int) -> Vector:
 def same_acceleration(bodies: Bodies, f: int, s: int) -> bool:
     """Whether the centres have no relative acceleration at all."""
     a = relative_curvature(bodies, f, s)
-    return a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0
+    curved = bodies.curved[f] or bodies.curved[s]
+    return bool(not curved and a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0)
 
 
 @inner_kernel
@@ -211,9 +220,11 @@ def bend_bound(bodies: Bodies, f: int, s: int, duration: float) -> float:
     spin_f, change_f = turning_bounds(bodies, f, duration)
     spin_s, change_s = turning_bounds(bodies, s, duration)
     bend = reach_of(bodies, s) * (spin_s * spin_s + change_s)
+    bend += bend_of_path(bodies, f, duration) + bend_of_path(bodies, s, duration)
     if bodies.kind[f] != HALF_SPACE:
         return bend + reach_of(bodies, f) * (spin_f * spin_f + change_f)
     acceleration = length(relative_curvature(bodies, f, s))
+    acceleration += bend_of_path(bodies, f, duration) + bend_of_path(bodies, s, duration)
     speed = length(relative(bodies.twist, f, s)) + duration * acceleration
     wide = length(relative(bodies.pose, f, s)) + duration * speed + reach_of(bodies, s)
     # Relative to the half-space the distance to its axis turns at spin_f, and so do its own changes, twice (Coriolis).

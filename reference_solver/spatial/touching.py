@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.planar.impact import LATE
-from reference_solver.planar.rows import COORDINATE_NOISE, ROUND_OFF
-from reference_solver.planar.state import HELD, LEFT, Options
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_frame, set_world_points, sort_points
@@ -14,6 +11,9 @@ from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
+from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, ROUND_OFF
+from reference_solver.stepping.options import Options
 
 
 @inner_kernel

@@ -150,3 +150,11 @@ def rotation_quaternion(v: Vector) -> Quaternion:
     else:
         s = math.sin(0.5 * angle) / angle
     return (math.cos(0.5 * angle), s * v[0], s * v[1], s * v[2])
+
+
+@inner_kernel
+def rotated_back(q: Quaternion, v: Vector) -> Vector:
+    """World vector v in the axes of the unit quaternion q (body to world)."""
+    u = (-q[1], -q[2], -q[3])
+    twice = scale(2.0, cross(u, v))
+    return add(add_scaled(v, q[0], twice), cross(u, twice))

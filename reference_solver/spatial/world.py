@@ -11,7 +11,6 @@ from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Array, Model
 from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
-from reference_solver.planar.state import LOCATED, options, uses_direct
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.located import copy_ledger, run_located
@@ -31,6 +30,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.options import FIXED_STEP, MIDPOINT, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -44,9 +44,11 @@ class World:
         self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
-        self._sub_step = allocate_sub_step()
+        self._sub_step = allocate_sub_step(n)
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
+        if self._options.scheme == MIDPOINT:
+            raise ValueError("scheme: 'midpoint' exists in the plane only")
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
         self.journal = allocate_journal(3, n, 0)
@@ -81,7 +83,7 @@ class World:
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
             return int(run_located(*state, sub, self._ledger, self._options, self.tally, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
@@ -89,7 +91,7 @@ class World:
     def contacts(self) -> Contacts:
         """Contacts of the last step."""
         buffer = self._buffer(0, self._most_points)
-        if self._options.scheme == LOCATED:
+        if self._options.scheme != FIXED_STEP:
             return _contacts(buffer, copy_ledger(self._ledger, buffer, 0))
         return _contacts(buffer, copy_contacts(self._manifolds[: self._detection.found[MANIFOLDS]], buffer, 0))
 

@@ -1,6 +1,13 @@
-"""What is round-off and not physics, for all of the step; each number with its reason."""
+"""What is round-off and not physics, and what ends a run, for all of the step; each number with its reason."""
 
 from __future__ import annotations
+
+#: Events located in one step before the run ends: a ball at 100 m/s with .1 mm of play has 4e3 at 1/240 s. None is ever
+#: left out.
+EVENT_BUDGET = 100_000
+#: A contact that still approaches with this share of its reference speed after its solve is not solved, whatever its
+#: impulse: solves end at 1e-13, and stalled ones of mass ratio 1e6 near 1e-6.
+UNSOLVED = 1e-3
 
 #: Gaps and overlaps below this fraction of the smaller half width are round-off, not geometry.
 ROUND_OFF = 1e-12
@@ -20,3 +27,17 @@ FORCE_NOISE = 1e-9
 #: An entry of a row that changes by less than this share of its body's reach along a path stays what it is: what that
 #: leaves out of the motion is as much of h a.
 FROZEN = 1e-13
+#: Round-off floor of a contact's reference speed, as a share of the speeds of its two points: with a residual of
+#: 1e-13 it allows 5e-15 of them, about 20 units in the last place.
+SPEED_SHARE = 0.05
+#: A sub-step shorter than this share of a step tells nothing about forces.
+SHORT = 1e-3
+#: A gap drifts if its rate is more than this share of the contact's reference speed. What drifts less, by round-off or
+#: the least disturbance, leaves a gap that the next sub-step closes.
+DRIFT = 1e-6
+#: A gap below this fraction of the smaller half width is touching. Far above round-off, far below what a body
+#: moves in a step.
+TOUCHING = 1e-9
+#: Velocities that differ from those the impulses give by more than this share of all that these can do are mended: some
+#: fifty units in the last place, which is what summing the impulses of a body costs itself.
+MENDED = 1e-14

@@ -8,12 +8,15 @@ that the caller's machine code is found on disk again by the next process. Uncom
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
 from reference_solver.linking import Carried
+
+#: The bodies of either dimension: what operations are chosen by.
+Bodies: TypeAlias = Any
 
 
 def operation(function: Callable[..., Any]) -> Any:
@@ -42,3 +45,52 @@ def operation(function: Callable[..., Any]) -> Any:
 def provide(name: Any, bodies: type, kernel: Any) -> None:
     """Let the operation ``name`` be ``kernel`` where the first argument is a ``bodies``."""
     name.table[bodies] = kernel
+
+
+@operation
+def is_free(bodies: Any, i: int) -> bool:
+    """Whether forces move body i."""
+    raise NotImplementedError
+
+
+@operation
+def hold(bodies: Any, rows: Any, lasting: Any, c: int, k: int) -> None:
+    """Note the touching features of row c as contact k: bodies, friction, and features in body axes.
+
+    Fills ``lasting.body[k]``, ``lasting.friction[k]``, ``lasting.kind[k]``, ``lasting.place[k]``; bodies stand at the
+    start of the phase.
+    """
+
+
+@operation
+def evaluate(bodies: Any, lasting: Any) -> None:
+    """Follow the noted features of all contacts at the present poses and twists.
+
+    Fills gap, frame, jacobian, response (rows of J M^-1), speed (u = J v) and gamma = (dJ/dt) v of every contact.
+    """
+
+
+@operation
+def free_accelerations(bodies: Any, lasting: Any) -> None:
+    """Fill ``lasting.free``: accelerations of all bodies without contacts, at the present poses and twists."""
+
+
+@operation
+def displace(bodies: Any, lasting: Any, i: int) -> None:
+    """Put body i at ``lasting.base[i]`` moved by ``lasting.displacement[i]``."""
+
+
+@operation
+def displacement_rate(bodies: Any, lasting: Any, i: int, stage: int) -> None:
+    """Fill ``lasting.rate[stage, i]`` from the displacement and ``bodies.twist[i]``."""
+
+
+@operation
+def displacement_curvature(bodies: Any, lasting: Any, i: int, end: int) -> None:
+    """Fill ``lasting.bend[end, i]``, second derivative of the displacement, also from ``lasting.acceleration[i]``."""
+
+
+@operation
+def feature_limit(bodies: Any, lasting: Any, k: int) -> float:
+    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m]."""
+    raise NotImplementedError

@@ -331,7 +331,7 @@ def advance(meeting: Any, now: float, until: float) -> float:
         step = safe_time(meeting, value - floor, acceleration)
         if not left:
             # The parabola that ends first rises to more than the noise: -a (step / 2)^2 / 2 at half its time.
-            left = step > 0.0 and -0.125 * acceleration * step * step > noise
+            left = 0.0 < step < math.inf and -0.125 * acceleration * step * step > noise
             if step < math.inf and not left:
                 step = safe_time(meeting, value - floor + noise, acceleration)
         if step >= until - t:

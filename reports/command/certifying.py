@@ -34,6 +34,8 @@ PARTS = (
     "columns",
     "conservation",
     "rotation",
+    "turning",
+    "turning_in_space",
     "detection",
     "metamorphic",
     "hard_cases",

@@ -6,9 +6,24 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.planar.clock import MOST_SOFT, count_event, most_events, open_step, weigh_event
-from reference_solver.planar.state import CLOCK_SIZE, EVENTS, HELD, LEFT, PATIENCE, SOFT
-from reference_solver.tally import EVENTS_LOCATED, STEPS_HELD, new_tally
+from reference_solver.certificate import reasons
+from reference_solver.stepping.clock import (
+    CLOCK_SIZE,
+    EVENTS,
+    HELD,
+    JAM_PATIENCE,
+    JAMMED,
+    LEFT,
+    MOST_SOFT,
+    PATIENCE,
+    SOFT,
+    count_event,
+    open_step,
+    weigh_event,
+    weigh_jam,
+)
+from reference_solver.stepping.noise import EVENT_BUDGET
+from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD, new_tally
 
 DT, G = 1.0 / 240.0, 9.81
 PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -77,35 +92,65 @@ def test_a_hard_impact_is_located_in_a_held_step_as_well():
     assert simulation.pose[-1, 0] == pytest.approx(end - abs(unfolded - 2.0 * end), abs=1e-10)
 
 
-def test_patience_halves_after_a_held_step_and_comes_back_after_calm_ones():
+def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_before():
     clock, tally, bodies = np.zeros(CLOCK_SIZE), new_tally(), 4
-    open_step(clock, bodies, DT)
-    assert (clock[LEFT], clock[PATIENCE]) == (DT, MOST_SOFT + bodies)
-    for _ in range(MOST_SOFT + bodies):
-        count_event(clock, bodies, tally)
-    assert clock[HELD] == 0.0
-    count_event(clock, bodies, tally)
-    assert clock[HELD] == 1.0
-    assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (1.0, MOST_SOFT + bodies + 1)
-    open_step(clock, bodies, DT)
-    assert (clock[HELD], clock[PATIENCE], clock[EVENTS]) == (0.0, 0.5 * (MOST_SOFT + bodies), 0.0)
-    for _ in range(6):  # more than half of the ten: neither calm nor held
-        count_event(clock, bodies, tally)
-    open_step(clock, bodies, DT)
-    assert clock[PATIENCE] == 0.5 * (MOST_SOFT + bodies)
-    open_step(clock, bodies, DT)
-    assert clock[PATIENCE] == MOST_SOFT + bodies
+    for _ in range(2):
+        open_step(clock, bodies, DT)
+        assert (clock[LEFT], clock[PATIENCE], clock[HELD]) == (DT, MOST_SOFT + bodies, 0.0)
+        for _ in range(MOST_SOFT + bodies):
+            count_event(clock, tally)
+        assert clock[HELD] == 0.0
+        count_event(clock, tally)
+        assert clock[HELD] == 1.0
+    assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
 
 
-def test_hard_impacts_try_no_patience_but_have_a_bound():
-    clock, tally, bodies = np.zeros(CLOCK_SIZE), new_tally(), 1
-    open_step(clock, bodies, DT)
-    for k in range(most_events(bodies)):
-        assert clock[HELD] == 0.0, k
-        count_event(clock, bodies, tally)
+def test_an_island_is_jammed_where_contacts_have_more_rows_than_bodies_have_freedoms():
+    clock = np.zeros(CLOCK_SIZE)
+    for rows, bodies, jammed in [(13, 4, 1.0), (12, 4, 0.0), (60, 3, 0.0)]:
+        open_step(clock, bodies, DT)
+        weigh_jam(clock, rows, 3 * bodies, bodies)
+        assert (clock[JAMMED], clock[PATIENCE]) == (jammed, JAM_PATIENCE if jammed else MOST_SOFT + bodies)
+
+
+def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
+    clock, tally = np.zeros(CLOCK_SIZE), new_tally()
+    open_step(clock, 1, DT)
+    clock[EVENTS] = EVENT_BUDGET - 2
+    for _ in range(2):
+        count_event(clock, tally)
         weigh_event(clock, 0.0)
-        assert clock[SOFT] == 0.0
-    assert clock[HELD] == 1.0
+        assert (clock[SOFT], clock[HELD], tally[EXHAUSTED]) == (0.0, 0.0, 0.0)
+    count_event(clock, tally)
+    assert tally[EXHAUSTED] == 1.0
+    assert any("events" in reason for reason in reasons(tally))
+
+
+def test_a_ball_with_little_play_never_leaves_its_room():
+    """A hundred metres a second and a centimetre of play: 83 impacts in a step of 1/60 s, each followed."""
+    half, speed, play, dt = 0.5, 100.0, 0.01, 1.0 / 60.0
+    walls = [half_space((1.0, 0.0), -half - play), half_space((-1.0, 0.0), -half - play)]
+    ball = Body(Disc(half), 1.0, 0.125, (0.0, 0.0, 0.0), (speed, 0.0, 0.0))
+    simulation = Simulation(Model(2, [*walls, ball], (0.0, 0.0), 1.0, 0.0), Settings.reference(dt))
+    simulation.advance(30)
+    unfolded = (speed * 30 * dt + play) % (4.0 * play)
+    assert simulation.pose[2, 0] == pytest.approx(play - abs(unfolded - 2.0 * play), abs=1e-11)
+    assert simulation.certificate["events"] == int((speed * 30 * dt + play) / (2.0 * play))
+    assert simulation.certificate["holds"], simulation.certificate["reasons"]
+
+
+def test_a_disc_under_a_descending_ceiling_ends_the_run_and_names_the_pair():
+    floor = half_space((0.0, 1.0))
+    ceiling = Body(HalfSpace((0.0, -1.0)), motion="prescribed", pose=(0.0, 1.2, 0.0), twist=(0.0, -0.5, 0.0))
+    disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0))
+    simulation = Simulation(Model(2, [floor, ceiling, disc], (0.0, -G), 0.0, 0.3), Settings.reference(DT))
+    simulation.advance(90)
+    assert np.isfinite(simulation.pose).all()  # it has not come down yet
+    simulation.advance(30)
+    assert not np.isfinite(simulation.pose[2]).any()
+    certificate = simulation.certificate
+    assert not certificate["holds"]
+    assert any("no impulses keep bodies" in reason for reason in certificate["reasons"])
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -40,13 +40,17 @@ def _laws(run: Run) -> Iterator[float]:
     speed = _speeds(run)
     scale = mass * speed + pressed.clip(min=0.0)
     owner = run.contact_owner
+    # What corrects impulses at the end of a piece of the impulse-level scheme may be of any sign; the piece itself
+    # closes gaps with rows of mid-drift. Runs that hold one are no truth anyway (see `fallback`).
+    correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
-    yield _worst(-pressed, scale)
+    yield _worst(np.where(correction, 0.0, -pressed), scale)
     # Where rows turn within a piece its impulse is a mean over normals, of which the first is known: a turn by an angle
     # adds that share of the normal impulse to the friction, and of the friction to the normal impulse.
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * normal_turns(run)
-    yield _worst(held_back - mu * pressed.clip(min=0.0) - leaning, scale)
+    excess = held_back - mu * pressed.clip(min=0.0) - leaning
+    yield _worst(np.where(correction, 0.0, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
     # allowed after an impact is -e u-; a soft rebound may be held instead, and is then counted.
@@ -61,7 +65,7 @@ def _laws(run: Run) -> Iterator[float]:
     # Rebounds that are released leave with what was held, which their own piece cannot tell; and what is not pressed
     # and is not an impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
-    defect = np.where(release | parting, 0.0, defect)
+    defect = np.where(release | parting | coarse, 0.0, defect)
     yield _worst(defect, scale)
 
     # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it.
@@ -74,7 +78,8 @@ def _laws(run: Run) -> Iterator[float]:
     # Where the direction of a slip turns within a piece, its friction is a mean of directions.
     first, last = (x - (x * n).sum(axis=1)[:, None] * n for x in (before, after))
     turned = np.where(frozen, 0.0, limit * _angle(first, last)) + leaning
-    yield _worst(np.linalg.norm(along - wanted, axis=1) - turned, scale)
+    missed = np.linalg.norm(along - wanted, axis=1) - turned
+    yield _worst(np.where(coarse, 0.0, missed), scale)
 
     about = cross(pieces.point, pieces.impulse)
     arm = np.linalg.norm(pieces.point, axis=1) + run.size

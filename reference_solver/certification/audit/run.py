@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import FIXED, FORCES, FROZEN, IMPACT, RELEASE, Pieces
+from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, RELEASE, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -128,8 +128,18 @@ class Run:
 
     @cached_property
     def is_frozen(self) -> NDArray[np.bool_]:
-        """(p,) whether rows of the contacts stood still in a piece: impacts, and frozen and fixed-step phases."""
-        return np.asarray((self.pieces.length == 0.0) | np.isin(self.pieces.scheme, (FROZEN, FIXED)))
+        """(p,) whether rows of the contacts stood still in a piece: all but phases of fifth order."""
+        return np.asarray((self.pieces.length == 0.0) | (self.pieces.scheme != FIFTH_ORDER))
+
+    @cached_property
+    def is_impulse_level(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece went by the impulse-level scheme, whose rows are those of mid-drift."""
+        return np.asarray(self.pieces.scheme == IMPULSE_LEVEL)
+
+    @cached_property
+    def is_correction(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece changes the impulses of one of the impulse-level scheme, at its end."""
+        return np.asarray(self.is_impulse_level & (self.pieces.length == 0.0))
 
     @cached_property
     def is_impact(self) -> NDArray[np.bool_]:

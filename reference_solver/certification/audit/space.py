@@ -47,11 +47,12 @@ def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
 def _touching(run: Run) -> tuple[float, float, float]:
     """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
 
-    Of contacts that carry something. Those of the fixed-step law may close a gap, and are not asked.
+    Of contacts that carry something. Those of the fixed-step law and of the impulse-level scheme may close a gap, and
+    have the levers of another time: they are not asked.
     """
     pieces = run.pieces
     worst = [0.0, 0.0, 0.0]
-    fixed = run.is_fixed[run.contact_owner]
+    fixed = (run.is_fixed | run.is_impulse_level)[run.contact_owner]
     carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~fixed & np.isfinite(pieces.normal).all(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     for pair in np.unique(pairs[carry]):

@@ -2,7 +2,17 @@
 
 import pytest
 
-from reference_solver.certification import Gate, columns, conservation, detection, friction, impact, rotation
+from reference_solver.certification import (
+    Gate,
+    columns,
+    conservation,
+    detection,
+    friction,
+    impact,
+    rotation,
+    turning,
+    turning_in_space,
+)
 from reference_solver.certification.space import SPACES
 
 IN_BOTH = [
@@ -38,10 +48,17 @@ IN_BOTH = [
 ]
 ALONE = [
     (rotation.order, "classical"),
-    (rotation.order, "reference"),
+    (rotation.error, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
+    *[(turning.errors, name) for name in turning.CASES],
+    *[(turning.order, name) for name in turning.CASES],
+    *[(turning.impulse_order, name) for name in turning.SMOOTH],
+    (turning.long_board,),
+    *[(turning_in_space.errors, name) for name in turning_in_space.CASES],
+    *[(turning_in_space.order, name) for name in turning_in_space.CASES],
     (detection.seams, SPACES[0], "polygon"),
+    (detection.slender_rod,),
 ]
 
 

@@ -53,14 +53,8 @@ SCENES = {
 }
 
 
-#: The slide on a round contact that ends in step 240 is located by the planar solver and not by the spatial one.
-OPEN_DEFECT = pytest.param("discs on each other", 360, marks=pytest.mark.xfail(strict=True, reason="slide not located"))
-
-
-@pytest.mark.parametrize(
-    ("scene", "steps"), [(name, 239 if name == "discs on each other" else 360) for name in SCENES] + [OPEN_DEFECT]
-)
-def test_a_lifted_planar_scene_moves_as_in_the_plane(scene, steps):
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_lifted_planar_scene_moves_as_in_the_plane(scene, steps=360):
     bodies, restitution, friction, tolerance = SCENES[scene]
     bodies = [floor(), *bodies]
     settings = Settings.reference(1 / 240)

@@ -1,0 +1,191 @@
+"""Force phases at impulse level: one solve for the mean velocity, with rows at mid-drift (E28).
+
+    q_m = q0 + (h/2) v0,   v = v0 + (h/2) M^-1 f + M^-1 J(q_m)^T p,   v1 = 2 v - v0,   q1 = q0 + h v
+
+Gaps at the end are those of the start and h J(q_m) v but for the third order: what may close, closes at the end. What
+v1 misses of held contacts there is of second order, and `settle` takes it out: the mid-point rule with a projection, of
+second order. For bodies that jam, and where no phase of fifth order is found.
+"""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.block import prepare_blocks
+from reference_solver.planar.columns import (
+    APPROACH,
+    ARM_A,
+    ARM_B,
+    COS,
+    EXTENT,
+    FORCE_N,
+    FORCE_T,
+    FRICTION,
+    GAP,
+    IMPACT_N,
+    IMPACT_T,
+    MOTION,
+    NORMAL_MASS,
+    NX,
+    NY,
+    PN,
+    PT,
+    REACH,
+    SIN,
+    SPEED,
+    TARGET,
+    A,
+    B,
+)
+from reference_solver.planar.flight import keep_start, put_back
+from reference_solver.planar.impact import gap_noise
+from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.kinematics import apply_normal, apply_tangent, copy_vectors, tangent_velocity
+from reference_solver.planar.lasting import displace, evaluate, hold
+from reference_solver.planar.rows import measure_speed, prepare_masses
+from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
+from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
+from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.noise import NOISE
+from reference_solver.stepping.options import BLOCK, Options
+
+#: Gaps above this share of what touches are closed: what is left is well inside.
+GAP_SHARE = 0.25
+#: Impulses of a solve for displacements start from this multiple of what its widest gap alone would take.
+FAR_ABOVE = 1e3
+#: Largest gap, as a share of the smaller half width, that the scheme may have left: (w h)^3 of a turn of .1 rad.
+LEFT_OVER = 1e-4
+#: Farthest that closing gaps may move a body, in multiples of the widest: a lever of a slender body.
+LEVERAGE = 100.0
+
+
+@inner_kernel
+def turn_rows(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> None:
+    """Give all rows the normals and levers that their features have at mid-drift of ``length``; bodies stay."""
+    lasting, first = sub.lasting, 0
+    keep_start(bodies, sub)
+    while first < rows.counts[CONTACTS]:
+        count = min(len(lasting.row), rows.counts[CONTACTS] - first)
+        for k in range(count):
+            hold(bodies, rows, lasting, first + k, k)
+        lasting.size[HELD_CONTACTS] = count
+        drift(bodies, sub, lasting, 0.5 * length)
+        evaluate(bodies, lasting)
+        for k in range(count):
+            take_levers(rows, lasting, first + k, k)
+        for i in range(len(bodies.kind)):
+            put_back(bodies, sub, i)
+        first += count
+    for c in range(rows.counts[CONTACTS]):
+        prepare_masses(bodies, rows, c)
+    if options.solver == BLOCK:
+        prepare_blocks(bodies, rows)
+
+
+@inner_kernel
+def drift(bodies: Bodies, sub: SubStep, lasting: Lasting, time: float) -> None:
+    """Put all bodies where the velocities of the start take them in ``time``."""
+    for i in range(len(bodies.kind)):
+        for d in range(3):
+            lasting.base[i, d] = sub.pose[i, d]
+            lasting.displacement[i, d] = time * sub.start[i, d]
+        displace(bodies, lasting, i)
+
+
+@inner_kernel
+def take_levers(rows: Rows, lasting: Lasting, c: int, k: int) -> None:
+    """Normal and levers of row c from the Jacobian of noted contact k: with a = x n + y t, a x n = -y and a x t = x."""
+    nx, ny = lasting.frame[k, 0, 0], lasting.frame[k, 0, 1]
+    rows.real[c, NX], rows.real[c, NY] = nx, ny
+    for side in range(2):
+        sign, arm = 2.0 * side - 1.0, ARM_A if side == 0 else ARM_B
+        y, x = -sign * lasting.jacobian[k, side, 0, 2], sign * lasting.jacobian[k, side, 1, 2]
+        rows.real[c, arm], rows.real[c, arm + 1] = x * nx - y * ny, x * ny + y * nx
+
+
+@inner_kernel
+def reach_end(bodies: Bodies, rows: Rows, sub: SubStep) -> None:
+    """From mean velocities and half the impulses to those of the end, and to all of them."""
+    for i in range(len(bodies.kind)):
+        for d in range(3):
+            bodies.twist[i, d] += bodies.twist[i, d] - sub.start[i, d]
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, PN], rows.real[c, PT] = 2.0 * rows.real[c, PN], 2.0 * rows.real[c, PT]
+
+
+@inner_kernel
+def misses_end(bodies: Bodies, rows: Rows, options: Options, time: float) -> bool:
+    """Whether velocities are not those that contacts held over ``time`` allow at its end; gives rows their impulses."""
+    misses = False
+    for c in range(rows.counts[CONTACTS]):
+        measure_speed(bodies, rows, c, options.dt)
+        pn, pt = time * rows.real[c, FORCE_N], time * rows.real[c, FORCE_T]
+        noise = NOISE * rows.real[c, SPEED]
+        misses = misses or abs(rows.real[c, APPROACH]) > noise
+        if options.friction and abs(pt) < rows.real[c, FRICTION] * pn:
+            misses = misses or abs(tangent_velocity(bodies.twist, rows, c)) > noise
+        rows.real[c, PN], rows.real[c, PT] = pn, pt
+        rows.real[c, TARGET] = rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
+    return misses
+
+
+@inner_kernel
+def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> bool:
+    """Move bodies until the gaps of all rows are closed, by M^-1 J^T; False if they are, or cannot be.
+
+    A solve for displacements, whose impulses are counted from far above zero: contacts push and pull. Gaps and overlaps
+    that the scheme cannot have left are not its own to close, nor those that contradict each other: then bodies stay.
+    """
+    widest, smallest = 0.0, math.inf
+    for c in range(rows.counts[CONTACTS]):
+        extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
+        if abs(rows.real[c, GAP]) > LEFT_OVER * extent:
+            return False
+        smallest = min(smallest, extent)
+        if abs(rows.real[c, GAP]) > GAP_SHARE * gap_noise(bodies, rows, c):
+            widest = max(widest, abs(rows.real[c, GAP]))
+    if widest == 0.0:
+        return False
+    copy_vectors(bodies.twist, sub.after)
+    for i in range(len(bodies.kind)):
+        for d in range(3):
+            bodies.twist[i, d] = 0.0
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, PN], rows.real[c, PT] = FAR_ABOVE * widest * rows.real[c, NORMAL_MASS], 0.0
+        rows.real[c, TARGET], rows.real[c, SPEED], rows.real[c, FRICTION] = -rows.real[c, GAP], widest, 0.0
+    solve_velocities(bodies, rows, problem, options, tally)
+    farthest = 0.0
+    for i in range(len(bodies.kind)):
+        way = abs(bodies.twist[i, 0]) + abs(bodies.twist[i, 1]) + bodies.real[i, REACH] * abs(bodies.twist[i, 2])
+        farthest = max(farthest, way if bodies.kind[i, MOTION] == FREE else 0.0)
+    if farthest > LEVERAGE * widest:
+        copy_vectors(sub.after, bodies.twist)
+        return False
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            for d in range(3):
+                bodies.pose[i, d] += bodies.twist[i, d]
+            bodies.real[i, COS], bodies.real[i, SIN] = math.cos(bodies.pose[i, 2]), math.sin(bodies.pose[i, 2])
+    copy_vectors(sub.after, bodies.twist)
+    return True
+
+
+@inner_kernel
+def take_back(bodies: Bodies, rows: Rows, options: Options) -> None:
+    """Velocities without the impulses of the rows, so that a solve may find other ones."""
+    for c in range(rows.counts[CONTACTS]):
+        apply_normal(bodies, bodies.twist, rows, c, -rows.real[c, PN])
+        if options.friction:
+            apply_tangent(bodies, bodies.twist, rows, c, -rows.real[c, PT])
+
+
+@inner_kernel
+def keep_change(rows: Rows, time: float) -> None:
+    """Enter impulses less those that were there before as those of an impact."""
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, IMPACT_N] = rows.real[c, PN] - time * rows.real[c, FORCE_N]
+        rows.real[c, IMPACT_T] = rows.real[c, PT] - time * rows.real[c, FORCE_T]
+        rows.real[c, PN] = rows.real[c, PT] = 0.0

@@ -1,0 +1,227 @@
+"""Force phases in which rows change with the bodies: one Dormand-Prince step instead of the frozen solve (E35 to E39).
+
+The contacts of the sub-step are noted with their features; where none of their rows would change along the path of the
+frozen solve, that solve is exact and used. Else `stepping.phase` goes to the end of the phase. Bodies that no noted
+contact holds fly on as in any other sub-step.
+"""
+
+from __future__ import annotations
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
+from reference_solver.model import Array
+from reference_solver.spatial.features import follow, name_features
+from reference_solver.spatial.impact import carries, copy_twists
+from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.motion import accelerate, momentum_of, put_orientation
+from reference_solver.spatial.operations import Spatial, displace
+from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
+from reference_solver.spatial.touching import gap_noise
+from reference_solver.spatial.vector import dot, length, row, sub
+from reference_solver.stepping.clock import HELD, OUTCOME
+from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
+from reference_solver.stepping.noise import FROZEN, NOISE
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.phase import FAILED, begin_phase, find_phase, go_back, step_phase, write_path
+from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK, SWEEPS, WORST_SWEEPS
+
+#: Gap of a contact that is held, as a share of the smaller half width: more is for the frozen solve to close (E20).
+CLOSED = 1e-9
+
+
+@inner_kernel
+def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> bool:
+    """Note all points that are pressed together, and which bodies they hold; False where one cannot be followed."""
+    lasting = sub_step.lasting
+    k = 0
+    for i in range(len(bodies)):
+        sub_step.held[i] = 0
+    for m in range(len(manifolds)):
+        a, b = manifolds.body_a[m], manifolds.body_b[m]
+        extent = min(bodies.extent[a], bodies.extent[b])
+        for p in range(manifolds.points[m]):
+            if manifolds.open[m, p] or manifolds.release[m, p] > 0.0:
+                continue
+            if k == len(lasting.gap) or not name_features(bodies, manifolds, lasting, POINTS * m + p, k):
+                return False
+            lasting.row[k] = POINTS * m + p
+            lasting.speeds[k], lasting.extent[k] = manifolds.speed[m, p], extent
+            follow(bodies, lasting, k)
+            if not abs(lasting.gap[k]) <= CLOSED * extent + gap_noise(bodies, manifolds, m, p):
+                return False
+            sub_step.held[a] = sub_step.held[b] = 1
+            k += 1
+    lasting.size[CONTACTS] = k
+    lasting.size[BODIES] = len(bodies)
+    return k > 0
+
+
+@inner_kernel
+def rows_stay(bodies: Bodies, sub_step: SubStep, time: float) -> bool:
+    """Whether no row of a noted contact changes along the way that bodies go at the mean of ``first`` and ``last``."""
+    lasting = sub_step.lasting
+    for k in range(lasting.size[CONTACTS]):
+        for side in range(2):
+            i = lasting.body[k, side]
+            if bodies.gyroscopic[i] and not (at_rest(bodies.first, i) and at_rest(bodies.last, i)):
+                return False
+            for r in range(3):
+                for d in range(6):
+                    sub_step.rows[k, side, r, d] = lasting.jacobian[k, side, r, d]
+    for i in range(len(bodies)):
+        for d in range(6):
+            lasting.displacement[i, d] = 0.5 * time * (bodies.first[i, d] + bodies.last[i, d])
+    space = Spatial(bodies, bodies.pose, bodies.twist)
+    for i in range(len(bodies)):
+        if sub_step.held[i]:
+            displace(space, lasting, i)
+    stay = True
+    for k in range(lasting.size[CONTACTS]):
+        follow(bodies, lasting, k)
+        for side in range(2):
+            i = lasting.body[k, side]
+            if bodies.motion[i] == FREE or (bodies.motion[i] != FIXED and bodies.turning[i]):
+                stay = stay and same_rows(sub_step.rows[k, side], lasting.jacobian[k, side], lasting.extent[k])
+    for i in range(len(bodies)):
+        for d in range(6):
+            lasting.displacement[i, d] = 0.0
+        if sub_step.held[i]:
+            for d in range(3):
+                bodies.pose[i, d] = lasting.base[i, d]
+            displace(space, lasting, i)
+    return stay
+
+
+@inner_kernel
+def at_rest(twist: Array, i: int) -> bool:
+    """Whether body i does not turn."""
+    return bool(twist[i, 3] == 0.0 and twist[i, 4] == 0.0 and twist[i, 5] == 0.0)
+
+
+@inner_kernel
+def same_rows(before: Array, after: Array, extent: float) -> bool:
+    """Whether the rows of one side of a contact are the same but for round-off."""
+    for r in range(3):
+        reach = extent + length(row(before, r, 3))
+        change = length(sub(row(after, r, 0), row(before, r, 0)))
+        turned = length(sub(row(after, r, 3), row(before, r, 3)))
+        if change > FROZEN or turned > FROZEN * reach:
+            return False
+    return True
+
+
+@spliced_kernel
+def enter_phase(
+    bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, tally: Array, left: float, frozen: float
+) -> float:
+    """Go through a phase whose rows change, at most ``left`` long; its length, 0 where the frozen solve is the one.
+
+    ``frozen``: length of the frozen solve, from ``first`` to ``last``. Afterwards ``twist`` are the velocities at the
+    end of the phase, its poses and velocities stand in the sub-step, the paths in the bodies; poses are those of its
+    start.
+    """
+    for i in range(len(bodies)):
+        bodies.curved[i] = 0
+    lasting = sub_step.lasting
+    if sub_step.clock[HELD] > 0.0 or not note_contacts(bodies, manifolds, sub_step):
+        return 0.0
+    space = Spatial(bodies, bodies.pose, bodies.twist)
+    begin_phase(space, lasting)
+    if rows_stay(bodies, sub_step, frozen):
+        return 0.0
+    copy_twists(bodies.first, bodies.twist)
+    time, outcome = find_phase(space, lasting, left)
+    sub_step.clock[OUTCOME] = outcome
+    if outcome == FAILED:
+        copy_twists(bodies.last, bodies.twist)
+        return 0.0
+    for k in range(len(tally)):
+        if k != SWEEPS and k != WORST_SWEEPS:
+            tally[k] = sub_step.struck[k]
+    keep_end(bodies, sub_step)
+    for i in range(len(bodies)):
+        if sub_step.held[i] and bodies.motion[i] != FIXED:
+            bodies.curved[i] = 1
+            write_path(lasting, i, time, bodies.path[i])
+    go_back(space, lasting)
+    copy_twists(bodies.first, bodies.twist)
+    accelerate(bodies, time)
+    for i in range(len(bodies)):
+        for d in range(6):
+            if bodies.curved[i]:
+                bodies.twist[i, d] = sub_step.end_twist[i, d]
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            for d in range(3):
+                manifolds.impulse[m, p, d] = 0.0
+    enter_impulses(manifolds, lasting)
+    return time
+
+
+@inner_kernel
+def keep_end(bodies: Bodies, sub_step: SubStep) -> None:
+    """Keep poses and velocities of the end of a phase."""
+    for i in range(len(bodies)):
+        for d in range(7):
+            sub_step.end_pose[i, d] = bodies.pose[i, d]
+        for d in range(6):
+            sub_step.end_twist[i, d] = bodies.twist[i, d]
+
+
+@inner_kernel
+def enter_impulses(manifolds: Manifolds, lasting: Lasting) -> None:
+    """Impulses of the phase, in the frames of the manifolds at its start; and which of the noted points parted."""
+    for k in range(lasting.size[CONTACTS]):
+        m, p = lasting.row[k] // POINTS, lasting.row[k] % POINTS
+        world = row(lasting.impulse, k, 0)
+        for d in range(3):
+            manifolds.impulse[m, p, d] = dot(row(manifolds.frame[m], d, 0), world)
+
+
+@inner_kernel
+def cut_phase(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: float) -> None:
+    """Make the phase again, up to ``time``."""
+    space = Spatial(bodies, bodies.pose, bodies.twist)
+    step_phase(space, sub_step.lasting, time)
+    keep_end(bodies, sub_step)
+    go_back(space, sub_step.lasting)
+    enter_impulses(manifolds, sub_step.lasting)
+
+
+@inner_kernel
+def end_phase(bodies: Bodies, sub_step: SubStep, tally: Array, time: float) -> None:
+    """Put the bodies held in the phase where it ends, all others being there, and enter its work."""
+    lasting = sub_step.lasting
+    for k in range(lasting.size[CONTACTS]):
+        tally[CONTACT_WORK] += lasting.work[k, 0]
+        tally[SURFACE_WORK] += lasting.work[k, 1]
+    for i in range(len(bodies)):
+        if bodies.curved[i]:
+            for d in range(3):
+                bodies.pose[i, d] = sub_step.end_pose[i, d]
+            if bodies.turning[i]:
+                q = sub_step.end_pose[i]
+                put_orientation(bodies, i, (q[3], q[4], q[5], q[6]))
+            for d in range(6):
+                bodies.twist[i, d] = sub_step.end_twist[i, d]
+            if bodies.gyroscopic[i]:
+                momentum = momentum_of(bodies, i, row(bodies.twist, i, 3))
+                for d in range(3):
+                    bodies.angular_momentum[i, d] = momentum[d]
+        if bodies.motion[i] == FREE:
+            way = sub(row(bodies.pose, i, 0), row(lasting.base, i, 0))
+            tally[LOAD_WORK] += dot(row(bodies.acceleration, i, 0), way) / bodies.inverse_mass[i]
+            for d in range(3):  # the turn about an axis of the torque, by Hermite's formula of fourth order
+                spins = row(bodies.first, i, 3)[d] + bodies.twist[i, 3 + d]
+                bend = lasting.slope[0, i, 3 + d] - lasting.slope[STAGES - 1, i, 3 + d]
+                tally[LOAD_WORK] += bodies.torque[i, d] * time * (0.5 * spins + time * bend / 12.0)
+
+
+@inner_kernel
+def part_points(bodies: Bodies, manifolds: Manifolds, options: Options, time: float) -> None:
+    """Mark the points that carry nothing in a phase and leave in it: they are looked for at their return."""
+    for m in range(len(manifolds)):
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            parts = velocity_at(v, w, manifolds, m, p)[2] > NOISE * manifolds.speed[m, p]
+            if parts and not carries(manifolds, m, p, time / options.dt):
+                manifolds.open[m, p] = 1

@@ -1,0 +1,75 @@
+"""Time left in a step, and how many events it may have before what is left of it is not located any more (E28)."""
+
+from __future__ import annotations
+
+from reference_solver.compilation import kernel
+from reference_solver.model import Array
+from reference_solver.stepping.noise import EVENT_BUDGET
+from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD
+
+#: Entries of a clock: what is left of the step [s] (0: a new one begins), events located in it, how many of them were
+#: soft, how many soft ones it may have, 1 where what is left of it goes at impulse level (E28), what the last
+#: phase of turning rows was, and the length of a sub-step at impulse level that is yet to be settled [s].
+LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
+#: 1 where bodies may not leave their bounds in the step, and 1 where one has.
+CONFINED, ESCAPED = 7, 8
+#: 1 where the island is jammed at the start of its step.
+JAMMED = 9
+CLOCK_SIZE = 10
+
+#: Soft events located in a step, and one more per body.
+MOST_SOFT = 16
+#: Free bodies from which on an island may be jammed, and soft events that are located in a step of one that is.
+JAM_BODIES, JAM_PATIENCE = 4, 2
+#: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
+REBOUND = 0.25
+
+
+@kernel
+def open_step(clock: Array, bodies: int, dt: float) -> None:
+    """Start the clock of a step.
+
+    Soft events, which are ends of slides and impacts no faster than what loads do in a step, try its patience: a pile
+    of bodies that jam has no end of them, each smaller than the one before. Nothing is known of the step before.
+    """
+    clock[LEFT] = dt
+    clock[PATIENCE] = MOST_SOFT + bodies
+    clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = 0.0
+
+
+@kernel
+def weigh_jam(clock: Array, rows: int, freedoms: int, bodies: int) -> None:
+    """Decide at the start of a step whether the island is jammed: its contacts have more rows than it has freedoms.
+
+    Then whatever moves in it moves what it touches, and events have no end; few of them are located.
+    """
+    if bodies >= JAM_BODIES and rows > freedoms:
+        clock[JAMMED], clock[PATIENCE] = 1.0, JAM_PATIENCE
+
+
+@kernel
+def count_event(clock: Array, tally: Array) -> None:
+    """Enter an event, as a soft one until its impact is weighed.
+
+    Too many soft ones, and the step is held from here; too many of all kinds, and the run ends.
+    """
+    clock[EVENTS] += 1.0
+    clock[SOFT] += 1.0
+    tally[EVENTS_LOCATED] += 1.0
+    if clock[HELD] == 0.0 and clock[SOFT] > clock[PATIENCE]:
+        hold_rest(clock, tally)
+    if clock[EVENTS] > EVENT_BUDGET:
+        tally[EXHAUSTED] += 1.0
+
+
+@kernel
+def hold_rest(clock: Array, tally: Array) -> None:
+    """Let what is left of the step go by the impulse-level scheme."""
+    clock[HELD] = 1.0
+    tally[STEPS_HELD] += 1.0
+
+
+@kernel
+def weigh_event(clock: Array, weight: float) -> None:
+    """What led here turned out to be a soft rebound, or a hard impact (weight 0)."""
+    clock[SOFT] = max(clock[SOFT] - (1.0 - weight), 0.0)

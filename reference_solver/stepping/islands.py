@@ -1,0 +1,116 @@
+"""Islands: bodies that can meet each other within a step, each stepped by itself (E29).
+
+Free bodies whose places within the step may overlap are joined; bodies that forces do not move join nobody, and belong
+to every island that may touch them. Places are bounds that hold unless an impact makes a body faster: a body that
+leaves its own ends the attempt, and the step is made again with wider ones, in the end as one island.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.model import Array
+
+Indices = NDArray[np.int64]
+
+#: Entries of `Islands.size`: entries of the lists of bodies that forces do not move, bodies of the island gathered.
+NODES, MEMBERS = 0, 1
+SIZES = 2
+#: By how much farther than loads and speeds alone take it a body may get, one attempt after the other. An elastic
+#: impact with a heavy body doubles its speed and adds twice that of the other; the last attempt has no bounds.
+ROOM = (1.0, 8.0)
+
+
+class Islands(NamedTuple):
+    """Which free bodies belong together; n bodies, c candidates, d axes."""
+
+    size: Indices  # (SIZES,)
+    label: Indices  # (n,): lowest free body of the island
+    first: Indices  # (n,): first entry of the list of unmoved bodies of the island, -1: none
+    following: Indices  # (c,): next entry of that list
+    unmoved: Indices  # (c,): body of an entry
+    member: Indices  # (n,): bodies of the island gathered, ascending
+    local: Indices  # (n,): place of a body among them
+    mark: Indices  # (n,): island that a body was listed in last
+    next_free: Indices  # (n,): free body of the same island that follows, -1 after the last
+    last: Indices  # (n,): last one so far
+    limit: Array  # (n, 2 d): lower and upper bounds of the centres within the step [m]
+    pose: Array  # (n, P): at the end of the step
+    twist: Array  # (n, V)
+
+
+def allocate_islands(dimension: int, bodies: int, candidates: int) -> Islands:
+    """Return room for the islands of ``bodies`` bodies."""
+    n, p, v = bodies, 3 if dimension == 2 else 7, 3 * (dimension - 1)
+    whole = [np.zeros(n, np.int64) for _ in range(7)]
+    return Islands(
+        size=np.zeros(SIZES, np.int64),
+        label=whole[0],
+        first=whole[1],
+        following=np.zeros(candidates, np.int64),
+        unmoved=np.zeros(candidates, np.int64),
+        member=whole[2],
+        local=whole[3],
+        mark=whole[4],
+        next_free=whole[5],
+        last=whole[6],
+        limit=np.zeros((n, 2 * dimension)),
+        pose=np.zeros((n, p)),
+        twist=np.zeros((n, v)),
+    )
+
+
+@inner_kernel
+def root(islands: Islands, i: int) -> int:
+    """Lowest body joined with free body i so far; shortens the way there."""
+    while islands.label[i] != i:
+        islands.label[i] = islands.label[islands.label[i]]
+        i = islands.label[i]
+    return i
+
+
+@inner_kernel
+def join(islands: Islands, i: int, j: int) -> None:
+    """Let free bodies i and j belong together."""
+    i, j = root(islands, i), root(islands, j)
+    islands.label[max(i, j)] = min(i, j)
+
+
+@inner_kernel
+def list_unmoved(islands: Islands, island: int, body: int) -> None:
+    """Let an unmoved body belong to an island as well; it may be listed twice."""
+    entry = islands.size[NODES]
+    islands.unmoved[entry], islands.following[entry] = body, islands.first[island]
+    islands.first[island] = entry
+    islands.size[NODES] = entry + 1
+
+
+@inner_kernel
+def list_members(islands: Islands, island: int) -> int:
+    """Fill `member` with the bodies of an island in ascending order; their number."""
+    count = 0
+    i = island
+    while i >= 0:
+        islands.member[count] = i
+        count += 1
+        i = islands.next_free[i]
+    entry = islands.first[island]
+    while entry >= 0:
+        body = islands.unmoved[entry]
+        if islands.mark[body] != island:
+            islands.mark[body] = island
+            k = count
+            while k > 0 and islands.member[k - 1] > body:
+                islands.member[k] = islands.member[k - 1]
+                k -= 1
+            islands.member[k] = body
+            count += 1
+        entry = islands.following[entry]
+    for k in range(count):
+        islands.local[islands.member[k]] = k
+    islands.size[MEMBERS] = count
+    return count

@@ -1,0 +1,555 @@
+"""A phase of lasting contact: one Dormand-Prince step with modes held, cut where the first of them ends."""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.model import Array
+from reference_solver.stepping.equalities import (
+    CONTRADICTORY,
+    assemble,
+    force_contacts,
+    list_rows,
+    push,
+    row_value,
+    solve_rows,
+)
+from reference_solver.stepping.lasting import (
+    BETWEEN,
+    BODIES,
+    CONTACTS,
+    FAR,
+    FEATURE,
+    GRIP,
+    LAST,
+    LOAD,
+    MONITORS,
+    NEAR,
+    ONWARD,
+    OPEN,
+    SLIP,
+    STAGES,
+    START,
+    STICK,
+    TANGENTS,
+    VELOCITIES,
+    Lasting,
+)
+from reference_solver.stepping.modes import decide, friction_size, inverse_mass, set_slip
+from reference_solver.stepping.noise import FORCE_NOISE, NOISE
+from reference_solver.stepping.operations import (
+    Bodies,
+    displace,
+    displacement_curvature,
+    displacement_rate,
+    evaluate,
+    feature_limit,
+    free_accelerations,
+    is_free,
+)
+
+# Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
+#: Times of the stages, as shares of the step.
+NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+#: Row by row: weights of the slopes of earlier stages; the last row is the step itself.
+COUPLINGS = (
+    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
+    (44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+#: Fifth order less embedded fourth order.
+ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+
+#: Largest difference of both orders, as a share of what the bodies move in the step: it is 50 to 1000 times the error
+#: that is made, which is 1e-11 of a motion then.
+ERROR = 1e-8
+#: Share of the length that the error would allow which is taken.
+SAFETY = 0.8
+#: Attempts to find a length whose error is small enough, and a step without a second change of modes inside.
+LENGTHS = 24
+#: Steps in search of the end of a mode.
+SEARCHES = 40
+#: A monitor this small, as a share of what it is measured against, is at its end.
+LOCATED = 1e-13
+#: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
+SURELY = 1e-6
+#: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
+TURNED = 0.5
+#: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
+BEARABLE = 0.4
+#: Relative accuracy of that instant.
+SAME_TIME = 1e-15
+#: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
+SHORTEST = 1e-9
+
+#: What a phase was: over all of its length; cut where a mode ended; cut because its error demanded it; not possible.
+WHOLE, ENDED, SHORTENED, FAILED = 0, 1, 2, 3
+
+
+@inner_kernel
+def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
+    """Accelerations at the present state under the modes held."""
+    evaluate(bodies, lasting)
+    free_accelerations(bodies, lasting)
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
+            follow_slip(lasting, k)
+    if force_contacts(lasting) == CONTRADICTORY:
+        return False
+    steadied = False
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
+            steadied = steady_slip(lasting, k) or steadied
+    return not steadied or force_contacts(lasting) != CONTRADICTORY
+
+
+@inner_kernel
+def follow_slip(lasting: Lasting, k: int) -> None:
+    """Direction of a slip that may turn; the last known of one that has all but ended, or turns round.
+
+    A slip that comes to its end does not pass zero, but under friction along its last direction it does: what is along
+    that changes sign at the end, as in the plane.
+    """
+    speed, onward = 0.0, 0.0
+    for t in range(lasting.size[TANGENTS]):
+        speed += lasting.speed[k, 1 + t] ** 2
+        onward += lasting.speed[k, 1 + t] * lasting.direction[k, t]
+    speed = math.sqrt(speed)
+    if speed > NOISE * lasting.speeds[k] and onward > TURNED * speed:
+        for t in range(lasting.size[TANGENTS]):
+            lasting.direction[k, t] = lasting.speed[k, 1 + t] / speed
+
+
+@inner_kernel
+def steady_slip(lasting: Lasting, k: int) -> bool:
+    """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
+
+    With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
+    f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
+    which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
+    slip does not turn, and off by no more than it turns in that moment.
+    """
+    speed, push, force, along = 0.0, 0.0, 0.0, 0.0
+    for t in range(lasting.size[TANGENTS]):
+        friction = 0.0
+        for other in range(lasting.size[TANGENTS]):
+            for side in range(2):
+                for d in range(lasting.size[VELOCITIES]):
+                    share = lasting.jacobian[k, side, 1 + t, d] * lasting.response[k, side, 1 + other, d]
+                    friction -= share * lasting.force[k, 1 + other]
+        gain = row_value(lasting, k, 1 + t, lasting.acceleration) + lasting.gamma[k, 1 + t]
+        lasting.wanted[t] = gain + friction
+        speed += lasting.speed[k, 1 + t] ** 2
+        push += lasting.wanted[t] ** 2
+        force += friction**2
+        along += lasting.wanted[t] * lasting.speed[k, 1 + t]
+    speed, push, force = math.sqrt(speed), math.sqrt(push), math.sqrt(force)
+    if force == 0.0 or speed >= BEARABLE * lasting.length[0] * force or push < TURNED * force:
+        return False
+    if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
+        return False
+    size = 0.0
+    for t in range(lasting.size[TANGENTS]):
+        moment = BEARABLE * lasting.length[0] - speed / force
+        lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
+        size += lasting.wanted[t] ** 2
+    for t in range(lasting.size[TANGENTS]):
+        lasting.direction[k, t] = lasting.wanted[t] / math.sqrt(size)
+    return True
+
+
+@inner_kernel
+def begin_phase(bodies: Bodies, lasting: Lasting) -> None:
+    """Keep the state that the phase begins with."""
+    for i in range(lasting.size[BODIES]):
+        for d in range(lasting.base.shape[1]):
+            lasting.base[i, d] = bodies.pose[i, d]
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.before[i, d] = bodies.twist[i, d]
+            lasting.displacement[i, d] = 0.0
+
+
+@inner_kernel
+def go_back(bodies: Bodies, lasting: Lasting) -> None:
+    """Return to the start of the phase."""
+    for i in range(lasting.size[BODIES]):
+        for d in range(lasting.size[VELOCITIES]):
+            bodies.twist[i, d] = lasting.before[i, d]
+            lasting.displacement[i, d] = 0.0
+        for d in range(lasting.base.shape[1]):
+            bodies.pose[i, d] = lasting.base[i, d]
+        displace(bodies, lasting, i)
+    for k in range(lasting.size[CONTACTS]):
+        for t in range(lasting.size[TANGENTS]):
+            lasting.direction[k, t] = lasting.begun[k, t]
+
+
+@inner_kernel
+def keep_slopes(bodies: Bodies, lasting: Lasting, stage: int) -> None:
+    """Rates of a stage."""
+    for i in range(lasting.size[BODIES]):
+        displacement_rate(bodies, lasting, i, stage)
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.slope[stage, i, d] = lasting.acceleration[i, d]
+
+
+@inner_kernel
+def bend_paths(bodies: Bodies, lasting: Lasting, end: int) -> None:
+    """Second derivatives of the displacements at one end of the phase."""
+    for i in range(lasting.size[BODIES]):
+        displacement_curvature(bodies, lasting, i, end)
+
+
+@inner_kernel
+def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
+    """Stage 0: forces and monitors at the start of the phase under the modes held."""
+    for k in range(lasting.size[CONTACTS]):
+        for t in range(lasting.size[TANGENTS]):
+            lasting.begun[k, t] = lasting.direction[k, t]
+    go_back(bodies, lasting)
+    if not evaluate_forces(bodies, lasting):
+        return False
+    keep_slopes(bodies, lasting, 0)
+    bend_paths(bodies, lasting, 0)
+    watch(bodies, lasting, START)
+    return True
+
+
+@inner_kernel
+def go_to_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> None:
+    """Put all bodies where a stage of the step has them."""
+    for i in range(lasting.size[BODIES]):
+        moves = False
+        for d in range(lasting.size[VELOCITIES]):
+            way, gain = 0.0, 0.0
+            for s in range(stage):
+                way += COUPLINGS[stage][s] * lasting.rate[s, i, d]
+                gain += COUPLINGS[stage][s] * lasting.slope[s, i, d]
+            lasting.displacement[i, d] = length * way
+            bodies.twist[i, d] = lasting.before[i, d] + length * gain
+            moves = moves or way != 0.0
+        if moves:
+            displace(bodies, lasting, i)
+
+
+@inner_kernel
+def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
+    """One step of ``length`` from the start of the phase, cleaned up; its error over `ERROR`, < 0 where rows fail.
+
+    Leaves the end state in bodies, its monitors in place LAST, and in `Lasting.early` whether a stage in between found
+    one below zero.
+    """
+    for k in range(lasting.size[CONTACTS]):
+        for d in range(lasting.impulse.shape[1]):
+            lasting.impulse[k, d] = 0.0
+        for d in range(lasting.moment.shape[1]):
+            lasting.moment[k, d] = 0.0
+        lasting.work[k, 0] = lasting.work[k, 1] = 0.0
+    lasting.length[0] = length
+    weigh_stage(bodies, lasting, 0, length)
+    keep_slopes(bodies, lasting, 0)
+    lasting.early[0] = 1.0
+    for stage in range(1, STAGES):
+        go_to_stage(bodies, lasting, stage, length)
+        if not evaluate_forces(bodies, lasting):
+            return -1.0
+        keep_slopes(bodies, lasting, stage)
+        if stage < STAGES - 1:
+            weigh_stage(bodies, lasting, stage, length)
+            watch(bodies, lasting, BETWEEN)
+            if lowest(lasting, BETWEEN) < -SURELY:
+                lasting.early[0] = min(lasting.early[0], NODES[stage])
+    error = relative_error(lasting, length)
+    if not clean_up(bodies, lasting):
+        return -1.0
+    if not evaluate_forces(bodies, lasting):
+        return -1.0
+    keep_slopes(bodies, lasting, STAGES - 1)
+    bend_paths(bodies, lasting, 1)
+    watch(bodies, lasting, LAST)
+    return error
+
+
+@inner_kernel
+def weigh_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> None:
+    """Add the share of a stage to the impulses and the work of all contacts."""
+    if stage == 0:
+        go_back(bodies, lasting)
+        evaluate_forces(bodies, lasting)
+    weight = length * COUPLINGS[STAGES - 1][stage]
+    for k in range(lasting.size[CONTACTS]):
+        for row in range(1 + lasting.size[TANGENTS]):
+            give(bodies, lasting, k, row, weight * lasting.force[k, row])
+
+
+@inner_kernel
+def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> None:
+    """Enter an impulse along a row of contact k: in world axes, its work, and that of surfaces that are moved."""
+    if size == 0.0:
+        return
+    for d in range(lasting.impulse.shape[1]):
+        lasting.impulse[k, d] += size * lasting.frame[k, row, d]
+    axes, b = lasting.impulse.shape[1], lasting.body[k, 1]
+    for d in range(lasting.moment.shape[1]):
+        # The row's lever about the centre of B, and the centre's about the origin.
+        first, second = ((d + 1) % 3, (d + 2) % 3) if axes == 3 else (0, 1)
+        lever = bodies.pose[b, first] * lasting.frame[k, row, second]
+        lever -= bodies.pose[b, second] * lasting.frame[k, row, first]
+        lasting.moment[k, d] += size * (lever + lasting.jacobian[k, 1, row, axes + d])
+    lasting.work[k, 0] += size * lasting.speed[k, row]
+    for side in range(2):
+        i = lasting.body[k, side]
+        if not is_free(bodies, i):
+            for d in range(lasting.size[VELOCITIES]):
+                lasting.work[k, 1] -= size * lasting.jacobian[k, side, row, d] * bodies.twist[i, d]
+
+
+@inner_kernel
+def relative_error(lasting: Lasting, length: float) -> float:
+    """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`."""
+    worst = 0.0
+    for part in range(2):
+        split = lasting.impulse.shape[1]
+        first, last = (0, split) if part == 0 else (split, lasting.size[VELOCITIES])
+        moved, missed = 0.0, 0.0
+        for i in range(lasting.size[BODIES]):
+            for d in range(first, last):
+                way, gain = 0.0, 0.0
+                for s in range(STAGES):
+                    way += ERRORS[s] * lasting.rate[s, i, d]
+                    gain += ERRORS[s] * lasting.slope[s, i, d]
+                    moved = max(moved, abs(lasting.rate[s, i, d]))
+                missed = max(missed, abs(way), length * abs(gain))
+        if moved > 0.0:
+            worst = max(worst, missed / (ERROR * moved))
+    return worst
+
+
+@inner_kernel
+def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
+    """Close the gaps of pressed contacts, and take out what velocities miss of their rows; both by M^-1 G^T."""
+    evaluate(bodies, lasting)
+    for _ in range(2):
+        if not project(bodies, lasting, True):
+            return False
+        evaluate(bodies, lasting)
+    return project(bodies, lasting, False)
+
+
+@inner_kernel
+def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
+    """Project poses on closed gaps, or velocities on the rows that are held (an orthogonal projection)."""
+    kept = list_rows(lasting)
+    count = 0
+    for i in range(kept):
+        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
+        if poses and row > 0:
+            continue
+        lasting.unknown[count, 0], lasting.unknown[count, 1] = k, row
+        lasting.right[count] = -lasting.gap[k] if poses else -lasting.speed[k, row]
+        count += 1
+    if count == 0:
+        return True
+    assemble(lasting, count, False)
+    solve_rows(lasting, count, 0.0)
+    for i in range(lasting.size[BODIES]):
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.acceleration[i, d] = 0.0
+    for i in range(count):
+        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
+        push(lasting, lasting.acceleration, k, row, lasting.answer[i])
+        if not poses:
+            give(bodies, lasting, k, row, lasting.answer[i])
+    for i in range(lasting.size[BODIES]):
+        if not is_free(bodies, i):
+            continue
+        for d in range(lasting.size[VELOCITIES]):
+            if poses:
+                lasting.spin[d], bodies.twist[i, d] = bodies.twist[i, d], lasting.acceleration[i, d]
+            else:
+                bodies.twist[i, d] += lasting.acceleration[i, d]
+        if poses:
+            displacement_rate(bodies, lasting, i, STAGES - 1)
+            for d in range(lasting.size[VELOCITIES]):
+                lasting.displacement[i, d] += lasting.rate[STAGES - 1, i, d]
+                bodies.twist[i, d] = lasting.spin[d]
+            displace(bodies, lasting, i)
+    return True
+
+
+@inner_kernel
+def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
+    """Monitors of the evaluated state: none may fall below zero while modes are what they are."""
+    for k in range(lasting.size[CONTACTS]):
+        monitor = lasting.monitor[place, k]
+        for m in range(MONITORS):
+            monitor[m] = math.inf
+        if lasting.mode[k] == OPEN:
+            continue
+        share = inverse_mass(lasting, k, 0) / lasting.scale[k] if lasting.scale[k] > 0.0 else 0.0
+        monitor[LOAD] = lasting.force[k, 0] * share
+        if lasting.mode[k] == STICK:
+            monitor[GRIP] = (lasting.friction[k] * lasting.force[k, 0] - friction_size(lasting, k)) * share
+        elif lasting.friction[k] > 0.0:
+            along = 0.0
+            for t in range(lasting.size[TANGENTS]):
+                along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
+            monitor[ONWARD] = along / lasting.speeds[k]
+        monitor[FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+
+
+@inner_kernel
+def lowest(lasting: Lasting, place: int) -> float:
+    """Least monitor of those that were above zero at the start."""
+    least = math.inf
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            if lasting.monitor[START, k, m] > FORCE_NOISE:
+                least = min(least, lasting.monitor[place, k, m])
+    return least
+
+
+@inner_kernel
+def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
+    """Change the mode whose monitor was zero at the start and has fallen most; False if there is none."""
+    worst, which, what = -FORCE_NOISE, -1, LOAD
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
+                worst, which, what = lasting.monitor[LAST, k, m], k, m
+    if which < 0:
+        return False
+    if what == LOAD or what == FEATURE:
+        lasting.mode[which] = OPEN
+    elif what == ONWARD:
+        lasting.mode[which], lasting.slides[which] = STICK, 0
+    else:
+        go_back(bodies, lasting)
+        evaluate_forces(bodies, lasting)
+        set_slip(lasting, which)
+    return True
+
+
+@inner_kernel
+def predict(lasting: Lasting, near: float, far: float) -> float:
+    """First zero of the monitors that are below zero at the far end, along their chords."""
+    first = far
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            before, after = lasting.monitor[NEAR, k, m], lasting.monitor[FAR, k, m]
+            if lasting.monitor[START, k, m] > FORCE_NOISE and after < 0.0:
+                first = min(first, near + (far - near) * max(before, 0.0) / (max(before, 0.0) - after))
+    return first
+
+
+@inner_kernel
+def keep_monitors(lasting: Lasting, source: int, target: int) -> None:
+    """Copy all monitors."""
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            lasting.monitor[target, k, m] = lasting.monitor[source, k, m]
+
+
+@inner_kernel
+def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
+    """Length of the step at whose end the first monitor is zero, below which it is not; < 0 where rows fail.
+
+    `step_phase` of ``length`` has found one below zero. Chords between brackets (regula falsi, the kept end's value
+    halved where it is kept twice, as in the Illinois method), each evaluated by a step of its own.
+    """
+    near, far = 0.0, length
+    keep_monitors(lasting, START, NEAR)
+    keep_monitors(lasting, LAST, FAR)
+    kept = 0
+    for _ in range(SEARCHES):
+        guess = predict(lasting, near, far)
+        if not (near < guess < far):
+            guess = 0.5 * (near + far)
+        if far - near <= SAME_TIME * far or guess <= near or guess >= far:
+            break
+        if step_phase(bodies, lasting, guess) < 0.0:
+            return -1.0
+        value = lowest(lasting, LAST)
+        if abs(value) <= LOCATED:
+            return guess
+        if value < 0.0:
+            keep_monitors(lasting, LAST, FAR)
+            far = guess
+            kept = kept + 1 if kept > 0 else 1
+            if kept > 1:
+                soften(lasting, NEAR)
+        else:
+            keep_monitors(lasting, LAST, NEAR)
+            near = guess
+            kept = kept - 1 if kept < 0 else -1
+            if kept < -1:
+                soften(lasting, FAR)
+    if step_phase(bodies, lasting, far) < 0.0:
+        return -1.0
+    return far
+
+
+@inner_kernel
+def soften(lasting: Lasting, place: int) -> None:
+    """Halve what is kept of one end of a bracket."""
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            lasting.monitor[place, k, m] *= 0.5
+
+
+@inner_kernel
+def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, int]:
+    """Go from the present state to the end of a phase of lasting contact, within ``left``; its length and what it was.
+
+    Contacts have been noted (`hold`). Bodies are at the end of the phase afterwards, or where they were if it FAILED.
+    """
+    begin_phase(bodies, lasting)
+    evaluate(bodies, lasting)
+    free_accelerations(bodies, lasting)
+    if not decide(lasting) or not start_slopes(bodies, lasting):
+        go_back(bodies, lasting)
+        return 0.0, FAILED
+    length, outcome = left, WHOLE
+    for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
+        error = step_phase(bodies, lasting, length)
+        if error < 0.0:
+            length, outcome = 0.25 * length, SHORTENED
+        elif error > 1.0:
+            parts = math.ceil(max(error, 1.0) ** 0.2 / SAFETY)
+            length, outcome = length / max(parts, 2), SHORTENED
+        elif switch_at_once(bodies, lasting):
+            if not start_slopes(bodies, lasting):
+                break
+            continue
+        elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
+            length, outcome = lasting.early[0] * length, SHORTENED
+        elif lowest(lasting, LAST) < -LOCATED:
+            end = find_end(bodies, lasting, length)
+            if end > 0.0:
+                return end, ENDED
+            break
+        else:
+            return length, outcome
+        if length < SHORTEST * left:
+            break
+    go_back(bodies, lasting)
+    return 0.0, FAILED
+
+
+@inner_kernel
+def write_path(lasting: Lasting, i: int, length: float, coefficient: Array) -> None:
+    """Coefficients (V, 6) of the quintic with place, rate and second derivative of body i at both ends."""
+    for d in range(lasting.size[VELOCITIES]):
+        rate, bend = lasting.rate[0, i, d], lasting.bend[0, i, d]
+        way = lasting.displacement[i, d] - length * (rate + 0.5 * length * bend)
+        gain = length * (lasting.rate[STAGES - 1, i, d] - rate - length * bend)
+        turn = length * length * (lasting.bend[1, i, d] - bend)
+        coefficient[d, 0], coefficient[d, 1], coefficient[d, 2] = 0.0, rate, 0.5 * bend
+        coefficient[d, 3] = (10.0 * way - 4.0 * gain + 0.5 * turn) / length**3
+        coefficient[d, 4] = (-15.0 * way + 7.0 * gain - turn) / length**4
+        coefficient[d, 5] = (6.0 * way - 3.0 * gain + 0.5 * turn) / length**5

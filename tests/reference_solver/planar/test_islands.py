@@ -1,0 +1,79 @@
+"""Bodies that cannot meet within a step are stepped apart: what happens elsewhere changes nothing, to the last bit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+
+DOWN = (0.0, -9.81)
+DT = 1.0 / 60.0
+
+
+def world(bodies, restitution=0.4, friction=0.3):
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    return Simulation(Model(2, [floor, *bodies], DOWN, restitution, friction), Settings.reference(DT))
+
+
+def disc(x, y, vx=0.0, vy=0.0, radius=0.3, mass=1.0):
+    return Body(Disc(radius), mass, 0.5 * mass * radius**2, (x, y, 0.0), (vx, vy, 0.0))
+
+
+def tipping(x):
+    """A box that leans on its corner and falls over."""
+    half, lean = (0.2, 0.5), 0.3
+    height = half[0] * math.sin(lean) + half[1] * math.cos(lean)
+    return Body(Box(half), 1.0, 0.29 / 3.0, (x, height, lean))
+
+
+def test_a_ball_that_bounces_far_away_changes_nothing_here():
+    alone = world([tipping(0.0), disc(-2.0, 0.3, 1.5)])
+    beside = world([tipping(0.0), disc(-2.0, 0.3, 1.5), disc(1000.0, 1.0, 0.0, -3.0)])
+    for _ in range(6):
+        alone.advance(10)
+        beside.advance(10)
+        assert np.array_equal(alone.pose, beside.pose[:3])
+        assert np.array_equal(alone.twist, beside.twist[:3])
+    assert beside.certificate["events"] > alone.certificate["events"] > 0
+
+
+def test_contacts_of_all_islands_carry_all_weights():
+    simulation = world([disc(float(x), 0.3, mass=1.0 + x) for x in range(6)], restitution=0.0)
+    simulation.advance(2)
+    contacts = simulation.contacts()
+    assert contacts.body_a.tolist() == [0] * 6
+    assert contacts.body_b.tolist() == [1, 2, 3, 4, 5, 6]
+    weights = 9.81 * DT * np.arange(1.0, 7.0)
+    assert contacts.impulse[:, 1] == pytest.approx(weights, rel=1e-13)
+
+
+def test_a_light_ball_struck_out_of_its_bounds_meets_what_it_meets():
+    """A heavy disc sends a light one off at three times its speed, into one that nothing had come near (e = 1)."""
+    speed, gap, far = 3.0, 0.01, 0.09
+    start = 0.6 + gap
+    heavy, light = disc(0.0, 10.0, speed, mass=1e12), disc(start, 10.0, mass=1.0)
+    wall = Body(HalfSpace((-1.0, 0.0), -(start + 0.3 + far)), motion="fixed")
+    bodies = [wall, heavy, light]
+    simulation = Simulation(Model(2, bodies, (0.0, 0.0), 1.0, 0.0), Settings.reference(DT))
+    simulation.advance(1)
+    place, velocity, heavy_at, left = start, 0.0, 0.0, DT
+    while True:  # between a wall and a disc that nothing stops
+        to_heavy = (place - heavy_at - 0.6) / (speed - velocity) if velocity < speed else math.inf
+        to_wall = (start + far - place) / velocity if velocity > 0.0 else math.inf
+        time = min(to_heavy, to_wall, left)
+        place, heavy_at, left = place + time * velocity, heavy_at + time * speed, left - time
+        if left <= 0.0:
+            break
+        velocity = 2.0 * speed - velocity if to_heavy < to_wall else -velocity
+    assert simulation.pose[2, 0] == pytest.approx(place, abs=1e-9)  # the heavy one loses 1e-11 of its speed
+    assert simulation.twist[2, 0] == pytest.approx(velocity, abs=1e-9)
+
+
+def test_moving_floors_are_where_their_velocity_takes_them_for_all_islands():
+    floor = Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(0.0, 0.5, 0.0))
+    bodies = [floor, disc(0.0, 0.3, 0.0, 0.5), disc(5.0, 2.0), disc(9.0, 0.3, 0.0, 0.5)]
+    simulation = Simulation(Model(2, bodies, DOWN, 0.0, 0.3), Settings.reference(DT))
+    simulation.advance(60)
+    assert simulation.pose[0, 1] == pytest.approx(0.5, abs=1e-14)
+    assert simulation.pose[1:, 1] == pytest.approx([0.8, 0.8, 0.8], abs=1e-12)
