@@ -23,8 +23,9 @@ Indices = NDArray[np.int64]
 
 #: What a piece is: a force phase; an impact; rebounds that were held, and get their speed now (E22).
 FORCES, IMPACT, RELEASE = 0, 1, 2
-#: By which scheme: constant acceleration (E19), fifth order, one impulse-level solve, the fixed-step law (E5 to E17).
-FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED = 0, 1, 2, 3
+#: By which scheme: constant acceleration (E19), fifth order, one impulse-level solve, the fixed-step law (E5 to E17),
+#: until two bodies that rock rest on each other, by constant acceleration or where rows turn at impulse level (E22).
+FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING = 0, 1, 2, 3, 4
 
 #: Entries of `Journal.used`.
 PIECES, BODIES, CONTACTS, STEPS = 0, 1, 2, 3

@@ -85,4 +85,6 @@ RELEASE = 28
 SLIP = 29
 #: e.
 RESTITUTION = 30
-ROW_REALS = 31
+#: Normal and levers at the start of a sub-step at impulse level, or those of its mid-drift: six columns (E28).
+OTHER = 31
+ROW_REALS = 37

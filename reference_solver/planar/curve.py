@@ -33,7 +33,7 @@ from reference_solver.planar.slide import FAR, go_back, keep
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Pairs, Rows, SubStep
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping import phase
-from reference_solver.stepping.clock import LEFT, OUTCOME
+from reference_solver.stepping.clock import LEFT, OUTCOME, ROCKING
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import OPEN, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
@@ -44,6 +44,8 @@ from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 REPEATS = 6
 #: Relative change of its length that ends them: a few units in the last place.
 SAME_LENGTH = 1e-15
+#: How far beyond its end the path of a phase is followed, in multiples of its length: a quintic tells nothing of more.
+AHEAD = 1.5
 
 
 @inner_kernel
@@ -73,11 +75,11 @@ def turns(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
     if note_contacts(bodies, rows, lasting):
         evaluate(bodies, lasting)
         keep_rows(lasting)
-        for part in range(1, 3):
+        for part in range(2 if sub.clock[ROCKING] > 0.0 else 1, 3):  # what rocks to rest ends as it began
             for i in range(len(bodies.kind)):
                 place(bodies, sub, i, 0.5 * part * length)
             evaluate(bodies, lasting)
-            found = found or rows_changed(lasting)
+            found = found or rows_changed(bodies, lasting)
         for i in range(len(bodies.kind)):
             put_back(bodies, sub, i)
     copy_vectors(sub.after, bodies.twist)
@@ -95,14 +97,17 @@ def keep_rows(lasting: Lasting) -> None:
 
 
 @inner_kernel
-def rows_changed(lasting: Lasting) -> bool:
-    """Whether any entry that a body feels differs from the one kept by more than a share of its lever, or of one."""
+def rows_changed(bodies: Bodies, lasting: Lasting) -> bool:
+    """Whether any entry that matters differs from the one kept by more than a share of its lever, or of one.
+
+    One of a body that neither answers to it nor moves along it does not.
+    """
     for k in range(lasting.size[HELD_CONTACTS]):
         for side in range(2):
             lever = max(abs(lasting.trial[k, side, 0, 2]), abs(lasting.trial[k, side, 1, 2]))
             for row in range(2):
                 for d in range(3):
-                    if lasting.response[k, side, row, d] == 0.0 and lasting.response[k, 1 - side, row, d] == 0.0:
+                    if lasting.response[k, side, row, d] == 0.0 and bodies.twist[lasting.body[k, side], d] == 0.0:
                         continue
                     change = abs(lasting.jacobian[k, side, row, d] - lasting.trial[k, side, row, d])
                     if change > FROZEN * (1.0 if d < 2 else lever):
@@ -158,15 +163,17 @@ def follow_curve(
     bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options: Options, length: float, end: float
 ) -> float:
     """Go to the end of the phase, or to an impact in it: then the phase is made again until it ends there."""
-    if end < length:
-        for _ in range(REPEATS):
-            phase.go_back(bodies, sub.lasting)
-            phase.step_phase(bodies, sub.lasting, end)
-            end_curve(bodies, sub, end)
-            again = next_impact(bodies, pairs, rows, sub, options, length)
-            if again >= length or abs(again - end) <= SAME_LENGTH * end or again <= 0.0:
-                break
-            end = again
+    for repeat in range(REPEATS if end < length else 0):
+        known = min(length, AHEAD * end)
+        phase.go_back(bodies, sub.lasting)
+        phase.step_phase(bodies, sub.lasting, end)
+        end_curve(bodies, sub, end)
+        if repeat == REPEATS - 1:
+            break
+        again = next_impact(bodies, pairs, rows, sub, options, known)
+        if again >= known or abs(again - end) <= SAME_LENGTH * end or again <= 0.0:
+            break
+        end = again
     copy_vectors(sub.final, bodies.pose)
     copy_vectors(sub.after, bodies.twist)
     for i in range(len(bodies.kind)):

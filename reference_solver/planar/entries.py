@@ -15,12 +15,15 @@ from reference_solver.pieces import (
     IMPACT,
     IMPULSE_LEVEL,
     RELEASE,
+    ROCKING,
     Journal,
 )
 from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
+from reference_solver.planar.midpoint import exchange_levers
 from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
 from reference_solver.planar.state import Bodies, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.clock import HELD, LEFT, UNTIL_REST
+from reference_solver.stepping.clock import ROCKING as COMES_TO_REST
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.options import Options
@@ -64,10 +67,16 @@ def enter_moments(journal: Journal, lasting: Lasting, first: int) -> None:
 
 
 @inner_kernel
+def impulse_scheme(sub: SubStep) -> int:
+    """By what rule the impulse-level scheme was taken: for what is left, or until bodies that rock rest (E22)."""
+    return ROCKING if sub.clock[HELD] == UNTIL_REST or sub.clock[COMES_TO_REST] > 0.0 else IMPULSE_LEVEL
+
+
+@inner_kernel
 def enter_settled(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> None:
     """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
     if is_kept(sub.journal):
-        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
+        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, impulse_scheme(sub))
         enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
         enter_contact_rows(sub.journal, bodies, sub.journal.pose, rows, IMPACT_N, IMPACT_T)
 
@@ -93,9 +102,15 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
     if differ(sub.before, sub.start):
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
         enter_numbered(journal, bodies, sub.pose, sub.start)
+        if sub.clock[HELD] > 0.0:
+            exchange_levers(rows)  # those of the start
         enter_contact_rows(journal, bodies, sub.pose, rows, IMPACT_N, IMPACT_T)
+        if sub.clock[HELD] > 0.0:
+            exchange_levers(rows)
     keep_state(journal, sub.pose, sub.start)
-    scheme = IMPULSE_LEVEL if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    scheme = FIFTH_ORDER if curved else FROZEN
+    if sub.clock[HELD] > 0.0 or sub.clock[COMES_TO_REST] > 0.0:
+        scheme = impulse_scheme(sub)
     open_piece(journal, begin, length, FORCES, scheme)
     enter_numbered(journal, bodies, bodies.pose, bodies.twist)
     first = journal.used[CONTACTS]

@@ -26,34 +26,39 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import collide_now, end_series, keep_loaded, keep_touching, release
+from reference_solver.planar.impact import collide_now, end_rocking, end_series, keep_loaded, keep_touching, release
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
-from reference_solver.planar.midpoint import close_gaps, keep_change, misses_end, take_back
+from reference_solver.planar.midpoint import close_gaps, keep_change, levers_of_start, misses_end, take_back
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import warm_start
-from reference_solver.planar.slide import cut_work, go_back, keep, press_until_stick
+from reference_solver.planar.slide import cut_work, go_back, keep, press, press_until_stick
 from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.clock import (
     CONFINED,
     ESCAPED,
+    HASTE,
     HELD,
     JAMMED,
     LEFT,
     OUTCOME,
     REBOUND,
+    ROCKING,
+    ROCKS,
     UNSETTLED,
+    UNTIL_REST,
     count_event,
+    end_settling,
     hold_rest,
     open_step,
     weigh_event,
     weigh_jam,
 )
-from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES, STRUCK
 from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
 from reference_solver.stepping.options import BLOCK, MIDPOINT, Options
 from reference_solver.stepping.phase import SHORTENED
@@ -161,10 +166,13 @@ def sub_step(
     begin_flight(bodies, rows, sub, length)
     curved = 0.0
     if sub.clock[HELD] == 0.0 and turns(bodies, rows, sub, length):
-        if sub.clock[JAMMED] == 0.0:
+        if sub.clock[ROCKING] > 0.0:
+            sub.clock[ROCKS] = UNTIL_REST
+        elif sub.clock[JAMMED] == 0.0:
             curved = curve(bodies, rows, sub, tally)
         if curved == 0.0:
-            hold_rest(sub.clock, tally)
+            if sub.clock[ROCKING] == 0.0:
+                hold_rest(sub.clock, tally)
             go_back(tally, sub.tally[0])
             copy_vectors(sub.before, bodies.twist)
             return True
@@ -194,8 +202,9 @@ def sub_step(
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
         enter_release(bodies, rows, sub, options, end)
-    if end < left and not (curved == end and sub.clock[OUTCOME] == SHORTENED):
-        count_event(sub.clock, tally)
+    haste = end < SHORT * options.dt
+    if end < left and (haste or not (curved == end and sub.clock[OUTCOME] == SHORTENED)):
+        count_event(sub.clock, tally, HASTE if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -220,7 +229,7 @@ def settle(
     if not detect(bodies, pairs, rows, options):
         return False
     if not keep_loaded(bodies, pairs, rows):
-        sub.clock[UNSETTLED] = 0.0
+        end_settling(sub.clock)
         return True
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
@@ -239,7 +248,7 @@ def settle(
         enter_contacts(bodies, rows, ledger)
     if close_gaps(bodies, rows, problem, sub, options, tally) or misses:
         enter_settled(bodies, rows, sub, options)
-    sub.clock[UNSETTLED] = 0.0
+    end_settling(sub.clock)
     return True
 
 
@@ -248,16 +257,40 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
     length, found = left, NO_IMPACT
+    sub.clock[ROCKING] = 0.0
     keep(tally, sub.tally[0])
     for k in range(SERIES_PASSES):
         if k > 0:
             go_back(tally, sub.tally[0])
+            if sub.clock[HELD] > 0.0:
+                levers_of_start(bodies, rows, options)
         found = collide_now(bodies, rows, problem, sub, options, tally)
         length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
         if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
             break
+    if sub.clock[HELD] == 0.0 and (found == LANDED or found == STRUCK):
+        length = rest(bodies, rows, problem, sub, options, tally, length)
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
+    return length
+
+
+@spliced_kernel
+def rest(
+    bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array, length: float
+) -> float:
+    """Hold contacts of bodies that rock to rest (E22), until they do; length of the sub-step."""
+    left = sub.clock[LEFT]
+    longest, shortest = end_rocking(bodies, rows, sub, length)
+    if shortest < left:
+        weigh_event(sub.clock, REBOUND)
+    if longest == 0.0:
+        return length
+    go_back(tally, sub.tally[1])
+    sub.clock[HELD] = sub.clock[ROCKS]  # if rows turn the impulse-level scheme does it
+    sub.clock[ROCKS], sub.clock[ROCKING] = 0.0, 1.0
+    length = min(max(longest, SHORT * options.dt), left)
+    press(bodies, rows, problem, sub, options, tally, length)
     return length
 
 

@@ -31,6 +31,7 @@ from reference_solver.planar.columns import (
     NORMAL_MASS,
     NX,
     NY,
+    OTHER,
     PN,
     PT,
     REACH,
@@ -64,8 +65,12 @@ LEVERAGE = 100.0
 
 @inner_kernel
 def turn_rows(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> None:
-    """Give all rows the normals and levers that their features have at mid-drift of ``length``; bodies stay."""
+    """Give all rows the normals and levers that their features have at mid-drift of ``length``; bodies stay.
+
+    Those of the start are kept: `exchange_levers` brings them back.
+    """
     lasting, first = sub.lasting, 0
+    keep_levers(rows)
     keep_start(bodies, sub)
     while first < rows.counts[CONTACTS]:
         count = min(len(lasting.row), rows.counts[CONTACTS] - first)
@@ -79,6 +84,35 @@ def turn_rows(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length
         for i in range(len(bodies.kind)):
             put_back(bodies, sub, i)
         first += count
+    for c in range(rows.counts[CONTACTS]):
+        prepare_masses(bodies, rows, c)
+    if options.solver == BLOCK:
+        prepare_blocks(bodies, rows)
+
+
+@inner_kernel
+def keep_levers(rows: Rows) -> None:
+    """Keep normals and levers of all rows."""
+    for c in range(rows.counts[CONTACTS]):
+        for k in range(2):
+            rows.real[c, OTHER + k] = rows.real[c, NX + k]
+        for k in range(4):
+            rows.real[c, OTHER + 2 + k] = rows.real[c, ARM_A + k]
+
+
+@inner_kernel
+def exchange_levers(rows: Rows) -> None:
+    """Exchange normals and levers of all rows for those kept."""
+    for c in range(rows.counts[CONTACTS]):
+        for k in range(6):
+            own = NX + k if k < 2 else ARM_A + k - 2
+            rows.real[c, own], rows.real[c, OTHER + k] = rows.real[c, OTHER + k], rows.real[c, own]
+
+
+@inner_kernel
+def levers_of_start(bodies: Bodies, rows: Rows, options: Options) -> None:
+    """Bring back what all rows were before `turn_rows`."""
+    exchange_levers(rows)
     for c in range(rows.counts[CONTACTS]):
         prepare_masses(bodies, rows, c)
     if options.solver == BLOCK:
@@ -159,8 +193,9 @@ def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, optio
     solve_velocities(bodies, rows, problem, options, tally)
     farthest = 0.0
     for i in range(len(bodies.kind)):
-        way = abs(bodies.twist[i, 0]) + abs(bodies.twist[i, 1]) + bodies.real[i, REACH] * abs(bodies.twist[i, 2])
-        farthest = max(farthest, way if bodies.kind[i, MOTION] == FREE else 0.0)
+        if bodies.kind[i, MOTION] == FREE:
+            way = abs(bodies.twist[i, 0]) + abs(bodies.twist[i, 1]) + bodies.real[i, REACH] * abs(bodies.twist[i, 2])
+            farthest = max(farthest, way)
     if farthest > LEVERAGE * widest:
         copy_vectors(sub.after, bodies.twist)
         return False

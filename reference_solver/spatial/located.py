@@ -36,7 +36,17 @@ from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
-from reference_solver.stepping.clock import EVENTS, HELD, LEFT, OUTCOME, REBOUND, count_event, open_step, weigh_event
+from reference_solver.stepping.clock import (
+    EVENTS,
+    HASTE,
+    HELD,
+    LEFT,
+    OUTCOME,
+    REBOUND,
+    count_event,
+    open_step,
+    weigh_event,
+)
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
 from reference_solver.stepping.noise import EVENT_BUDGET, NOTHING_LEFT, SHORT
 from reference_solver.stepping.options import Options
@@ -123,8 +133,9 @@ def sub_step(
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
         enter_release(bodies, manifolds, sub, options, end)
-    if end < left and not (smooth == end and sub.clock[OUTCOME] == SHORTENED):
-        count_event(sub.clock, tally)
+    haste = end < SHORT * options.dt
+    if end < left and (haste or not (smooth == end and sub.clock[OUTCOME] == SHORTENED)):
+        count_event(sub.clock, tally, HASTE if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

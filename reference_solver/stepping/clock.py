@@ -8,14 +8,23 @@ from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD
 
 #: Entries of a clock: what is left of the step [s] (0: a new one begins), events located in it, how many of them were
-#: soft, how many soft ones it may have, 1 where what is left of it goes at impulse level (E28), what the last
-#: phase of turning rows was, and the length of a sub-step at impulse level that is yet to be settled [s].
+#: soft, how many soft ones it may have, 1 where what is left of it goes at impulse level (E28; UNTIL_REST: one
+#: sub-step only), what the last phase of turning rows was, and the length of a sub-step at impulse level that is yet to
+#: be settled [s].
 LEFT, EVENTS, SOFT, PATIENCE, HELD, OUTCOME, UNSETTLED = 0, 1, 2, 3, 4, 5, 6
 #: 1 where bodies may not leave their bounds in the step, and 1 where one has.
 CONFINED, ESCAPED = 7, 8
 #: 1 where the island is jammed at the start of its step.
 JAMMED = 9
-CLOCK_SIZE = 10
+#: What the last event counted.
+WEIGHT = 10
+#: 1 in a sub-step at whose end bodies that rock have come to rest on each other (E22), and what HELD shall be in the
+#: next such one.
+ROCKING, ROCKS = 11, 12
+CLOCK_SIZE = 13
+
+#: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
+UNTIL_REST = 0.5
 
 #: Soft events located in a step, and one more per body.
 MOST_SOFT = 16
@@ -23,6 +32,8 @@ MOST_SOFT = 16
 JAM_BODIES, JAM_PATIENCE = 4, 2
 #: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
 REBOUND = 0.25
+#: What a soft event counts that follows within a thousandth of a step: such ones come in crowds.
+HASTE = 4.0
 
 
 @kernel
@@ -34,7 +45,8 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
     """
     clock[LEFT] = dt
     clock[PATIENCE] = MOST_SOFT + bodies
-    clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = 0.0
+    clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
+    clock[ROCKING] = clock[ROCKS] = 0.0
 
 
 @kernel
@@ -48,13 +60,14 @@ def weigh_jam(clock: Array, rows: int, freedoms: int, bodies: int) -> None:
 
 
 @kernel
-def count_event(clock: Array, tally: Array) -> None:
-    """Enter an event, as a soft one until its impact is weighed.
+def count_event(clock: Array, tally: Array, weight: float) -> None:
+    """Enter an event, as a soft one of ``weight`` until its impact is weighed.
 
     Too many soft ones, and the step is held from here; too many of all kinds, and the run ends.
     """
     clock[EVENTS] += 1.0
-    clock[SOFT] += 1.0
+    clock[SOFT] += weight
+    clock[WEIGHT] = weight
     tally[EVENTS_LOCATED] += 1.0
     if clock[HELD] == 0.0 and clock[SOFT] > clock[PATIENCE]:
         hold_rest(clock, tally)
@@ -72,4 +85,13 @@ def hold_rest(clock: Array, tally: Array) -> None:
 @kernel
 def weigh_event(clock: Array, weight: float) -> None:
     """What led here turned out to be a soft rebound, or a hard impact (weight 0)."""
-    clock[SOFT] = max(clock[SOFT] - (1.0 - weight), 0.0)
+    clock[SOFT] = max(clock[SOFT] - max(clock[WEIGHT] - weight, 0.0), 0.0)
+    clock[WEIGHT] = weight
+
+
+@kernel
+def end_settling(clock: Array) -> None:
+    """What the impulse-level scheme left is taken out; rocking that has ended is behind."""
+    clock[UNSETTLED] = 0.0
+    if clock[HELD] == UNTIL_REST:
+        clock[HELD] = 0.0

@@ -68,6 +68,8 @@ ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1
 #: Largest difference of both orders, as a share of what the bodies move in the step: it is 50 to 1000 times the error
 #: that is made, which is 1e-11 of a motion then.
 ERROR = 1e-8
+#: Share of the translations that rotations are measured against at least, and the other way round.
+NEXT_TO_NOTHING = 1e-4
 #: Share of the length that the error would allow which is taken.
 SAFETY = 0.8
 #: Attempts to find a length whose error is small enough, and a step without a second change of modes inside.
@@ -311,23 +313,38 @@ def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> Non
 
 @inner_kernel
 def relative_error(lasting: Lasting, length: float) -> float:
-    """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`."""
+    """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
+
+    What moves next to nothing is measured against `NEXT_TO_NOTHING` of the other, at the size of the largest body.
+    """
+    split, size = lasting.impulse.shape[1], 0.0
+    for k in range(lasting.size[CONTACTS]):
+        size = max(size, lasting.extent[k])
+    missed_way, moved_way = missed_and_moved(lasting, length, 0, split)
+    missed_turn, moved_turn = missed_and_moved(lasting, length, split, lasting.size[VELOCITIES])
+    way = max(moved_way, NEXT_TO_NOTHING * size * moved_turn)
+    turn = max(size * moved_turn, NEXT_TO_NOTHING * moved_way)
     worst = 0.0
-    for part in range(2):
-        split = lasting.impulse.shape[1]
-        first, last = (0, split) if part == 0 else (split, lasting.size[VELOCITIES])
-        moved, missed = 0.0, 0.0
-        for i in range(lasting.size[BODIES]):
-            for d in range(first, last):
-                way, gain = 0.0, 0.0
-                for s in range(STAGES):
-                    way += ERRORS[s] * lasting.rate[s, i, d]
-                    gain += ERRORS[s] * lasting.slope[s, i, d]
-                    moved = max(moved, abs(lasting.rate[s, i, d]))
-                missed = max(missed, abs(way), length * abs(gain))
-        if moved > 0.0:
-            worst = max(worst, missed / (ERROR * moved))
+    if way > 0.0:
+        worst = missed_way / (ERROR * way)
+    if turn > 0.0:
+        worst = max(worst, size * missed_turn / (ERROR * turn))
     return worst
+
+
+@inner_kernel
+def missed_and_moved(lasting: Lasting, length: float, first: int, last: int) -> tuple[float, float]:
+    """Largest difference of both orders, of displacements and gains of velocity, and largest rate, of some entries."""
+    missed, moved = 0.0, 0.0
+    for i in range(lasting.size[BODIES]):
+        for d in range(first, last):
+            way, gain = 0.0, 0.0
+            for s in range(STAGES):
+                way += ERRORS[s] * lasting.rate[s, i, d]
+                gain += ERRORS[s] * lasting.slope[s, i, d]
+                moved = max(moved, abs(lasting.rate[s, i, d]))
+            missed = max(missed, abs(way), length * abs(gain))
+    return missed, moved
 
 
 @inner_kernel

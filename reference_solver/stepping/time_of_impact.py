@@ -41,6 +41,8 @@ UNITS = 4.0 * 2.0**-52
 #: Steps of one advancement; usual are 3 to 10, one per radian of turn, a few dozen for grazing passes. Bodies that take
 #: more are said to meet: the caller goes there, finds no contact, and asks anew.
 STEPS = 2000
+#: Steps of one whose bodies touch and do not part for certain.
+CREEPS = 100
 #: Corners that are off a face by less than this share of its body are on it.
 ON_FACE = 1e-9
 
@@ -326,7 +328,7 @@ def advance(meeting: Any, now: float, until: float) -> float:
     bend = bend_bound(meeting, now, until)
     noise, least = gap_noise(meeting), round_off(meeting)
     floor, left = min(value, 0.0), value > noise
-    for _ in range(STEPS):
+    for k in range(STEPS):
         acceleration = relative_acceleration(meeting, t) - bend
         step = safe_time(meeting, value - floor, acceleration)
         if not left:
@@ -347,6 +349,8 @@ def advance(meeting: Any, now: float, until: float) -> float:
             return later
         left = left or value - floor > noise
         t = later
+        if not left and k == CREEPS:
+            return t
     return t
 
 

@@ -98,9 +98,9 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
         open_step(clock, bodies, DT)
         assert (clock[LEFT], clock[PATIENCE], clock[HELD]) == (DT, MOST_SOFT + bodies, 0.0)
         for _ in range(MOST_SOFT + bodies):
-            count_event(clock, tally)
+            count_event(clock, tally, 1.0)
         assert clock[HELD] == 0.0
-        count_event(clock, tally)
+        count_event(clock, tally, 1.0)
         assert clock[HELD] == 1.0
     assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
 
@@ -118,10 +118,10 @@ def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
     open_step(clock, 1, DT)
     clock[EVENTS] = EVENT_BUDGET - 2
     for _ in range(2):
-        count_event(clock, tally)
+        count_event(clock, tally, 1.0)
         weigh_event(clock, 0.0)
         assert (clock[SOFT], clock[HELD], tally[EXHAUSTED]) == (0.0, 0.0, 0.0)
-    count_event(clock, tally)
+    count_event(clock, tally, 1.0)
     assert tally[EXHAUSTED] == 1.0
     assert any("events" in reason for reason in reasons(tally))
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
+from reference_solver.pieces import ROCKING
 
 #: Classical Runge-Kutta steps in which a turn is integrated: one of .3 rad is off by 1e-11.
 TURN_STEPS = 16
@@ -117,6 +118,9 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
     way = pieces.pose_after[:, : run.d] - pieces.pose_before[:, : run.d]
     defect = np.linalg.norm(way - length[:, None] * mean, axis=1)
     bend = np.where(run.is_frozen[run.owner], 0.0, _bend(run))
+    # What rocks to rest goes anywhere between its speeds of the start and of the end, which comes first.
+    change = np.linalg.norm(last - pieces.twist_before[:, : run.d], axis=1)
+    bend = np.where((pieces.scheme == ROCKING)[run.owner], 0.5 * length * change, bend)
     touched = np.zeros(len(body), bool)
     for row in run.side:
         touched[row[row >= 0]] = True

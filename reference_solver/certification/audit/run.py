@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, RELEASE, Pieces
+from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, RELEASE, ROCKING, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -134,7 +134,7 @@ class Run:
     @cached_property
     def is_impulse_level(self) -> NDArray[np.bool_]:
         """(p,) whether a piece went by the impulse-level scheme, whose rows are those of mid-drift."""
-        return np.asarray(self.pieces.scheme == IMPULSE_LEVEL)
+        return np.isin(self.pieces.scheme, (IMPULSE_LEVEL, ROCKING))
 
     @cached_property
     def is_correction(self) -> NDArray[np.bool_]:
