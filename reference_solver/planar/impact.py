@@ -42,6 +42,7 @@ from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodie
 from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    CREEP,
     LANDED,
     NO_IMPACT,
     OPEN_ENDED,
@@ -150,6 +151,13 @@ def copy_row(rows: Rows, source: int, target: int) -> None:
 
 
 @inner_kernel
+def soft_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
+    """Speed up to which an impact is soft: what loads do in a step, or what closes next to nothing of a body in one."""
+    a, b = rows.integer[c, A], rows.integer[c, B]
+    return load_speed(bodies, rows, c, dt) + CREEP * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) / dt
+
+
+@inner_kernel
 def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float) -> int:
     """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve."""
     found = NO_IMPACT
@@ -165,7 +173,7 @@ def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float
         if rows.integer[c, MEETS] == 0:
             continue
         soft = REBOUNDED if options.restitution and rows.real[c, RESTITUTION] > 0.0 else LANDED
-        found = max(found, soft if -u <= load_speed(bodies, rows, c, options.dt) else STRUCK)
+        found = max(found, soft if -u <= soft_speed(bodies, rows, c, options.dt) else STRUCK)
         rows.integer[c, IMPACT] = 1
         if options.restitution:
             rebound = -rows.real[c, RESTITUTION] * u

@@ -220,11 +220,12 @@ def settle(
     options: Options,
     tally: Array,
 ) -> bool:
-    """Take out what the impulse-level scheme leaves of the velocities and gaps of contacts that it held (E28).
+    """Take out what the impulse-level scheme leaves of the gaps and velocities of contacts that it held (E28).
 
-    Their impulses are found anew with the rows of the end, by a solve that starts from them: what was too much is taken
-    back. Otherwise it would be an impact in the sub-step that follows, which knows nothing of this one. False if an
-    array is too small; called again, it starts anew.
+    Gaps first: velocities are those that the closed contacts allow. Their impulses are found anew with the rows of the
+    end, by a solve that starts from them: what was too much is taken back. Otherwise it would be an impact in the
+    sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
+    anew.
     """
     if not detect(bodies, pairs, rows, options):
         return False
@@ -235,18 +236,25 @@ def settle(
         return False
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
+    keep_state(sub.journal, bodies.pose, bodies.twist)
+    moved = close_gaps(bodies, rows, problem, sub, options, tally)
+    if moved:
+        if not detect(bodies, pairs, rows, options):
+            return False
+        keep_loaded(bodies, pairs, rows)
+        if options.solver == BLOCK:
+            prepare_blocks(bodies, rows)
     time = sub.clock[UNSETTLED]
     misses = misses_end(bodies, rows, options, time)
-    keep_state(sub.journal, bodies.pose, bodies.twist)
     if misses:
-        take_back(bodies, rows, options)
+        take_back(bodies, rows, options, tally)
         open_solve(bodies, 0.0, tally)
         warm_start(bodies, rows, options)
         solve_velocities(bodies, rows, problem, options, tally)
         certify(bodies, rows, options, tally)
         keep_change(rows, time)
         enter_contacts(bodies, rows, ledger)
-    if close_gaps(bodies, rows, problem, sub, options, tally) or misses:
+    if moved or misses:
         enter_settled(bodies, rows, sub, options)
     end_settling(sub.clock)
     return True

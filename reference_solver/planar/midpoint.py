@@ -15,12 +15,12 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
+from reference_solver.planar.certificate import row_work
 from reference_solver.planar.columns import (
     APPROACH,
     ARM_A,
     ARM_B,
     COS,
-    EXTENT,
     FORCE_N,
     FORCE_T,
     FRICTION,
@@ -52,13 +52,15 @@ from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.tally import CONTACT_WORK, SURFACE_WORK
 
 #: Gaps above this share of what touches are closed: what is left is well inside.
 GAP_SHARE = 0.25
 #: Impulses of a solve for displacements start from this multiple of what its widest gap alone would take.
 FAR_ABOVE = 1e3
-#: Largest gap, as a share of the smaller half width, that the scheme may have left: (w h)^3 of a turn of .1 rad.
-LEFT_OVER = 1e-4
+#: Largest gap, as a share of the smaller body's reach, that the scheme may have left: (w h)^3 of a turn of .1 rad, as
+#: bodies that fall over have it in steps of 1/60 s, is 1e-3.
+LEFT_OVER = 1e-3
 #: Farthest that closing gaps may move a body, in multiples of the widest: a lever of a slender body.
 LEVERAGE = 100.0
 
@@ -168,17 +170,16 @@ def misses_end(bodies: Bodies, rows: Rows, options: Options, time: float) -> boo
 
 @inner_kernel
 def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> bool:
-    """Move bodies until the gaps of all rows are closed, by M^-1 J^T; False if they are, or cannot be.
+    """Move bodies until the gaps of all rows are closed, by M^-1 J^T; whether rows are not what they were.
 
     A solve for displacements, whose impulses are counted from far above zero: contacts push and pull. Gaps and overlaps
     that the scheme cannot have left are not its own to close, nor those that contradict each other: then bodies stay.
     """
-    widest, smallest = 0.0, math.inf
+    widest = 0.0
     for c in range(rows.counts[CONTACTS]):
-        extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
-        if abs(rows.real[c, GAP]) > LEFT_OVER * extent:
+        reach = min(bodies.real[rows.integer[c, A], REACH], bodies.real[rows.integer[c, B], REACH])
+        if abs(rows.real[c, GAP]) > LEFT_OVER * reach:
             return False
-        smallest = min(smallest, extent)
         if abs(rows.real[c, GAP]) > GAP_SHARE * gap_noise(bodies, rows, c):
             widest = max(widest, abs(rows.real[c, GAP]))
     if widest == 0.0:
@@ -196,9 +197,9 @@ def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, optio
         if bodies.kind[i, MOTION] == FREE:
             way = abs(bodies.twist[i, 0]) + abs(bodies.twist[i, 1]) + bodies.real[i, REACH] * abs(bodies.twist[i, 2])
             farthest = max(farthest, way)
-    if farthest > LEVERAGE * widest:
+    if not farthest <= LEVERAGE * widest:
         copy_vectors(sub.after, bodies.twist)
-        return False
+        return True
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FREE:
             for d in range(3):
@@ -209,12 +210,16 @@ def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, optio
 
 
 @inner_kernel
-def take_back(bodies: Bodies, rows: Rows, options: Options) -> None:
-    """Velocities without the impulses of the rows, so that a solve may find other ones."""
+def take_back(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
+    """Velocities without the impulses of the rows, so that a solve may find other ones; their work in the tally."""
+    copy_vectors(bodies.twist, bodies.start)
     for c in range(rows.counts[CONTACTS]):
         apply_normal(bodies, bodies.twist, rows, c, -rows.real[c, PN])
         if options.friction:
             apply_tangent(bodies, bodies.twist, rows, c, -rows.real[c, PT])
+    for c in range(rows.counts[CONTACTS]):
+        done, moved, _ = row_work(bodies, rows, c)
+        tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] - done, tally[SURFACE_WORK] - moved
 
 
 @inner_kernel

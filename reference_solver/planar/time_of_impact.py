@@ -8,7 +8,8 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.columns import GAP, NX, NY, PN, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, place, put_back
-from reference_solver.planar.kinematics import load_speed, normal_velocity
+from reference_solver.planar.impact import soft_speed
+from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.rows import prepare_masses
 from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, Rows, SubStep
@@ -59,7 +60,7 @@ def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int,
             prepare_masses(bodies, sub.probe, c)
             nearest = sub.probe.real[c, GAP]
             approach = normal_velocity(sub.start, sub.probe, c) + t * normal_velocity(sub.gain, sub.probe, c)
-            push = load_speed(bodies, sub.probe, c, options.dt)
+            push = soft_speed(bodies, sub.probe, c, options.dt)
     put_back(bodies, sub, a)
     put_back(bodies, sub, b)
     return approach < -push

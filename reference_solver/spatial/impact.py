@@ -16,6 +16,7 @@ from reference_solver.spatial.vector import Vector, length, row
 from reference_solver.stepping.clock import LEFT
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    CREEP,
     LANDED,
     NO_IMPACT,
     OPEN_ENDED,
@@ -73,6 +74,13 @@ def set_reference_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u:
 
 
 @inner_kernel
+def soft_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) -> float:
+    """Speed up to which an impact is soft: what loads do in a step, or what closes next to nothing of a body in one."""
+    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+    return load_speed(bodies, manifolds, m, p, dt) + CREEP * extent / dt
+
+
+@inner_kernel
 def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> int:
     """Targets -e u- of points that meet (E21), 0 of all others; returns what there is to solve.
 
@@ -99,7 +107,7 @@ def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifold
             if manifolds.meets[m, p] == 0:
                 continue
             soft = REBOUNDED if options.restitution and restitution > 0.0 else LANDED
-            found = max(found, soft if -u[2] <= load_speed(bodies, manifolds, m, p, options.dt) else STRUCK)
+            found = max(found, soft if -u[2] <= soft_speed(bodies, manifolds, m, p, options.dt) else STRUCK)
             manifolds.impact[m, p] = 1
             if options.restitution and manifolds.ending[m, p] == OPEN_ENDED:
                 manifolds.target[m, p] = -restitution * u[2]

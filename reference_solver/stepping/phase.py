@@ -155,13 +155,17 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
         return False
     if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
         return False
-    size = 0.0
+    size, onward = 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
         moment = BEARABLE * lasting.length[0] - speed / force
         lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
         size += lasting.wanted[t] ** 2
+        onward += lasting.wanted[t] * lasting.direction[k, t]
+    size = math.sqrt(size)
+    if onward < TURNED * size:  # it has come to its end
+        return False
     for t in range(lasting.size[TANGENTS]):
-        lasting.direction[k, t] = lasting.wanted[t] / math.sqrt(size)
+        lasting.direction[k, t] = lasting.wanted[t] / size
     return True
 
 
@@ -315,15 +319,18 @@ def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> Non
 def relative_error(lasting: Lasting, length: float) -> float:
     """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
 
-    What moves next to nothing is measured against `NEXT_TO_NOTHING` of the other, at the size of the largest body.
+    What moves next to nothing is measured against `NEXT_TO_NOTHING` of the other, at the size of the largest body that
+    touches another.
     """
-    split, size = lasting.impulse.shape[1], 0.0
+    split, size, least = lasting.impulse.shape[1], 0.0, NEXT_TO_NOTHING
     for k in range(lasting.size[CONTACTS]):
         size = max(size, lasting.extent[k])
+    if size == 0.0:  # free bodies
+        size, least = 1.0, 0.0
     missed_way, moved_way = missed_and_moved(lasting, length, 0, split)
     missed_turn, moved_turn = missed_and_moved(lasting, length, split, lasting.size[VELOCITIES])
-    way = max(moved_way, NEXT_TO_NOTHING * size * moved_turn)
-    turn = max(size * moved_turn, NEXT_TO_NOTHING * moved_way)
+    way = max(moved_way, least * size * moved_turn)
+    turn = max(size * moved_turn, least * moved_way)
     worst = 0.0
     if way > 0.0:
         worst = missed_way / (ERROR * way)
