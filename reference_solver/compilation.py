@@ -116,3 +116,12 @@ def spliced_kernel(function: F) -> F:
     above the solvers is therefore spliced into one function at the top: their code is then carried once.
     """
     return _compiled(function, inner=True, inline=True)
+
+
+def from_python(function: F) -> F:
+    """Return a function that calls, from Python, what only kernels call; compiled at its first call, and not kept."""
+
+    def call(*arguments: Any) -> Any:
+        return function(*arguments)
+
+    return function if numba_config.DISABLE_JIT else numba.njit(call, pipeline_class=Whole)  # type: ignore[return-value]

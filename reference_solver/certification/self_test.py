@@ -62,6 +62,9 @@ def _box(x: float, y: float, *twist: float) -> Body:
 SCENES = {
     "disc that bounces": _planar([_disc(0.0, 0.7, 1.0, -1.0, 3.0)], 0.8, 0.1),
     "discs that collide": _planar([_disc(0.0, 0.5, 2.0, 0, 0), _disc(1.2, 0.5, mass=2.0, inertia=0.25)], 0.5, 0.0),
+    "discs in a row": _planar(
+        [_disc(-1.2, 0.5, 2.0, 0.0, 0.0), *(_disc(1.0 * i, 0.5, mass=1.0 + i) for i in range(3))], 0.5, 0.0, steps=40
+    ),
     "box that slides": _planar([_box(0.0, 0.5, 2.0, 0.0, 0.0)], steps=40),
     "box that stops": _planar([_box(0.0, 0.5, 0.5, 0.0, 0.0)], steps=40),
     "box that lands": _planar([_box(0.0, 0.6)], steps=60),
@@ -561,7 +564,7 @@ CORRUPTIONS = (
     Corruption(
         "events",
         "residual of the solves",
-        "stack",
+        "discs in a row",
         settings(residual=lambda size: size, direct=lambda size: False, warm_starting=lambda size: False),
     ),
     Corruption("motion", "place in flight", "disc in flight", handed(jumped("pose", 0))),

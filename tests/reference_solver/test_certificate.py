@@ -115,8 +115,10 @@ def test_the_works_of_a_run_are_its_kinetic_energy(dimension, profile):
     start = sum(0.5 * (0.3 * i) ** 2 for i in range(4))
     simulation = pile(dimension, profile)
     works = [simulation.certificate[name] for name in ("load_work", "contact_work", "surface_work")]
-    # 130 steps of round-off, each a few units in the last place of some 100 J
-    assert kinetic_energy(simulation) - start == pytest.approx(sum(works), abs=130 * 4e-14)
+    # 130 steps of round-off, each a few units in the last place of some 100 J; where rows turn, of what the control of
+    # a phase's length leaves (`phase.ERROR`), 1e-11 of some 10 J.
+    allowed = 4e-14 if profile == "classical" else 1e-10
+    assert kinetic_energy(simulation) - start == pytest.approx(sum(works), abs=130 * allowed)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation
+from reference_solver.compilation import from_python
 from reference_solver.needs import needs
-from reference_solver.planar.lasting import evaluate, hold
-from reference_solver.planar.manifolds import detect
-from reference_solver.planar.rows import prepare_masses
+from reference_solver.planar import lasting as held
+from reference_solver.planar import manifolds, rows
 from reference_solver.planar.world import World
 from reference_solver.stepping.lasting import allocate_lasting
+
+evaluate, hold = from_python(held.evaluate), from_python(held.hold)
+detect, prepare_masses = from_python(manifolds.detect), from_python(rows.prepare_masses)
 
 DOWN = (0.0, -9.81)
 TRIANGLE = Polygon(((0.6, 0.0), (-0.3, 0.5), (-0.3, -0.5)))

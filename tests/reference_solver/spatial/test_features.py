@@ -4,12 +4,10 @@ Central differences of fourth order over .3 ms err by 3e-16 of the fifth derivat
 which lines nearly meet or run nearly parallel, where derivatives have no bound, are left out.
 """
 
-import numba
 import numpy as np
 import pytest
 
-from reference_solver.compilation import config
-from reference_solver.linking import Whole
+from reference_solver.compilation import from_python
 from reference_solver.spatial import turning, vector
 from reference_solver.spatial.features import (
     ALONG,
@@ -26,16 +24,6 @@ from reference_solver.spatial.features import (
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.state import BODY, BOX, FIXED, FREE, allocate_manifolds
 from reference_solver.stepping.lasting import allocate_lasting
-
-
-def from_python(inner):
-    """Return a function that calls a kernel which only kernels call."""
-
-    def call(*arguments):
-        return inner(*arguments)
-
-    return inner if config.DISABLE_JIT else numba.njit(call, pipeline_class=Whole)
-
 
 spin_from_rate, vector_rate = from_python(turning.spin_from_rate), from_python(turning.vector_rate)
 vector_curvature = from_python(turning.vector_curvature)
