@@ -124,4 +124,7 @@ def from_python(function: F) -> F:
     def call(*arguments: Any) -> Any:
         return function(*arguments)
 
-    return function if numba_config.DISABLE_JIT else numba.njit(call, pipeline_class=Whole)  # type: ignore[return-value]
+    if not hasattr(function, "py_func"):  # not compiled: NUMBA_DISABLE_JIT
+        return function
+    compiled: F = njit(call, pipeline_class=Whole)
+    return compiled

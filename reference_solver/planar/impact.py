@@ -240,15 +240,34 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
 
 
 @inner_kernel
+def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
+    """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
+
+    A rebound with e > 0 always does, however low: its series ends when it ends; rocking that ends does not (E22).
+    """
+    if rows.integer[c, IMPACT] and rows.real[c, RESTITUTION] > 0.0:
+        return True
+    if rows.integer[c, ENDING] == SERIES_ENDS:
+        return False
+    pull = load_speed(bodies, rows, c, 1.0)
+    return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
+
+
+@inner_kernel
 def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tuple[float, float]:
-    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow (E22).
+    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow, and hops of noise.
 
     ``bodies.twist`` are the velocities after ``length`` of it. One contact was hit, the other leaves and returns: with
     e = 0 speeds of impacts, and times between them, go on by the same ratio (G. Housner, *Bull. Seismol. Soc. Am.*
-    53, 1963). Returns the time until the last has ended, and the shortest until one returns; 0 and infinite if there
-    are none.
+    53, 1963; E22). Returns the time until the last has ended, and the shortest until one that rocks returns; 0 and
+    infinite if there are none.
     """
     left, longest, shortest = sub.clock[LEFT], 0.0, math.inf
+    for c in range(rows.counts[CONTACTS]):
+        leaves = normal_velocity(sub.start, rows, c)
+        if leaves > NOISE * rows.real[c, SPEED] and not flies(bodies, rows, c, leaves, left):
+            longest = max(longest, 2.0 * leaves / load_speed(bodies, rows, c, 1.0))
+            rows.integer[c, ENDING] = SERIES_ENDS
     for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         for k in range(2 if rows.manifold[m + 1] - first == 2 else 0):

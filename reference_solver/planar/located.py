@@ -58,7 +58,7 @@ from reference_solver.stepping.clock import (
     weigh_event,
     weigh_jam,
 )
-from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES, STRUCK
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
 from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
 from reference_solver.stepping.options import BLOCK, MIDPOINT, Options
 from reference_solver.stepping.phase import SHORTENED
@@ -276,7 +276,7 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
         if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
             break
-    if sub.clock[HELD] == 0.0 and (found == LANDED or found == STRUCK):
+    if sub.clock[HELD] == 0.0:
         length = rest(bodies, rows, problem, sub, options, tally, length)
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)

@@ -10,32 +10,28 @@ from reference_solver.model import Array
 from reference_solver.planar.certificate import certify, open_solve, row_work
 from reference_solver.planar.columns import (
     APPROACH,
-    ENDING,
     FORCE_N,
     FORCE_T,
     FRICTION,
     GAP,
-    IMPACT,
     INVERSE_INERTIA,
     INVERSE_MASS,
     LOAD,
     MOTION,
     PN,
     PT,
-    RESTITUTION,
     SLIP,
     SPEED,
     TANGENT_MASS,
     TARGET,
 )
-from reference_solver.planar.impact import doubt, gap_noise
+from reference_solver.planar.impact import doubt, flies, gap_noise
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
 from reference_solver.planar.midpoint import reach_end, turn_rows
 from reference_solver.planar.rows import measure_speed, warm_start
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
-from reference_solver.stepping.impacts import SERIES_ENDS
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES
@@ -109,20 +105,6 @@ def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float,
         rows.real[c, PN], rows.real[c, PT] = share * rows.real[c, PN], share * rows.real[c, PT]
         done, moved, _ = row_work(bodies, rows, c)
         tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
-
-
-@inner_kernel
-def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
-    """Whether a contact that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
-
-    A rebound with e > 0 always does, however low: its series ends when it ends; rocking that ends does not (E22).
-    """
-    if rows.integer[c, IMPACT] and rows.real[c, RESTITUTION] > 0.0:
-        return True
-    if rows.integer[c, ENDING] == SERIES_ENDS:
-        return False
-    pull = load_speed(bodies, rows, c, 1.0)
-    return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
 
 
 @inner_kernel

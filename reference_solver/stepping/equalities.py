@@ -7,8 +7,6 @@ G: normals of pressed contacts, tangents of those that stick. F: G^T, but for a 
 
 from __future__ import annotations
 
-import math
-
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.stepping.lasting import BODIES, CONTACTS, OPEN, SLIP, STICK, TANGENTS, VELOCITIES, Lasting
@@ -76,38 +74,42 @@ def assemble(lasting: Lasting, count: int, sliding: bool) -> None:
 
 @inner_kernel
 def row_scale(lasting: Lasting, i: int) -> float:
-    """Square root of the inverse effective mass of equality i, that of the plain row [kg^-1/2]."""
+    """Inverse effective mass of equality i, that of the plain row [1/kg]."""
     k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
     mass = 0.0
     for side in range(2):
         for d in range(lasting.size[VELOCITIES]):
             mass += lasting.jacobian[k, side, row, d] * lasting.response[k, side, row, d]
-    return math.sqrt(mass)
+    return mass
 
 
 @inner_kernel
 def eliminate(lasting: Lasting, count: int) -> bool:
-    """Solve for `answer` by elimination with row interchanges; False where a pivot is round-off."""
-    factor, x = lasting.factor, lasting.answer
+    """Solve for `answer` by elimination with row interchanges; False where a pivot is round-off.
+
+    Pivots are compared as entries over the roots of both rows' scales, squared: no root is taken, so that units of
+    powers of two change no bit.
+    """
+    factor, x, scale = lasting.factor, lasting.answer, lasting.spare
     for i in range(count):
-        scale = lasting.spare[i] = row_scale(lasting, i)
-        if scale == 0.0:
+        scale[i] = lasting.other[i] = row_scale(lasting, i)
+        if scale[i] == 0.0:
             return False
-    for i in range(count):
         for j in range(count):
-            factor[i, j] = lasting.matrix[i, j] / (lasting.spare[i] * lasting.spare[j])
-        x[i] = lasting.right[i] / lasting.spare[i]
+            factor[i, j] = lasting.matrix[i, j]
+        x[i] = lasting.right[i]
     for j in range(count):
         best = j
         for i in range(j + 1, count):
-            if abs(factor[i, j]) > abs(factor[best, j]):
+            if factor[i, j] ** 2 * scale[best] > factor[best, j] ** 2 * scale[i]:
                 best = i
-        if not abs(factor[best, j]) > RANK:
+        if not factor[best, j] ** 2 > RANK**2 * scale[best] * lasting.other[j]:
             return False
         if best != j:
             for c in range(count):
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
             x[j], x[best] = x[best], x[j]
+            scale[j], scale[best] = scale[best], scale[j]
         for i in range(j + 1, count):
             share = factor[i, j] / factor[j, j]
             if share != 0.0:
@@ -118,25 +120,23 @@ def eliminate(lasting: Lasting, count: int) -> bool:
         for c in range(j + 1, count):
             x[j] -= factor[j, c] * x[c]
         x[j] /= factor[j, j]
-    for i in range(count):
-        x[i] /= lasting.spare[i]
     return True
 
 
 @inner_kernel
 def force_weight(lasting: Lasting, i: int) -> float:
-    """Weight of unknown i where forces are not unique: they change in proportion to what they carry."""
+    """Weight of unknown i, squared, where forces are not unique: changes go by what they carry."""
     k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-    load = abs(lasting.usual[k, 0]) * (lasting.friction[k] if row > 0 else 1.0)
-    return math.sqrt(load)
+    return abs(lasting.usual[k, 0]) * (lasting.friction[k] if row > 0 else 1.0)
 
 
 @inner_kernel
 def least_change(lasting: Lasting, count: int, told: float) -> int:
     """Solve redundant rows for the `answer` nearest to ``told`` times the usual forces; how well they agree.
 
-    With the matrix B, scaled by masses and weights, the change is B^T y of the solution of B B^T y = r: Cholesky's
-    method with interchanges, which ends where pivots are round-off, and corrections of what squaring cost.
+    With the matrix A and the weights W, squared, the change is W A^T y of the solution of A W A^T y = r: Cholesky's
+    method without roots, with interchanges, which ends where pivots are round-off, and corrections of what squaring
+    cost.
     """
     factor, x, y, order = lasting.factor, lasting.answer, lasting.spare, lasting.order
     largest = 0.0
@@ -144,7 +144,7 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
         largest = max(largest, force_weight(lasting, j) * row_scale(lasting, j))
     for j in range(count):
         scale = row_scale(lasting, j)
-        weight = max(force_weight(lasting, j) * scale, LIGHT * largest) if largest > 0.0 else 1.0
+        weight = max(force_weight(lasting, j) * scale, LIGHT**2 * largest) if largest > 0.0 else 1.0
         lasting.weight[j] = weight / scale
         x[j] = told * lasting.usual[lasting.unknown[j, 0], lasting.unknown[j, 1]]
         order[j] = j
@@ -152,7 +152,7 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
         for j in range(i + 1):
             total = 0.0
             for c in range(count):
-                total += lasting.matrix[i, c] * lasting.weight[c] ** 2 * lasting.matrix[j, c]
+                total += lasting.matrix[i, c] * lasting.weight[c] * lasting.matrix[j, c]
             factor[i, j] = factor[j, i] = total
     rank = decompose(lasting, count)
     miss = 0.0
@@ -170,13 +170,13 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
             change = 0.0
             for i in range(count):
                 change += lasting.matrix[i, c] * y[i]
-            x[c] += lasting.weight[c] ** 2 * change
+            x[c] += lasting.weight[c] * change
     return REDUNDANT if miss <= CONSISTENT else CONTRADICTORY
 
 
 @inner_kernel
 def decompose(lasting: Lasting, count: int) -> int:
-    """Cholesky factor of `factor` with interchanges noted in `order`, in place; its rank."""
+    """Factors L D L^T of `factor` with interchanges noted in `order`, in place; its rank."""
     factor, order = lasting.factor, lasting.order
     first = 0.0
     for j in range(count):
@@ -195,13 +195,11 @@ def decompose(lasting: Lasting, count: int) -> int:
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
             for c in range(count):
                 factor[c, j], factor[c, best] = factor[c, best], factor[c, j]
-        root = math.sqrt(pivot)
-        factor[j, j] = root
         for i in range(j + 1, count):
-            factor[i, j] /= root
+            factor[i, j] /= pivot
         for i in range(j + 1, count):
             for c in range(j + 1, i + 1):
-                factor[i, c] -= factor[i, j] * factor[c, j]
+                factor[i, c] -= factor[i, j] * pivot * factor[c, j]
                 factor[c, i] = factor[i, c]
     return count
 
@@ -214,11 +212,10 @@ def substitute(lasting: Lasting, count: int, rank: int) -> None:
         z[i] = y[order[i]]
         for c in range(i):
             z[i] -= factor[i, c] * z[c]
-        z[i] /= factor[i, i]
     for i in range(rank - 1, -1, -1):
+        z[i] /= factor[i, i]
         for c in range(i + 1, rank):
             z[i] -= factor[c, i] * z[c]
-        z[i] /= factor[i, i]
     for i in range(count):
         y[i] = 0.0
     for i in range(rank):
