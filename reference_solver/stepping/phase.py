@@ -84,6 +84,8 @@ SURELY = 1e-6
 TURNED = 0.5
 #: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
 BEARABLE = 0.4
+#: An acceleration turns a slip no more than round-off does if this share of it is across.
+STRAIGHT = 1e-6
 #: Relative accuracy of that instant.
 SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
@@ -134,9 +136,9 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
     f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
     which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
-    slip does not turn, and off by no more than it turns in that moment.
+    slip does not turn, and off by no more than it turns in that moment. What accelerates along its direction keeps it.
     """
-    speed, push, force, along = 0.0, 0.0, 0.0, 0.0
+    speed, push, force, along, size, onward = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
         friction = 0.0
         for other in range(lasting.size[TANGENTS]):
@@ -146,16 +148,21 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
                     friction -= share * lasting.force[k, 1 + other]
         gain = row_value(lasting, k, 1 + t, lasting.acceleration) + lasting.gamma[k, 1 + t]
         lasting.wanted[t] = gain + friction
+        size += gain**2
+        onward += gain * lasting.direction[k, t]
         speed += lasting.speed[k, 1 + t] ** 2
         push += lasting.wanted[t] ** 2
         force += friction**2
         along += lasting.wanted[t] * lasting.speed[k, 1 + t]
     speed, push, force = math.sqrt(speed), math.sqrt(push), math.sqrt(force)
+    across, moment = math.sqrt(max(size - onward**2, 0.0)), lasting.length[0]
+    if across * moment <= STRAIGHT * max(math.sqrt(size) * moment, speed):
+        return False
     if force == 0.0 or speed >= BEARABLE * lasting.length[0] * force or push < TURNED * force:
         return False
     if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
         return False
-    size, onward = 0.0, 0.0
+    size = onward = 0.0
     for t in range(lasting.size[TANGENTS]):
         moment = BEARABLE * lasting.length[0] - speed / force
         lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]

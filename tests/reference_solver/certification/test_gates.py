@@ -88,6 +88,7 @@ def test_each_part_yields_what_its_functions_yield():
     assert names == {
         "free rotation: observed order",
         "free rotation: |L|, relative",
+        "free rotation: error [rad]",
         "free rotation: direction of L [rad]",
     }
 
