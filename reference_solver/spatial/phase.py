@@ -7,6 +7,8 @@ contact holds fly on as in any other sub-step.
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.features import follow, name_features
@@ -18,6 +20,7 @@ from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifold
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub
 from reference_solver.stepping.clock import HELD, OUTCOME
+from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
 from reference_solver.stepping.options import Options
@@ -57,9 +60,14 @@ def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> bo
 
 @inner_kernel
 def rows_stay(bodies: Bodies, sub_step: SubStep, time: float) -> bool:
-    """Whether no row of a noted contact changes along the way that bodies go at the mean of ``first`` and ``last``."""
+    """Whether no row of a noted contact, and no slip's direction, changes along the way that bodies go.
+
+    They go at the mean of ``first`` and ``last``.
+    """
     lasting = sub_step.lasting
     for k in range(lasting.size[CONTACTS]):
+        if slip_turns(bodies, lasting, k):
+            return False
         for side in range(2):
             i = lasting.body[k, side]
             if bodies.gyroscopic[i] and not (keeps_turn(bodies.first, i, time) and keeps_turn(bodies.last, i, time)):
@@ -89,6 +97,18 @@ def rows_stay(bodies: Bodies, sub_step: SubStep, time: float) -> bool:
                 bodies.pose[i, d] = lasting.base[i, d]
             displace(space, lasting, i)
     return stay
+
+
+@inner_kernel
+def slip_turns(bodies: Bodies, lasting: Lasting, k: int) -> bool:
+    """Whether noted contact k slips first in one direction and last in another, which friction follows."""
+    if lasting.friction[k] == 0.0:
+        return False
+    x, y = row_value(lasting, k, 1, bodies.first), row_value(lasting, k, 2, bodies.first)
+    x_last, y_last = row_value(lasting, k, 1, bodies.last), row_value(lasting, k, 2, bodies.last)
+    first, last = math.hypot(x, y), math.hypot(x_last, y_last)
+    noise = NOISE * lasting.speeds[k]
+    return bool(first > noise and last > noise and abs(x * y_last - y * x_last) > FROZEN * first * last)
 
 
 @inner_kernel
