@@ -102,8 +102,9 @@ def _observe(
 def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], trajectory: Trajectory) -> Observation:
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
-    if trajectory.finish == "diverged":
-        return replace(measured, outcome=Outcome.DIVERGED, reason=one_line(trajectory.reason))
+    if trajectory.finish == "diverged":  # an engine that certifies says why it ended the run
+        said = [trajectory.reason, *map(str, trajectory.certificate.get("reasons", ()))]
+        return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
     metrics = prepared.canonical.measure(prepared.scene, trajectory)
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
     if trajectory.certificate.get("certified") is False:

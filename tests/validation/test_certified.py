@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import pytest
-
 from reference_solver import Settings
 from validation.cells import Outcome, Slot
 from validation.execution import execute
@@ -17,21 +15,26 @@ def test_a_certified_run_is_judged():
     assert observation.outcome is Outcome.OK and observation.certificate["certified"] is True
 
 
-@pytest.fixture
-def starved(monkeypatch):
-    """The profile as it is, but out of sweeps after three: a column of ten is then far from solved."""
+def profile_with(monkeypatch, **changes):
+    """The profile `reference` with other settings than its own."""
     plain = Settings.reference
-
-    def few(dt):
-        return replace(plain(dt), max_sweeps=3, direct=False)
-
-    monkeypatch.setattr(Settings, "reference", few)
+    monkeypatch.setattr(Settings, "reference", lambda dt: replace(plain(dt), **changes))
 
 
-def test_an_uncertified_run_has_no_verdict(starved):
-    observation = execute(COLUMN)
+def test_an_uncertified_run_has_no_verdict(monkeypatch):
+    """Impacts a step late, said to be located."""
+    profile_with(monkeypatch, scheme="fixed")
+    observation = execute(Slot("bounce", (("e", 0.5),), 2, "reference", "reference", 1 / 60))
     assert observation.outcome is Outcome.INVALID
-    assert observation.reason.startswith("certificate: contact equations unsolved")
+    assert observation.reason.startswith("certificate: a body's way is not that of its velocity")
     assert observation.metrics  # what it did is kept, to be looked at
     rows = rows_of("run", [observation])
     assert rows and all(row.physics is None for row in rows)
+
+
+def test_a_run_that_cannot_be_solved_ends_and_says_where(monkeypatch):
+    """Out of sweeps after three, a column of ten is far from solved."""
+    profile_with(monkeypatch, max_sweeps=3, direct=False)
+    observation = execute(COLUMN)
+    assert observation.outcome is Outcome.DIVERGED
+    assert "no impulses keep bodies 0 and 1 apart" in observation.reason
