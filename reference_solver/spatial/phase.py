@@ -18,7 +18,7 @@ from reference_solver.spatial.motion import accelerate, momentum_of, put_orienta
 from reference_solver.spatial.operations import Spatial, displace
 from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
-from reference_solver.spatial.vector import dot, length, row, sub
+from reference_solver.spatial.vector import dot, length, row, sub, times_transposed
 from reference_solver.stepping.clock import HELD, OUTCOME
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
@@ -59,14 +59,14 @@ def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> bo
 
 
 @inner_kernel
-def rows_stay(bodies: Bodies, sub_step: SubStep, time: float) -> bool:
+def rows_stay(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: float) -> bool:
     """Whether no row of a noted contact, and no slip's direction, changes along the way that bodies go.
 
     They go at the mean of ``first`` and ``last``.
     """
     lasting = sub_step.lasting
     for k in range(lasting.size[CONTACTS]):
-        if slip_turns(bodies, lasting, k):
+        if slip_turns(bodies, manifolds, lasting, k):
             return False
         for side in range(2):
             i = lasting.body[k, side]
@@ -100,15 +100,23 @@ def rows_stay(bodies: Bodies, sub_step: SubStep, time: float) -> bool:
 
 
 @inner_kernel
-def slip_turns(bodies: Bodies, lasting: Lasting, k: int) -> bool:
-    """Whether noted contact k slips first in one direction and last in another, which friction follows."""
+def slip_turns(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, k: int) -> bool:
+    """Whether noted contact k slips first in one direction and last in another, which friction follows.
+
+    Of a slip that ends on the way its friction tells: where it does not turn, that is along it.
+    """
     if lasting.friction[k] == 0.0:
         return False
     x, y = row_value(lasting, k, 1, bodies.first), row_value(lasting, k, 2, bodies.first)
-    x_last, y_last = row_value(lasting, k, 1, bodies.last), row_value(lasting, k, 2, bodies.last)
-    first, last = math.hypot(x, y), math.hypot(x_last, y_last)
     noise = NOISE * lasting.speeds[k]
-    return bool(first > noise and last > noise and abs(x * y_last - y * x_last) > FROZEN * first * last)
+    if math.hypot(x, y) <= noise:
+        return False
+    x_last, y_last = row_value(lasting, k, 1, bodies.last), row_value(lasting, k, 2, bodies.last)
+    if math.hypot(x_last, y_last) <= noise:
+        m, p = lasting.row[k] // POINTS, lasting.row[k] % POINTS
+        force = times_transposed(manifolds.frame, m, row(manifolds.impulse[m], p, 0))
+        x_last, y_last = dot(force, row(lasting.frame[k], 1, 0)), dot(force, row(lasting.frame[k], 2, 0))
+    return bool(abs(x * y_last - y * x_last) > FROZEN * math.hypot(x, y) * math.hypot(x_last, y_last))
 
 
 @inner_kernel
@@ -146,7 +154,7 @@ def enter_phase(
         return 0.0
     space = Spatial(bodies, bodies.pose, bodies.twist)
     begin_phase(space, lasting)
-    if rows_stay(bodies, sub_step, frozen):
+    if rows_stay(bodies, manifolds, sub_step, frozen):
         return 0.0
     copy_twists(bodies.first, bodies.twist)
     time, outcome = find_phase(space, lasting, left)
