@@ -46,6 +46,10 @@ GATES = (
     Gate("pumped", entries.PUMPED, 1e-10, "energy created without restitution"),
 )
 
+#: Largest overlap where events are located, as a share of the smaller half width: steps that go at impulse level, which
+#: jammed piles need (E28), leave some 1e-4.
+LOCATED_OVERLAP = 1e-3
+
 
 def summary(tally: Array) -> dict[str, Any]:
     """Return the tally under its public names (see ``Simulation.certificate``)."""
@@ -85,6 +89,10 @@ def reasons(tally: Array) -> tuple[str, ...]:
     """Return what keeps a run from serving as truth, one sentence each; empty if nothing does."""
     missed = [gate for gate in GATES if not tally[gate.entry] <= gate.limit]
     found = [f"{gate.meaning}: {gate.name} {tally[gate.entry]:.3g}, at most {gate.limit:.3g}" for gate in missed]
+    located = tally[entries.EVENTS_LOCATED] > 0.0 or tally[entries.STEPS_HELD] > 0.0
+    if located and not tally[entries.PENETRATION] <= LOCATED_OVERLAP:
+        overlap = f"penetration {tally[entries.PENETRATION]:.3g}, at most {LOCATED_OVERLAP:.3g}"
+        found.append(f"bodies overlap where events are located: {overlap}")
     if tally[entries.NOT_FINITE] > 0.0:
         found.append(f"velocities are no numbers after {int(tally[entries.NOT_FINITE])} contact solves")
     if tally[entries.EXHAUSTED] > 0.0:

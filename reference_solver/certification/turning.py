@@ -33,6 +33,9 @@ HELD_BELOW = 1e-11
 #: Length of the long run of the board [s], and what its energy and amplitude may be off, as shares of their own.
 LONG, KEPT = 60.0, 1e-8
 
+#: Spin of a block that rocks no more [rad/s].
+AT_REST = 1e-9
+
 State = tuple[float, float]
 Rate = Callable[[float, float], float]
 
@@ -202,9 +205,12 @@ def ladder() -> Case:
     return Case(bodies, 0.0, time, (*place(angle), angle))
 
 
-def rocking_block() -> Case:
-    """A block rocks from corner to corner, twice; each impact leaves 1 - (3/2) sin^2(alpha) of its spin (E56)."""
-    half, lean, left = (0.25, 1.0), 0.1, 1.6
+def rocking_block(time: float = 1.6) -> Case:
+    """A block rocks from corner to corner; each impact leaves 1 - (3/2) sin^2(alpha) of its spin (E56).
+
+    What is left of impacts at less than `AT_REST` is less than that in all: it rests then.
+    """
+    half, lean, left = (0.25, 1.0), 0.1, time
     slender, size = math.atan2(*half), math.hypot(*half)
     kept, side, state = 1.0 - 1.5 * math.sin(slender) ** 2, 1.0, (lean, 0.0)
     while left > 0.0:
@@ -213,6 +219,7 @@ def rocking_block() -> Case:
         )
         if left > 0.0:
             side, state = -side, (0.0, -kept * state[1])
+            left = left if abs(state[1]) > AT_REST else 0.0
     angle = side * state[0]
 
     def place(q: float, corner: float) -> tuple[float, float]:
@@ -221,7 +228,7 @@ def rocking_block() -> Case:
 
     start = place(lean, -1.0)
     truth = place(angle, -1.0 if side > 0.0 else 1.0)
-    return Case((_floor(), _box(half, 1.0, (*start, lean))), 5.0, 1.6, (*truth, angle))
+    return Case((_floor(), _box(half, 1.0, (*start, lean))), 5.0, time, (*truth, angle))
 
 
 def two_boxes() -> Case:

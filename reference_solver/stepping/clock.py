@@ -30,6 +30,8 @@ UNTIL_REST = 0.5
 MOST_SOFT = 16
 #: Free bodies from which on an island may be jammed, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
+#: Free bodies from which on two thirds as many rows jam an island: more than a contact for every body.
+MANY_BODIES = 8
 #: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
 REBOUND = 0.25
 #: What a soft event counts that follows within a thousandth of a step: such ones come in crowds.
@@ -53,9 +55,10 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
 def weigh_jam(clock: Array, rows: int, freedoms: int, bodies: int) -> None:
     """Decide at the start of a step whether the island is jammed: its contacts have more rows than it has freedoms.
 
-    Then whatever moves in it moves what it touches, and events have no end; few of them are located.
+    Then whatever moves in it moves what it touches, and events have no end; few of them are located. Of many bodies
+    two thirds as many rows do.
     """
-    if bodies >= JAM_BODIES and rows > freedoms:
+    if bodies >= JAM_BODIES and (rows > freedoms or (bodies >= MANY_BODIES and 3 * rows > 2 * freedoms)):
         clock[JAMMED], clock[PATIENCE] = 1.0, JAM_PATIENCE
 
 

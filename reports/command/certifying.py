@@ -34,6 +34,7 @@ PARTS = (
     "columns",
     "conservation",
     "rotation",
+    "falling",
     "turning",
     "turning_in_space",
     "detection",

@@ -107,7 +107,7 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
 
 def test_an_island_is_jammed_where_contacts_have_more_rows_than_bodies_have_freedoms():
     clock = np.zeros(CLOCK_SIZE)
-    for rows, bodies, jammed in [(13, 4, 1.0), (12, 4, 0.0), (60, 3, 0.0)]:
+    for rows, bodies, jammed in [(13, 4, 1.0), (12, 4, 0.0), (60, 3, 0.0), (16, 8, 0.0), (17, 8, 1.0), (14, 7, 0.0)]:
         open_step(clock, bodies, DT)
         weigh_jam(clock, rows, 3 * bodies, bodies)
         assert (clock[JAMMED], clock[PATIENCE]) == (jammed, JAM_PATIENCE if jammed else MOST_SOFT + bodies)
