@@ -31,9 +31,9 @@ from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import Measured
+from validation.catalogue import CATALOGUE
 from validation.deviation import Deviation, Law
 from validation.deviations.mujoco_box import BoxOnFace
-from validation.scenes import CATALOGUE
 
 Array = NDArray[np.float64]
 Prediction = tuple[float, float]
