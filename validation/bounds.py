@@ -71,6 +71,15 @@ def found_late(g: float, dt: float, place: float) -> Bound:
     return Bound(g * dt * dt + ROUND_OFF * place, because)
 
 
+def landed(speed: float, g: float, dt: float, place: float) -> Bound:
+    """Place [m] of what came to rest by an impact at ``speed`` [m/s]; ``place`` [m] as in `found_late`.
+
+    The impact is found up to one step late, speed dt deep, and nothing says that a solver must push out what it finds.
+    """
+    because = "the impact is found up to one step late, v dt deep, and the rest one more step of free fall: + g dt^2"
+    return Bound(speed * dt + g * dt * dt + ROUND_OFF * place, because)
+
+
 def still_energy(bodies: int, mass: float, g: float, dt: float) -> Bound:
     """Kinetic energy [J] of ``bodies`` of ``mass`` that do not move."""
     because = "n bodies below the speed that counts as motion, v1/100 = g dt/100"
