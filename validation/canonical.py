@@ -113,10 +113,18 @@ Params = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Variation:
-    """Parameters of a cell, and the iteration counts to run it at (None: the profile's own)."""
+    """Parameters of a cell, and the iteration counts to run it at (None: the profile's own).
+
+    ``dimensions`` are those of the scene in which the cell runs; all of them if it says none.
+    """
 
     params: Params
     iterations: tuple[int | None, ...] = (None,)
+    dimensions: tuple[int, ...] = ()
+
+    def runs_in(self, dimension: int) -> bool:
+        """Whether the cell is meant in this dimension."""
+        return not self.dimensions or dimension in self.dimensions
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,8 @@ def _engine_slots(
         if request.profiles and profile not in request.profiles:
             continue
         for variation in _variations(request, canonical):
+            if not variation.runs_in(dimension):
+                continue
             params = canonical.minimal(variation.params)
             for dt in _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
@@ -103,7 +105,9 @@ def in_quick_suite(slot: Slot) -> bool:
         return False
     canonical = CATALOGUE[slot.scene]
     return any(
-        slot.params == canonical.minimal(variation.params) and slot.iterations in variation.iterations
+        slot.params == canonical.minimal(variation.params)
+        and slot.iterations in variation.iterations
+        and variation.runs_in(slot.dimension)
         for variation in canonical.variations("quick")
     ) or (slot.iterations is None and not slot.params)
 
