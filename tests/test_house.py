@@ -52,6 +52,8 @@ OTHER_MEANINGS = {
     ("adapters/mujoco.py", "impact"): "a regime of `Needs`",
     ("adapters/needs.py", "impact"): "a regime of `Needs`",
     ("adapters/receipts.py", "impact"): "a regime of `Needs`",
+    ("adapters/probes.py", "slide"): "a probe",
+    ("adapters/receipts.py", "slide"): "a probe",
     ("reports/command/certifying.py", "impact"): "a part of `reference_solver.certification`",
 }
 

@@ -167,7 +167,7 @@ SCENE = CanonicalScene(
     sampling=sampling,
     track=track,
     quick=(Variation({}), Variation({"ratio": 100.0, "gap": 2.0})),  # 12 and 31 impacts
-    full=tuple(Variation({"ratio": r}) for r in (1.0, 3.0, 16.0, 100.0)),
+    full=tuple(Variation({"ratio": r, "gap": 2.0}) for r in (1.0, 3.0, 16.0, 100.0)),
     planted=({},),
     primary=Primary(
         "velocity error",
