@@ -215,7 +215,8 @@ def _constant(kind: str, rows: Sequence[Plain]) -> str:
     low, high = (number(value, 3) for value in (min(values), max(values)))
     spread = rows[0]["unit"] if rows[0]["unit"] != "1" else ""
     value = f"{low if low == high else f'{low} to {high}'} {spread}".strip()
-    return f"{spoken(rows[0]['scene'], kind, value)} whatever {' and '.join(asked)} is asked"
+    what = " ".join(["whatever", *([" and ".join(asked)] if asked else []), "is asked"])
+    return f"{spoken(rows[0]['scene'], kind, value)} {what}"
 
 
 def spoken(scene: str, kind: str, value: str) -> str:

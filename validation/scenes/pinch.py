@@ -52,7 +52,7 @@ def exact(scene: Scene) -> dict[str, float]:
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Creep and turn of the box over the second half of the run; loads over the last second."""
     p, d, dt = scene.params, scene.dimension, trajectory.dt
-    sunk = metrics.mean_rate(trajectory.t, trajectory.pose[:, 2, d - 1])
+    sunk = metrics.mean_rate(trajectory.t, -trajectory.pose[:, 2, d - 1])
     spin = float(np.linalg.norm(trajectory.twist[-1, 2, d:]))
     measured: dict[str, Measured] = {"creep": sunk, "turned": (spin * 0.5 * SIDE, "")}
     wall, pad = _late(trajectory, 1, 2), _late(trajectory, 2, 3)
