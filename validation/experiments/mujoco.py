@@ -24,6 +24,8 @@ CURED: tuple[Cured, ...] = (
     Cured("bounce", ({}, {"e": 0.5}, {"e": 1.0})),
     Cured("stack", ({}, {"n": 2.0}, {"n": 20.0})),
     Cured("incline", ({}, {"ratio": 0.999}), ("creep",)),
+    Cured("head_on", ({}, {"e": 1.0, "ratio": 1.0})),
+    Cured("pinch", ({}, {"margin": 1.05}, {"margin": 100.0})),
 )
 
 #: Restitution in the step after contact, as the tuned profile has it for blows.
