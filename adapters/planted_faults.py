@@ -7,9 +7,12 @@ reader knows how far "all receipts hold" goes. `Planted` gives any engine a faul
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from adapters.engine import Array, Contacts, Declared, Engine, EngineError, Simulation
 from adapters.needs import Needs
@@ -48,7 +51,7 @@ CAUGHT_BY = {
 #: Faults of a given size that any engine can be given from outside, in what it is told...
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
 #: ... or in what it reports.
-REPORTED = ("velocity", "impulse", "damping", "drift", "climb", "tremble", "flicker")
+REPORTED = ("velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker")
 SIZED = TOLD + REPORTED
 
 
@@ -60,7 +63,8 @@ class Planted(Engine):
     fault
         One of `SIZED`: of what is built (`TOLD`), or of what is read (`REPORTED`). Motion that a solver leaves behind
         or adds is no share of a parameter: ``drift`` moves every body along x by ``size`` times 1 m/s and ``climb``
-        upwards, as a correction of places that never ends does; ``tremble`` adds ``size`` times 1 m/s along x with a
+        upwards, as a correction of places that never ends does, and ``twirl`` turns it by ``size`` times 1 rad/s in
+        the plane of x and the vertical; ``tremble`` adds ``size`` times 1 m/s along x with a
         sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``damping`` takes the
         share of all speeds away in a second.
     size
@@ -134,7 +138,7 @@ class _Misread(Simulation):
             pose = pose.copy()
             up = 1 if pose.shape[1] == 3 else 2
             pose[:, 0 if self.fault == "drift" else up] += self.size * self.dt * self.steps
-        return pose
+        return _turned(pose, self.size * self.dt * self.steps) if self.fault == "twirl" else pose
 
     def twist(self) -> Array:
         twist = self.inner.twist()
@@ -145,6 +149,12 @@ class _Misread(Simulation):
         if self.fault == "tremble":
             twist = twist.copy()
             twist[:, 0] += self._turn() * self.size
+        if self.fault == "twirl":
+            twist = twist.copy()
+            if twist.shape[1] == 3:
+                twist[:, 2] += self.size
+            else:
+                twist[:, 4] -= self.size
         return twist
 
     def contacts(self) -> Contacts:
@@ -164,3 +174,16 @@ class _Misread(Simulation):
 
     def close(self) -> None:
         self.inner.close()
+
+
+def _turned(pose: Array, angle: float) -> Array:
+    """Poses turned by ``angle`` from x towards the vertical: about +z in the plane, about -y in space."""
+    pose = pose.copy()
+    if pose.shape[1] == 3:
+        pose[:, 2] += angle
+        return pose
+    c, s = math.cos(0.5 * angle), -math.sin(0.5 * angle)
+    w, x, y, z = pose[:, 3:].T
+    # The product (c, 0, s, 0) (w, x, y, z): a turn in world axes stands on the left.
+    pose[:, 3:] = np.column_stack([c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x])
+    return pose

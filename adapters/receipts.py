@@ -56,7 +56,7 @@ QUANTITIES = (
 #: Band of everything an engine gets exactly: some thousand roundings of 2.2e-16 each.
 ROUND_OFF = 1e-12
 #: What a profile's own solve may leave of friction, as a share of the coefficient, unless it declares more: what a
-#: sliding box is judged to at 1/240 s (`validation.tolerances`, dt/100 s = 4e-5), rounded up.
+#: sliding box is judged to at 1/240 s (`validation.bounds.driven`, dt/100 s = 4e-5), rounded up.
 FRICTION_SHARE = 1e-4
 #: What a solver's tolerance may leave of the sum of contact impulses, as a share of the momentum they change.
 IMPULSE_SHARE = 1e-6

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,6 +16,8 @@ from reports.cures import decided_by
 from reports.findings import severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
+from validation.metrics import SILENT, WORDS
+from validation.posed import resolve
 
 Plain = Mapping[str, Any]
 #: (scene, dimension, engine, profile) -> cost [s of CPU per simulated s] of the cheapest step that passes.
@@ -170,33 +172,15 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
 
 #: What is smaller than this share of the truth is nothing, in words.
 NOTHING = 1e-6
-SILENT = "does not rebound"
-#: What a value of a metric means, in words; {value} carries the unit.
-SPOKEN: dict[str, str] = {
-    "rebound_ratio": "rebounds at {value}",
-    "apex": "rebounds at {value}",
-    "creep": "creeps at {value} where it should stick",
-    "acceleration": "slides with {value}",
-    "threshold": "lets go at {value} of the friction limit",
-    "settle_time": "settles after {value}",
-    "drift": "drifts sideways by {value}",
-    "penetration": "overlaps by {value}",
-    "interface_impulse": "carries {value} of the weight above an interface",
-    "kinetic_energy": "keeps {value} of motion",
-    "impulse_scatter": "shakes: loads scatter by {value}",
-    "rest_time": "rests after {value}",
-}
 
 
-def _rebound(row: Plain) -> Plain:
-    """First apex as the coefficient of restitution that it shows: h_1 = e^2 h_0."""
-    height = row["params"]["height"]
-    value, truth = (math.sqrt(max(row[name], 0.0) / height) for name in ("value", "truth"))
+def _as_seen(row: Plain, metric: str) -> Plain | None:
+    """A row with the number by which people know its metric; None where they know it by its own."""
+    view = resolve(row["scene"]).seen_as.get(metric)
+    if view is None or row["value"] is None or row["truth"] is None:
+        return None
+    value, truth = (view(row["params"], row[name]) for name in ("value", "truth"))
     return {**row, "value": value, "truth": truth, "unit": "1"}
-
-
-#: Metrics that people know by another number; only the rows named here are shown so.
-SEEN_AS: dict[tuple[str, str], Callable[[Plain], Plain]] = {("bounce", "apex[1]"): _rebound}
 
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
@@ -214,9 +198,9 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     kind = next(name for name, part in share.items() if part >= CLEAR * max(share.values()))
     members = [row for row in rows if row["metric"].partition("[")[0] == kind and row["value"] is not None]
     known_as = f"{kind}[1]"
-    view = SEEN_AS.get((rows[0]["scene"], known_as))
-    if view is not None and any(row["metric"] == known_as for row in kinds[kind]):
-        members = [view(row) for row in members if row["metric"] == known_as]
+    if any(row["metric"] == known_as for row in kinds[kind]):
+        seen = [_as_seen(row, known_as) for row in members if row["metric"] == known_as]
+        members = [row for row in seen if row is not None] or members
     return _constant(kind, members) or _worst(kind, [row for row in members if mark_of(row) != "pass"])
 
 
@@ -231,14 +215,15 @@ def _constant(kind: str, rows: Sequence[Plain]) -> str:
     low, high = (number(value, 3) for value in (min(values), max(values)))
     spread = rows[0]["unit"] if rows[0]["unit"] != "1" else ""
     value = f"{low if low == high else f'{low} to {high}'} {spread}".strip()
-    return f"{spoken(kind, value)} whatever {' and '.join(asked)} is asked"
+    what = " ".join(["whatever", *([" and ".join(asked)] if asked else []), "is asked"])
+    return f"{spoken(rows[0]['scene'], kind, value)} {what}"
 
 
-def spoken(kind: str, value: str) -> str:
-    """What a value of a kind of metric means, in words."""
-    if value == "0" and kind in ("rebound_ratio", "apex"):
-        return SILENT
-    return SPOKEN.get(kind, kind + " {value}").format(value=value)
+def spoken(scene: str, kind: str, value: str) -> str:
+    """What a value of a kind of metric means, in words: the scene's own, else those of `validation.metrics`."""
+    words = {**WORDS, **resolve(scene).words}
+    said = words.get(f"{kind}=0") if value == "0" else None
+    return said or words.get(kind, kind + " {value}").format(value=value)
 
 
 def _digits(row: Plain) -> int:
@@ -263,7 +248,7 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
     row = max(rows, key=severity)
     nothing = bool(row["truth"]) and abs(row["value"]) < NOTHING * abs(row["truth"])
     value = "0" if nothing else measured(row, _digits(row))
-    text = "never settles" if value == NEVER else spoken(kind, value)
+    text = "never settles" if value == NEVER else spoken(row["scene"], kind, value)
     if row["truth"] and text != SILENT:
         text += f" instead of {quantity(row['truth'], row['unit'], _digits(row))}"
     where = params_text(row["slot"]["params"])

@@ -12,7 +12,6 @@ from validation.cells import Observation
 from validation.decisive import ALONE, COMPLETES, NEEDED, decisive
 from validation.experiments import belongs_of
 from validation.posed import resolve
-from validation.tracks import SHOWN
 
 #: What a setting's part in a cure is called.
 ROLES = {
@@ -59,7 +58,8 @@ def shown_cell(
         if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
         and o.settings and o.slot.iterations is None
     ]  # fmt: skip
-    wanted = SHOWN.get(scene, ()) if params is None else tuple(sorted(params.items()))
+    canonical = resolve(scene)
+    wanted = canonical.minimal(canonical.representative if params is None else params)
     shown = [o for o in own if o.slot.params == wanted]
     return next(iter(shown or own), None)
 

@@ -13,10 +13,10 @@ from adapters import registry
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import SceneError
+from validation.catalogue import CATALOGUE, broken
 from validation.identity import commit, machine
-from validation.plan import QUICK_DT, variations
+from validation.plan import QUICK_DT
 from validation.posed import resolve
-from validation.scenes import CATALOGUE
 
 
 def scenes() -> list[dict[str, Any]]:
@@ -45,7 +45,7 @@ def checks() -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for canonical in CATALOGUE.values():
         seen: dict[str, dict[str, Any]] = {}
-        for variation in variations(canonical.name, "quick"):
+        for variation in canonical.variations("quick"):
             scene = canonical.scene(canonical.dimensions[0], variation.params)
             for check in canonical.checks(scene, QUICK_DT):
                 name = f"{canonical.name}/{check.metric.partition('[')[0]}"
@@ -126,6 +126,7 @@ def doctor() -> dict[str, Any]:
         packages[name] = str(path.parent)
         if path.parent.parent != home:
             problems.append(f"the package {name!r} on this path is not ours: {path.parent}")
+    problems += broken()
     found = engines()
     for engine in found:
         if engine["reason"]:

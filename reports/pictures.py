@@ -13,6 +13,8 @@ import zlib
 from pathlib import Path
 from typing import Any, Literal
 
+from validation.catalogue import CATALOGUE
+
 #: Picture -> the part of the page that it shows.
 SHOTS = {"verdicts": "#verdicts", "restitution": "#shot-restitution", "cost": "#shot-cost"}
 #: Room around a picture, and nothing in it that cannot be clicked.
@@ -48,7 +50,8 @@ def main(report: str, folder: str) -> None:
 
 def _replay(page: Any, path: Path) -> None:
     """The bouncing ball of every engine side by side, shortly after the first impact."""
-    page.select_option("#replay-scene", "replay-bounce-2")
+    bounced = next(scene.name for scene in CATALOGUE.values() if scene.restitution and scene.restitution.heights)
+    page.select_option("#replay-scene", f"replay-{bounced}-2")
     page.select_option("#replay-layout", "beside")
     page.wait_for_timeout(300)
     page.locator("#replay-time").fill("34")

@@ -17,9 +17,8 @@ from rich.text import Text
 from adapters import registry
 from reports.wording import cell, number
 from validation.bench import agreement, reading, work
-from validation.bench.primary import PRIMARY
 from validation.cells import Observation, Outcome, format_dt
-from validation.posed import resolve
+from validation.posed import primary_of, resolve
 from validation.store import Run, Store
 from validation.verdicts import judge_physics
 
@@ -129,7 +128,7 @@ def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
     levels = work.time_at_equal_error(points, SHOWN_LEVELS)
     out = []
     for (scene, dimension), group in reading.grouped(levels, ["scene", "dimension"]):
-        primary = PRIMARY[scene]
+        primary = primary_of(scene)
         unit = "" if primary.unit == "1" else f" / {primary.unit}"
         title = f"{scene} {dimension}-D: CPU time per simulated second at {primary.name}{unit} of at most"
         table = _table(title)

@@ -165,10 +165,9 @@ def sensitivity(entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[
     console.print(table)
     for fault, receipts in receipts_alone.items():
         console.print(Text(f"{fault}: no check of these scenes sees it; the cell is INVALID by {', '.join(receipts)}"))
-    console.print(
-        Text("faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:")
-    )
-    console.print(
-        Text("drift along x, climb upwards, tremble to and fro along x at every step. 1 % of flicker: impulses")
-    )
-    console.print(Text("1 % too high and too low in turn; of damping: speeds lose 1 % in a second"))
+    for line in (
+        "faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:",
+        "drift along x, climb upwards, tremble to and fro along x at every step; of twirl it is a turn of 0.01 rad/s.",
+        "1 % of flicker: impulses 1 % too high and too low in turn; of damping: speeds lose 1 % in a second",
+    ):
+        console.print(Text(line))

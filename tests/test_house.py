@@ -1,11 +1,15 @@
 """The house: four packages in one line, no engine imported by importing them, no stray rooms."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from validation.catalogue import CATALOGUE
+from validation.scenes import OURS
 
 ROOT = Path(__file__).parent.parent
 LINE = ["reference_solver", "adapters", "validation", "reports"]
@@ -40,6 +44,58 @@ def test_engines_are_named_in_validation_only_by_deviations_experiments_and_find
             continue
         text = path.read_text().lower()
         assert not [name for name in names if name in text], path
+
+
+#: Words that are scenes' names as well, where they mean something else.
+OTHER_MEANINGS = {
+    ("adapters/conformance.py", "impact"): "a regime of `Needs`",
+    ("adapters/mujoco.py", "impact"): "a regime of `Needs`",
+    ("adapters/needs.py", "impact"): "a regime of `Needs`",
+    ("adapters/receipts.py", "impact"): "a regime of `Needs`",
+    ("adapters/probes.py", "slide"): "a probe",
+    ("adapters/receipts.py", "slide"): "a probe",
+    ("reports/command/certifying.py", "impact"): "a part of `reference_solver.certification`",
+}
+
+
+def scenes_named(path, names):
+    """Scenes' names among the strings of a source file, and the quoted words of a template."""
+    text = path.read_text()
+    if path.suffix != ".py":
+        return {word for word in re.findall(r"""["'`](\w+)["'`]""", text) if word in names}
+    found = {node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)}
+    return {value for value in found if isinstance(value, str) and value in names}
+
+
+def test_a_scene_is_named_only_in_its_own_file_in_findings_and_in_laws():
+    """Whoever adds a scene opens no other file; `validation/scenes/__init__.py` registers ours."""
+    names, found = set(CATALOGUE), {}
+    for package in LINE[1:]:
+        for path in (ROOT / package).rglob("*.*"):
+            inside = path.relative_to(ROOT)
+            apart = {"deviations", "experiments", "findings", "scenes", "published"} & set(inside.parts[:-1])
+            if path.suffix in (".py", ".j2", ".js") and not apart:
+                found |= {(str(inside), name): path for name in scenes_named(path, names)}
+    assert set(found) == set(OTHER_MEANINGS)
+
+
+def test_a_scene_s_file_names_no_other_scene():
+    for name in OURS:
+        path = ROOT / "validation" / "scenes" / f"{name}.py"
+        assert scenes_named(path, set(CATALOGUE)) - {searched_group(name)} <= {name}
+        assert not {f"validation.scenes.{other}" for other in OURS} & set(whole_imports(path))
+
+
+def searched_group(name):
+    """The group that a scene is searched in may have the name of a scene."""
+    searched = CATALOGUE[name].searched
+    return searched.group if searched else ""
+
+
+def whole_imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            yield node.module
 
 
 @pytest.mark.parametrize("module", ["adapters", "validation.rows", "reports.command"])

@@ -16,7 +16,7 @@ from validation.cells import Slot, slot_from_dict
 from validation.findings import NEVER_LISTED, Family, Finding, Findings, Key, row_key
 from validation.plan import in_quick_suite
 from validation.rows import Row, predictions_of
-from validation.studies import STUDIES
+from validation.studies import study_of
 from validation.verdicts import is_marginal
 
 #: Starts moved by so many units in the last place show how far a value scatters.
@@ -178,7 +178,7 @@ def _never(row: Row) -> bool:
 
 def _is_study(row: Row) -> bool:
     """What several cells say together is one of few values; it does not scatter with the last bits of a start."""
-    return any(row.scene == study.scene and row.metric == study.name for study in STUDIES)
+    return study_of(row.scene, row.metric) is not None
 
 
 def _check(row: Row) -> Check:

@@ -1,15 +1,23 @@
-"""What a canonical scene is: a figure, parameters with reasons, a maker, and the exact answer.
+"""What a canonical scene is: everything that is about one scene, in one object, from one file.
 
-A canonical scene knows nothing of engines. Its tolerances stand in `validation.tolerances`, its metrics in
-`validation.metrics`.
+    figure and law        what is asked, drawn and said
+    parameters, make      the scene itself
+    exact, measure, rule  its truth, what is measured of a run, and how far the two may be apart
+    quick, full           the cells that a suite runs
+    primary, steps        the one error that a bench compares engines by, and the steps that it runs
+    the rest              what reports, tuning and detection want to know about a scene
+
+A canonical scene knows nothing of engines. Bounds that several scenes owe stand in `validation.bounds`, metrics in
+`validation.metrics`. `validation.catalogue` finds the scenes.
 """
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Sampling, Trajectory
@@ -98,9 +106,168 @@ class Track:
     position: Callable[[float], tuple[float, ...]]
 
 
+Suite = Literal["quick", "full"]
+#: Parameters of a cell, as what differs from the scene's defaults.
+Params = Mapping[str, float]
+
+
 @dataclass(frozen=True)
+class Variation:
+    """Parameters of a cell, and the iteration counts to run it at (None: the profile's own).
+
+    ``dimensions`` are those of the scene in which the cell runs; all of them if it says none.
+    """
+
+    params: Params
+    iterations: tuple[int | None, ...] = (None,)
+    dimensions: tuple[int, ...] = ()
+
+    def runs_in(self, dimension: int) -> bool:
+        """Whether the cell is meant in this dimension."""
+        return not self.dimensions or dimension in self.dimensions
+
+
+@dataclass(frozen=True)
+class Primary:
+    """The one declared error of a scene, and the state in which the scene is timed.
+
+    A work-precision plot shows one number per run of an engine, so it is declared with the scene, before anything is
+    measured. It is a supremum over variations that an engine cannot choose: the phase of an impact within a step, the
+    side of a threshold.
+
+    Parameters
+    ----------
+    name, unit
+        For axes.
+    law
+        What exactly is measured, in one line.
+    because
+        Why this and nothing else.
+    variations
+        ``variations(dt)``: parameters of the cells whose worst error counts; the first one is timed.
+    error
+        ``error(scene, dt, metrics)`` of one cell, or None and why.
+    state
+        The state that is timed, in words.
+    warm_up, window
+        Simulated seconds before the timed call and within it; a window of None is the whole scene.
+    """
+
+    name: str
+    unit: str
+    law: str
+    because: str
+    variations: Callable[[float], list[dict[str, float]]]
+    error: Callable[[Scene, float, Mapping[str, Measured]], Measured]
+    state: str
+    warm_up: float = 0.0
+    window: float | None = None
+
+
+def halves(first: float, last: float) -> tuple[float, ...]:
+    """Steps [s] from a rate of ``first`` [1/s] by halves to one of at least ``last``."""
+    rates = [first]
+    while rates[-1] < last:
+        rates.append(2.0 * rates[-1])
+    return tuple(1.0 / rate for rate in rates)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What a bench runs of a scene: steps [s], and iteration counts beside each profile's own, by suite.
+
+    Without quick steps a scene is benched in full, or where it is named.
+    """
+
+    quick: tuple[float, ...] = ()
+    full: tuple[float, ...] = halves(30.0, 1920.0)
+    quick_iterations: tuple[int, ...] = ()
+    full_iterations: tuple[int, ...] = ()
+
+    def dts(self, suite: Suite) -> tuple[float, ...]:
+        """Steps of a suite [s]; of a scene without quick ones three of the full ones, a quarter of the last each."""
+        return (self.quick or self.full[1:6:2]) if suite == "quick" else self.full
+
+    def counts(self, suite: Suite) -> tuple[int, ...]:
+        """Iteration counts of a suite."""
+        return self.quick_iterations if suite == "quick" else self.full_iterations
+
+
+@dataclass(frozen=True)
+class Member:
+    """A cell that ran, as a study sees it: ``params`` are complete, ``metrics`` what was measured."""
+
+    dimension: int
+    dt: float
+    params: Params
+    metrics: Mapping[str, Measured]
+
+
+#: What a study says: value, reason, and the check that judges it.
+Reduced = tuple[float | None, str, Check]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What several cells of a scene say together: a threshold, a supremum.
+
+    Parameters
+    ----------
+    name
+        Of its metric.
+    reduce
+        ``reduce(members)`` of cells that differ in parameters only; None if they do not allow it.
+    """
+
+    name: str
+    reduce: Callable[[Sequence[Member]], Reduced | None]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What tuning runs of a scene (`validation.tuning`).
+
+    Parameters
+    ----------
+    group
+        Scenes whose needs are alike are searched together: a profile has one set of settings for them.
+    cells, held_out
+        Parameters to search on, and those on which nothing may get worse.
+    starved
+        Iteration counts at which nothing may fail that passed, for profiles that have such a count.
+    """
+
+    group: str
+    cells: tuple[Params, ...]
+    held_out: tuple[Params, ...] = ()
+    starved: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Restitution:
+    """A metric that shows the restitution an engine realises, for the report's explorer.
+
+    Parameters
+    ----------
+    metric
+        Its name; of a series (``apex``) the name before the index.
+    asked
+        Parameter with the coefficient that is asked for.
+    scale
+        Parameter that the metric is relative to, or that it may depend on: a height, a speed.
+    heights
+        How many heights after bounces the series has; 0 if the metric is the ratio of speeds itself.
+    """
+
+    metric: str
+    asked: str
+    scale: str
+    heights: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
 class CanonicalScene:
-    """A scene of the catalogue.
+    """A scene of the catalogue; see the module's docstring.
 
     Parameters
     ----------
@@ -120,12 +287,35 @@ class CanonicalScene:
         ``exact(scene) -> {metric: truth}``, from the scene alone.
     measure
         ``measure(scene, trajectory) -> {metric: (value, reason)}``.
+    rule
+        ``rule(scene, dt, truth) -> [Check]``: the stated tolerances.
     sampling
         What has to be recorded.
     track
         Exact motion for the replay's ghost, or None.
-    rule
-        The stated tolerances, from `validation.tolerances`.
+    quick, full
+        Cells of the suites; without ``full`` both are the same.
+    representative
+        The cell that stands for the scene: its noise floor is measured and its motion is kept for the replay.
+    planted
+        Cells in which faults are planted (`validation.detection`): each check is stated by at least one of them.
+    primary, steps
+        The error by which a bench compares engines, and what it runs for it.
+    size
+        Parameter that is the number of its bodies, where a bench may scale it up.
+    smooth
+        Metrics that depend smoothly on the step, without an impact: a single cell per step has an order.
+    studies
+        What several of its cells say together.
+    searched
+        What tuning runs of it.
+    words
+        What a value of a metric means, in words with ``{value}`` for it, where `metrics.WORDS` does not say so; names
+        without their index. ``"rebound_ratio=0"`` is said of a value that is nothing.
+    seen_as
+        Of metrics that people know by another number: ``seen_as[metric](params, value)`` is that ratio.
+    restitution
+        What it tells the report's explorer of restitution.
     notes
         What was filled in or put right in a scene from a file, one line each; said wherever it is run or described.
     """
@@ -137,13 +327,40 @@ class CanonicalScene:
     law: str
     dimensions: tuple[int, ...]
     parameters: tuple[Parameter, ...]
-    make: Callable[[int, Mapping[str, float]], Scene]
+    make: Callable[[int, Params], Scene]
     exact: Callable[[Scene], dict[str, float]]
     measure: Callable[[Scene, Trajectory], dict[str, Measured]]
-    sampling: Callable[[Scene], Sampling]
-    track: Callable[[Scene], Track | None]
     rule: Callable[[Scene, float, dict[str, float]], list[Check]]
+    sampling: Callable[[Scene], Sampling]
+    track: Callable[[Scene], Track | None] = lambda scene: None
+    quick: tuple[Variation, ...] = (Variation({}),)
+    full: tuple[Variation, ...] = ()
+    representative: Params = field(default_factory=dict)
+    planted: tuple[Params, ...] = ()
+    primary: Primary | None = None
+    steps: Steps = Steps()
+    size: str | None = None
+    smooth: tuple[str, ...] = ()
+    studies: tuple[Study, ...] = ()
+    searched: Searched | None = None
+    words: Mapping[str, str] = field(default_factory=dict)
+    seen_as: Mapping[str, Callable[[Params, float], float]] = field(default_factory=dict)
+    restitution: Restitution | None = None
     notes: tuple[str, ...] = ()
+
+    def variations(self, suite: Suite) -> Sequence[Variation]:
+        """Cells of a suite."""
+        return self.quick if suite == "quick" or not self.full else self.full
+
+    def stands_for_it(self, params: Params) -> bool:
+        """Whether a cell with these parameters is the representative one."""
+        return self.complete(params) == self.complete(self.representative)
+
+    def minimal(self, params: Params) -> tuple[tuple[str, float], ...]:
+        """Parameters that differ from the defaults, validated and sorted, as a slot has them; raises as `complete`."""
+        complete = self.complete(params)
+        defaults = {parameter.name: parameter.default for parameter in self.parameters}
+        return tuple(sorted((name, value) for name, value in complete.items() if value != defaults[name]))
 
     def checks(self, scene: Scene, dt: float) -> list[Check]:
         """State all checks of ``scene`` at step ``dt`` [s]: truth, bound and reason.

@@ -20,7 +20,7 @@ from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
 from validation.canonical import CanonicalScene, Measured
-from validation.identity import adapter_hash
+from validation.identity import adapter_hash, scene_code
 from validation.posed import resolve
 
 #: Most iterations and units in the last place that can be asked for: C integers hold the first, and the second are
@@ -175,6 +175,7 @@ class Cell:
 
     slot: Slot
     scene_hash: str
+    scene_code: str
     engine_version: str
     adapter_hash: str
     settings_hash: str
@@ -275,7 +276,8 @@ def prepare(slot: Slot) -> Prepared:
     text = json.dumps([(s.name, plain(s.value)) for s in settings], sort_keys=True, default=str)
     settings_hash = hashlib.sha256(text.encode()).hexdigest()[:16]
     version = ".".join(platform.python_version_tuple()[:2])
-    cell = Cell(slot, scene.hash(), found.version, adapter_hash(slot.engine), settings_hash, version)
+    code = scene_code(slot.scene), found.version, adapter_hash(slot.engine)
+    cell = Cell(slot, scene.hash(), *code, settings_hash, version)
     return Prepared(canonical, scene, cell)
 
 

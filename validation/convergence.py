@@ -1,7 +1,7 @@
 """Whether an engine comes nearer to the truth as its step shrinks, and how fast.
 
 Two questions, two methods
-    * The declared error of a scene (`validation.bench.primary`, a supremum over the phases of its impacts) against
+    * The declared error of a scene (`validation.canonical.Primary`, a supremum over the phases of its impacts) against
       dt: a straight line in logarithms gives the observed order. A single phase gives no order at all.
     * A smooth metric (no impact in the scene) against dt: Richardson extrapolation from three steps of equal ratio r,
 
@@ -24,14 +24,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from validation.bench.primary import PRIMARY
 from validation.bench.work import accuracy
+from validation.bounds import ROUND_OFF
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import resolve
-from validation.tolerances import ROUND_OFF
 
-#: Metrics without an impact in their scene: smooth in dt, so that a single cell per step has an order.
-SMOOTH = {"incline": ("acceleration", "creep"), "stack": ("penetration",)}
 #: Three finest errors within this factor of each other, over steps at least a factor of four apart, have levelled off:
 #: even order 1/4 would part them by 4^(1/4) = 1.41.
 LEVEL = 1.35
@@ -62,7 +59,7 @@ class Order:
 class Convergence:
     """Declared error of one engine and profile on one scene, over steps.
 
-    ``dts`` descend [s]; ``errors`` as `validation.bench.primary` declares them; ``order`` is None where no line fits.
+    ``dts`` descend [s]; ``errors`` as the scene declares them; ``order`` is None where no line fits.
     """
 
     scene: str
@@ -193,7 +190,8 @@ def declared_errors(observations: Iterable[Observation]) -> dict[Series, dict[tu
     found: dict[Series, dict[tuple[float, int | None], float]] = defaultdict(dict)
     for series, settings in cells.items():
         for (dt, iterations), members in settings.items():
-            if len(members) == len(PRIMARY[series[0]].variations(dt)):
+            primary = resolve(series[0]).primary
+            if primary is not None and len(members) == len(primary.variations(dt)):
                 error = float(accuracy(list(members.values()))["error"])
                 if math.isfinite(error):
                     found[series][dt, iterations] = error
@@ -202,11 +200,11 @@ def declared_errors(observations: Iterable[Observation]) -> dict[Series, dict[tu
 
 def _is_variation(slot: Slot) -> bool:
     """Whether the slot is one of the cells whose worst error its scene declares."""
-    if slot.scene not in PRIMARY:
-        return False
     canonical = resolve(slot.scene)
+    if canonical.primary is None:
+        return False
     asked = canonical.complete(dict(slot.params))
-    return any(canonical.complete(params) == asked for params in PRIMARY[slot.scene].variations(slot.dt))
+    return any(canonical.complete(params) == asked for params in canonical.primary.variations(slot.dt))
 
 
 def convergence(observations: Iterable[Observation]) -> list[Convergence]:
@@ -226,7 +224,7 @@ def extrapolations(observations: Iterable[Observation]) -> list[Extrapolation]:
     for observation in observations:
         slot = observation.slot
         if slot.ulp == 0 and slot.iterations is None and observation.outcome is Outcome.OK:
-            for metric in SMOOTH.get(slot.scene, ()):
+            for metric in resolve(slot.scene).smooth:
                 anywhere = Slot(slot.scene, slot.params, slot.dimension, slot.engine, slot.profile, 1.0)
                 cells[anywhere, metric].setdefault(slot.dt, observation)
     found = [_extrapolated(slot, metric, steps) for (slot, metric), steps in cells.items() if len(steps) >= 3]

@@ -17,21 +17,12 @@ from adapters.needs import needs
 from adapters.planted_faults import SIZED, Planted
 from adapters.receipts import receipts
 from adapters.stepping import run
+from validation.catalogue import CATALOGUE
 from validation.plan import QUICK_DT
-from validation.scenes import CATALOGUE
 from validation.verdicts import Physics, judge_physics
 
 #: Ten per cent, one, and one in a thousand.
 SIZES = (0.1, 0.01, 0.001)
-#: Cells that stand for the scenes: each of their checks is stated by at least one of them.
-CELLS: tuple[tuple[str, Mapping[str, float]], ...] = (
-    ("impact", {"e": 0.8, "v": 6.0}),
-    ("bounce", {"e": 0.8}),
-    ("bounce", {"e": 1.0}),  # energy that a bounce adds shows only where it takes none away
-    ("stack", {"n": 2.0}),
-    ("incline", {"ratio": 0.9}),
-    ("incline", {"ratio": 1.1}),
-)
 
 
 @dataclass(frozen=True)
@@ -57,7 +48,8 @@ def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT
     One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault.
     """
     seen: dict[tuple[str, str, str], float | None] = {}
-    for scene, params in CELLS:
+    cells = [(name, params) for name, canonical in CATALOGUE.items() for params in canonical.planted]
+    for scene, params in cells:
         healthy = _watchers(engine, profile, scene, params, dimension, dt)
         for fault in SIZED:
             smallest: dict[str, float] = {}

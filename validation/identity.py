@@ -1,11 +1,18 @@
-"""What code and what machine an answer came from."""
+"""What code and what machine an answer came from.
+
+A cell's identity has two hashes of code: `adapter_hash`, of what stands between a scene and one engine's trajectory,
+and `scene_code`, of the scene's own file and what that measures with. Neither knows other engines or other scenes: who
+edits or adds one of those invalidates nothing else.
+"""
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
 import platform
 import subprocess
+from collections.abc import Iterable
 from functools import cache
 from importlib.machinery import PathFinder
 from importlib.metadata import entry_points
@@ -14,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.registry import GROUP
+from validation.catalogue import CATALOGUE, module_of
 
 
 def _hash_files(paths: list[Path]) -> str:
@@ -59,10 +67,48 @@ def adapter_hash(engine: str) -> str:
     return _hash_files(sorted({*shared, *own, *solver}))
 
 
+#: What runs and measures a cell of any scene.
+RUNNING = ("validation.execution", "validation.certification")
+
+
 @cache
-def code_hash() -> str:
-    """Hash of all our code that decides stored measurements (not of what judges or shows them)."""
-    return _hash_files([*_sources("adapters"), *_sources("reference_solver"), *_sources("validation")])
+def scene_code(scene: str) -> str:
+    """Hash of the code that makes and measures a scene: its own module, and what that imports of its package and ours.
+
+    All scene files share one: their text is part of their name.
+    """
+    module = module_of(scene) if scene in CATALOGUE else "validation.scene_files"
+    own = {"validation", module.partition(".")[0]}
+    found: dict[str, Path] = {}
+    left = [module]
+    while left:
+        name = left.pop()
+        path = None if name in found else located(name)
+        if path is not None and path.suffix == ".py":
+            found[name] = path
+            if name.partition(".")[0] in own:  # of the solver only what is imported itself: its geometry measures
+                left += [each for each in _imported(path) if each.partition(".")[0] in own | {"reference_solver"}]
+    return _hash_files([*found.values(), *(path for path in map(located, RUNNING) if path)])
+
+
+def _imported(path: Path) -> list[str]:
+    """Modules that a source file may import, by name; what turns out to be none is not located."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return names
+
+
+def code_hash(asked: Iterable[tuple[str, str]]) -> str:
+    """Hash of all our code that decides what is measured where these scenes run on these engines (scene, engine)."""
+    asked = list(asked)
+    registered = {entry.name for entry in entry_points(group=GROUP)}
+    scenes = sorted((scene, scene_code(scene)) for scene in {scene for scene, _ in asked})
+    engines = sorted((name, adapter_hash(name)) for name in {engine for _, engine in asked} & registered)
+    return hashlib.sha256(repr((scenes, engines)).encode()).hexdigest()[:16]
 
 
 def commit() -> str:

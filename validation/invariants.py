@@ -19,8 +19,8 @@ from adapters.engine import Array
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.trajectory import Trajectory
 from validation import metrics
+from validation.bounds import ROUND_OFF
 from validation.canonical import Check, Measured
-from validation.tolerances import ROUND_OFF
 
 
 def checks(scene: Scene, dt: float) -> list[Check]:

@@ -12,6 +12,23 @@ from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
 UNAVAILABLE = "the engine does not report contact impulses"
+#: Said of a rebound that is none.
+SILENT = "does not rebound"
+#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing. A
+#: scene has words of its own for metrics that are not here (`CanonicalScene.words`).
+WORDS = {
+    "rebound_ratio": "rebounds at {value}",
+    "rebound_ratio=0": SILENT,
+    "creep": "creeps at {value} where it should stick",
+    "acceleration": "slides with {value}",
+    "settle_time": "settles after {value}",
+    "drift": "drifts sideways by {value}",
+    "penetration": "overlaps by {value}",
+    "interface_impulse": "carries {value} of the weight above an interface",
+    "kinetic_energy": "keeps {value} of motion",
+    "impulse_scatter": "shakes: loads scatter by {value}",
+    "rest_time": "rests after {value}",
+}
 #: Begins the reason of a time that is only the end of the run: what has not come to rest has no time of rest.
 NEVER = "never settled"
 

@@ -1,59 +1,27 @@
-"""Which slots a run consists of.
+"""Which slots a run consists of: the cells that each scene declares, on every engine and profile.
 
 quick
-    dt 1/240; bounce heights at e = 0.8 only, one height for the other e; iteration sweep at n = 10 only.
+    dt 1/240; each scene's quick cells.
 full
-    dt from 1/60 to 1/960 by halves and each engine's customary step; all heights, all sweeps; representative
-    cells moved by 1 and 2 units in the last place (the floor that comparisons use).
+    dt from 1/60 to 1/960 by halves and each engine's customary step; each scene's full cells; representative cells
+    moved by 1 and 2 units in the last place (the floor that comparisons use).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
-from typing import Literal
 
 from adapters.engine import Engine, EngineError
 from adapters.needs import needs
 from adapters.registry import find
-from validation.canonical import CanonicalScene
+from validation.canonical import CanonicalScene, Suite, Variation
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size
 from validation.posed import pinned, resolve
-from validation.scenes import CATALOGUE
 
-Suite = Literal["quick", "full"]
 QUICK_DT = 1.0 / 240.0
 FULL_DT = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))
-#: Sixteen drop heights [m], 1 cm apart: about half a step of 1/240 s each, so that phases are spread.
-HEIGHTS = tuple(round(1.0 + 0.01 * k, 2) for k in range(16))
-STACK_SWEEP = (1, 4, 10, 30, 100)
-RATIOS = (0.5, 0.9, 0.99, 0.999, 1.001, 1.01, 1.1, 2.0)
-
-
-@dataclass(frozen=True)
-class Variation:
-    """Parameters of a cell, and the iteration counts to run it at (None: the profile's own)."""
-
-    params: Mapping[str, float]
-    iterations: tuple[int | None, ...] = (None,)
-
-
-def variations(scene: str, suite: Suite) -> list[Variation]:
-    """Parameter sets of a catalogue scene in a suite; a scene without a list runs once at its defaults."""
-    if scene == "impact":
-        grid = product((0.0, 0.2, 0.5, 0.8, 0.95, 1.0), (0.1, 1.0, 6.0, 50.0))
-        return [Variation({"e": e, "v": v}) for e, v in grid]
-    if scene == "bounce":
-        swept = (0.5, 0.8, 0.95, 1.0) if suite == "full" else (0.8,)
-        single = [Variation({"e": e, "height": HEIGHTS[0]}) for e in (0.5, 0.95, 1.0) if e not in swept]
-        return [Variation({"e": e, "height": h}) for e in swept for h in HEIGHTS] + single
-    if scene == "stack":
-        swept_n = (1, 2, 5, 10, 20) if suite == "full" else (10,)
-        return [Variation({"n": n}, (None, *STACK_SWEEP) if n in swept_n else (None,)) for n in (1, 2, 5, 10, 20)]
-    if scene == "incline":
-        return [Variation({"ratio": ratio}) for ratio in RATIOS]
-    return [Variation({})]
 
 
 @dataclass(frozen=True)
@@ -116,8 +84,10 @@ def _engine_slots(
     for profile in profiles:
         if request.profiles and profile not in request.profiles:
             continue
-        for variation in _variations(request, argument):
-            params = _minimal(canonical, variation.params)
+        for variation in _variations(request, canonical):
+            if not variation.runs_in(dimension):
+                continue
+            params = canonical.minimal(variation.params)
             for dt in _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
                 scene = canonical.scene(dimension, variation.params)
@@ -125,17 +95,8 @@ def _engine_slots(
                 if argument not in CATALOGUE:
                     canonical.checks(scene, dt)  # a scene that cannot be judged is refused before it runs
                 for iterations in _iterations(request, variation, engine, base):
-                    for ulp in (*request.ulps, *_moves(request, argument, variation, dt, iterations)):
+                    for ulp in (*request.ulps, *_moves(request, canonical, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)
-
-
-#: Parameters of the cell that stands for a scene: its noise floor is measured, its track is kept for replay.
-REPRESENTATIVE: dict[str, Mapping[str, float]] = {
-    "impact": {"e": 0.8, "v": 6.0},
-    "bounce": {"e": 0.8, "height": HEIGHTS[0]},
-    "stack": {"n": 10},
-    "incline": {"ratio": 1.1},
-}
 
 
 def in_quick_suite(slot: Slot) -> bool:
@@ -144,33 +105,22 @@ def in_quick_suite(slot: Slot) -> bool:
         return False
     canonical = CATALOGUE[slot.scene]
     return any(
-        slot.params == _minimal(canonical, variation.params) and slot.iterations in variation.iterations
-        for variation in variations(slot.scene, "quick")
+        slot.params == canonical.minimal(variation.params)
+        and slot.iterations in variation.iterations
+        and variation.runs_in(slot.dimension)
+        for variation in canonical.variations("quick")
     ) or (slot.iterations is None and not slot.params)
 
 
-def is_representative(scene: str, params: Mapping[str, float]) -> bool:
-    """Whether a cell with these parameters (any subset of a suite's) stands for its scene."""
-    canonical = resolve(scene)
-    return canonical.complete(params) == canonical.complete(REPRESENTATIVE.get(scene, {}))
-
-
-def _moves(request: Request, scene: str, variation: Variation, dt: float, iterations: int | None) -> tuple[int, ...]:
-    wanted = request.floors and dt == QUICK_DT and iterations is None and is_representative(scene, variation.params)
+def _moves(
+    request: Request, canonical: CanonicalScene, variation: Variation, dt: float, iterations: int | None
+) -> tuple[int, ...]:
+    wanted = request.floors and dt == QUICK_DT and iterations is None and canonical.stands_for_it(variation.params)
     return (1, 2) if wanted else ()
 
 
-def _variations(request: Request, scene: str) -> list[Variation]:
-    if request.params:
-        return [Variation(request.params)]
-    return variations(scene, request.suite)
-
-
-def _minimal(canonical: CanonicalScene, params: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
-    """Parameters that differ from the scene's defaults, validated and sorted."""
-    complete = canonical.complete(params)
-    defaults = {parameter.name: parameter.default for parameter in canonical.parameters}
-    return tuple(sorted((name, value) for name, value in complete.items() if value != defaults[name]))
+def _variations(request: Request, canonical: CanonicalScene) -> Sequence[Variation]:
+    return [Variation(request.params)] if request.params else canonical.variations(request.suite)
 
 
 def _steps(request: Request, engine: Engine | None, profile: str) -> Iterable[float]:

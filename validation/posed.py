@@ -15,8 +15,8 @@ from pathlib import Path
 
 from adapters.plain import is_visible, one_line
 from adapters.scene import SceneError
-from validation.canonical import CanonicalScene
-from validation.scenes import CATALOGUE, matching
+from validation.canonical import CanonicalScene, Primary
+from validation.catalogue import CATALOGUE, matching
 
 _FILE = re.compile(r"(?P<path>.+\.(?:toml|json))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
 #: Texts of pinned scene files by pinned name.
@@ -92,3 +92,18 @@ def resolve(argument: str) -> CanonicalScene:
         name = pinned(argument)
         return canonical_from_text(_texts[name], Path(name.rpartition("@")[0]))
     return matching(argument)[0]
+
+
+def primary_of(argument: str) -> Primary:
+    """Return the declared error of a scene.
+
+    Raises
+    ------
+    SceneError
+        If none is declared: a bench needs one number, and a scene from a file has no truth to take it from.
+    """
+    found = resolve(argument).primary
+    if found is None:
+        declared = [name for name, scene in CATALOGUE.items() if scene.primary]
+        raise SceneError(f"scene: no primary error is declared for {argument!r}, only for {', '.join(declared)}")
+    return found

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from validation.cells import Observation, Slot
 from validation.experiments import Experiment
-from validation.plan import variations
-from validation.studies import STUDIES
-from validation.switching import Reading, observe, reading, switched
+from validation.posed import resolve
+from validation.studies import results_of, study_of
+from validation.switching import Reading, observe, reading, readings, switched
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ def _versions(engine: str, experiment: Experiment) -> list[Slot]:
 
 def _cells(slot: Slot, metric: str) -> list[Slot]:
     """Cells that a metric is read from: the slot itself, or all cells of a study."""
-    if not any(study.name == metric and study.scene == slot.scene for study in STUDIES):
+    if study_of(slot.scene, metric) is None:
         return [slot]
-    return [slot.with_params(dict(variation.params)) for variation in variations(slot.scene, "quick")]
+    return [slot.with_params(variation.params) for variation in resolve(slot.scene).variations("quick")]
 
 
 def _proof(engine: str, experiment: Experiment, seen: dict[Slot, Observation]) -> Proof:
@@ -91,9 +91,9 @@ def _read(slot: Slot, metric: str, seen: dict[Slot, Observation]) -> Reading:
     cells = _cells(slot, metric)
     if cells == [slot]:
         return reading(seen[slot], metric)
-    (study,) = (study for study in STUDIES if study.name == metric)
-    results = list(study.results(seen[cell] for cell in cells))
-    if not results:
-        check = next(iter(reading(seen[cells[0]], name).check for name in ("creep",)))
-        return Reading(slot, check, None, "the study's cells have no answer")
-    return Reading(slot, results[0].check, results[0].value, results[0].reason)
+    study = study_of(slot.scene, metric)
+    assert study is not None
+    found = list(results_of(study, resolve(slot.scene), [seen[cell] for cell in cells]))
+    if not found:
+        return Reading(slot, readings(seen[cells[0]])[0].check, None, "the study's cells have no answer")
+    return Reading(slot, found[0].check, found[0].value, found[0].reason)

@@ -17,7 +17,7 @@ from validation.deviations import covering
 from validation.findings import Known, known_of
 from validation.findings.files import findings_of
 from validation.posed import is_file, resolve
-from validation.studies import STUDIES, StudyResult
+from validation.studies import StudyResult, results
 from validation.verdicts import (
     Physics,
     Prediction,
@@ -101,7 +101,7 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
         if not observation.slot.ulp:
             judged = _cell_rows(run, observation)
             rows += [replace(row, floor=_floor(row, moved[observation.slot])) for row in judged]
-    return rows + [_study_row(run, result) for study in STUDIES for result in study.results(observations)]
+    return rows + [_study_row(run, result) for result in results(observations)]
 
 
 def _missing(slot: Slot) -> Observation:

@@ -66,20 +66,19 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     read = stated_from_text(text, path)
     scene = read.scene
     return CanonicalScene(
-        scene.name,
-        scene.version,
-        f"Scene file {path.name}",
-        "",
-        "no closed form; energy never grows, bodies do not pass into each other",
-        (scene.dimension,),
-        (),
-        lambda dimension, params: scene,
-        lambda scene: _exact(read),
-        lambda scene, trajectory: _measure(read, trajectory),
-        lambda scene: Sampling(1, scene.duration - force_window(scene)),
-        lambda scene: None,
-        lambda scene, dt, truth: _checks(read, dt),
-        read.notes,
+        name=scene.name,
+        version=scene.version,
+        title=f"Scene file {path.name}",
+        figure="",
+        law="no closed form; energy never grows, bodies do not pass into each other",
+        dimensions=(scene.dimension,),
+        parameters=(),
+        make=lambda dimension, params: scene,
+        exact=lambda scene: _exact(read),
+        measure=lambda scene, trajectory: _measure(read, trajectory),
+        rule=lambda scene, dt, truth: _checks(read, dt),
+        sampling=lambda scene: Sampling(1, scene.duration - force_window(scene)),
+        notes=read.notes,
     )
 
 

@@ -155,7 +155,9 @@ class Store:
         The run, and the keys of the slots it already has.
         """
         plan = [slot.key() for slot in slots]
-        plan_hash = hashlib.sha256(json.dumps([sorted(plan), code_hash()]).encode()).hexdigest()[:16]
+        plan_hash = hashlib.sha256(
+            json.dumps([sorted(plan), code_hash((s.scene, s.engine) for s in slots)]).encode()
+        ).hexdigest()[:16]
         made = json.dumps(machine()), title, json.dumps(plan), plan_hash
         here = commit()
         query = "SELECT id FROM runs WHERE plan_hash = ? AND finished = 0 ORDER BY rowid DESC LIMIT 1"

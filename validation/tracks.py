@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO
 
@@ -24,14 +24,12 @@ from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import CanonicalScene
 from validation.cells import Slot
 from validation.plan import QUICK_DT
+from validation.posed import resolve
 
 #: Frames per second: what a screen shows.
 RATE = 60.0
 #: Fewest frames of a recording: an impact scene lasts half a second only.
 FRAMES = 120
-#: Parameters of the cell that is recorded, where the scene's defaults show too little: a column that starves an
-#: iterating solver, a box that slides.
-SHOWN: Mapping[str, tuple[tuple[str, float], ...]] = {"stack": (("n", 10.0),), "incline": (("ratio", 1.1),)}
 _LEVELS = 2**15 - 1
 
 
@@ -97,7 +95,7 @@ def _quantised(name: str, values: Array) -> dict[str, NDArray[np.generic]]:
 def representatives(slots: Iterable[Slot]) -> set[Slot]:
     """Slots whose motion is kept: per scene and dimension the same parameters and step for every profile.
 
-    Preferred are the parameters of `SHOWN` (else the scene's defaults), dt = 1/240 and the profile's own iterations;
+    Preferred is the scene's representative cell at dt = 1/240 and the profile's own iterations;
     a plan without such a slot keeps what comes closest.
     """
     chosen: dict[tuple[str, int], dict[tuple[str, str], Slot]] = {}
@@ -113,7 +111,9 @@ def representatives(slots: Iterable[Slot]) -> set[Slot]:
 def _distance(slot: Slot) -> tuple[bool, float, bool, int]:
     """How far a slot is from the preferred one; ties keep the order of the plan."""
     own = slot.iterations is None
-    return slot.params != SHOWN.get(slot.scene, ()), abs(math.log(slot.dt / QUICK_DT)), not own, -(slot.iterations or 0)
+    canonical = resolve(slot.scene)
+    other = slot.params != canonical.minimal(canonical.representative)
+    return other, abs(math.log(slot.dt / QUICK_DT)), not own, -(slot.iterations or 0)
 
 
 def record(canonical: CanonicalScene, scene: Scene, trajectory: Trajectory) -> Recording:

@@ -20,6 +20,7 @@ from typing import Any
 
 from adapters.needs import needs
 from adapters.registry import load
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Slot, settings_of
 from validation.experiments import candidates_of
 from validation.plan import QUICK_DT, has_iterations
@@ -27,24 +28,6 @@ from validation.posed import resolve
 from validation.switching import Reading, observe, readings, switched
 
 Cells = tuple[tuple[str, Mapping[str, float]], ...]
-#: Groups of scenes whose needs are alike, so that a profile has one set of settings for each.
-SEARCHED: dict[str, Cells] = {
-    "impact": (
-        *(("impact", {"e": e, "v": v}) for e, v in ((0.0, 1.0), (0.5, 6.0), (1.0, 1.0))),
-        *(("bounce", {"e": e, "height": 1.0}) for e in (0.5, 1.0)),
-        *(("bounce", {"height": height}) for height in (1.03, 1.1)),
-    ),
-    "stand": tuple(("stack", {"n": float(n)}) for n in (1, 2, 10)),
-    "slide": tuple(("incline", {"ratio": ratio}) for ratio in (0.5, 0.999, 1.001, 1.1, 2.0)),
-}
-HELD_OUT: dict[str, Cells] = {
-    "impact": (("impact", {"e": 0.2, "v": 50.0}), ("bounce", {"height": 1.07}), ("bounce", {"e": 1.0, "height": 1.05})),
-    "stand": (("stack", {}), ("stack", {"n": 20.0})),
-    "slide": tuple(("incline", {"ratio": ratio}) for ratio in (0.9, 0.99, 1.01, 1.5)),
-}
-#: Iterations at which the cells of a group must not fail where they passed, for profiles that have such a count: a
-#: setting that needs a solution to the end is no better one.
-STARVED: dict[str, tuple[int, ...]] = {"stand": (1, 10)}
 #: Least gain of the summed decades of error over tolerance that counts: a tenth of a decade is a quarter of an error.
 GAIN = 0.1
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
@@ -104,10 +87,32 @@ def slots_of(engine: str, profile: str, cells: Cells, dimensions: Sequence[int])
     """Slots of cells in every dimension."""
     found = []
     for scene, params in cells:
-        defaults = {parameter.name: parameter.default for parameter in resolve(scene).parameters}
-        differing = tuple(sorted((name, value) for name, value in params.items() if value != defaults[name]))
-        found += [Slot(scene, differing, dimension, engine, profile, QUICK_DT) for dimension in dimensions]
+        canonical = resolve(scene)
+        own = [dimension for dimension in dimensions if dimension in canonical.dimensions]
+        found += [Slot(scene, canonical.minimal(params), dimension, engine, profile, QUICK_DT) for dimension in own]
     return found
+
+
+def groups() -> list[str]:
+    """Groups of scenes that are searched together, as the scenes declare them (`validation.canonical.Searched`)."""
+    return list(dict.fromkeys(scene.searched.group for scene in CATALOGUE.values() if scene.searched))
+
+
+def cells_of(group: str, held_out: bool = False) -> Cells:
+    """Cells of a group: those to search on, or those on which nothing may get worse.
+
+    Raises
+    ------
+    KeyError
+        For an unknown group.
+    """
+    if group not in groups():
+        raise KeyError(group)
+    return tuple(
+        (name, params)
+        for name, scene in CATALOGUE.items() if scene.searched and scene.searched.group == group
+        for params in (scene.searched.held_out if held_out else scene.searched.cells)
+    )  # fmt: skip
 
 
 Progress = Callable[[Mapping[str, Any], Score], None]
@@ -157,9 +162,9 @@ def search(
     EngineError
         For an unknown engine or profile.
     """
-    bench = _Bench(slots_of(engine, profile, SEARCHED[group], dimensions), jobs)
-    held = _Bench(slots_of(engine, profile, HELD_OUT[group], dimensions), jobs)
-    starved = _Bench(_starved(bench.slots, group), jobs)
+    bench = _Bench(slots_of(engine, profile, cells_of(group), dimensions), jobs)
+    held = _Bench(slots_of(engine, profile, cells_of(group, held_out=True), dimensions), jobs)
+    starved = _Bench(_starved(bench.slots), jobs)
     start, start_held, start_starved = bench.readings({}), held.readings({}), starved.readings({})
     changes: dict[str, Any] = {}
     best, trials = score(start), []
@@ -215,10 +220,13 @@ def _own(slot: Slot, name: str) -> Any:
     return {setting.name: setting.value for setting in settings_of(found, slot, scene)}.get(name)
 
 
-def _starved(slots: Sequence[Slot], group: str) -> list[Slot]:
-    """The group's cells with fewer iterations, for profiles that stop at a count."""
-    counted = [slot for slot in slots if has_iterations(load(slot.engine), slot)]
-    return [replace(slot, iterations=count) for slot in counted for count in STARVED.get(group, ())]
+def _starved(slots: Sequence[Slot]) -> list[Slot]:
+    """Cells with the fewer iterations that their scenes declare, for profiles that stop at a count.
+
+    A setting that needs a solution to the end is no better one.
+    """
+    counted = [(slot, CATALOGUE[slot.scene].searched) for slot in slots if has_iterations(load(slot.engine), slot)]
+    return [replace(slot, iterations=n) for slot, searched in counted if searched for n in searched.starved]
 
 
 def _holds(before: Sequence[Reading], after: Sequence[Reading]) -> bool:

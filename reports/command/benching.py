@@ -29,10 +29,10 @@ from reports.stages import stage
 from reports.terminal import terminal
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
-from validation.bench.primary import PRIMARY
-from validation.bench.sweep import Sweep, accuracy_slots, timed_units
+from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
 from validation.bench.units import Unit, prepared
 from validation.cells import Outcome, Slot, parse_dt
+from validation.posed import primary_of
 from validation.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
@@ -63,6 +63,8 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
     options["full"] = not options["quick"]
     request = replace(request_from(options), ulps=(0,))
+    if not options["scenes"]:
+        request = replace(request, scenes=benched(request.suite))
     wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
     cells = accuracy_slots(wanted)
     if not cells:
@@ -88,7 +90,8 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
         sys.exit(statuses.INCOMPLETE)
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
-        _time(store, run, timed_units(wanted, store.observations(run)), limits, seed, console)
+        units = timed_units(wanted, store.observations(run))
+        _time(store, run, request.scenes, units, limits, seed, console)
     store.finish(run)
     _show(store, run, out, as_json, brief, console)
     agrees = _compare(store, earlier, run, console) if earlier else True
@@ -106,7 +109,9 @@ def _earlier(store: Store, name: str | None) -> Run | None:
     return found[-1]
 
 
-def _time(store: Store, run: Run, units: Sequence[Unit], limits: Limits, seed: int, console: Console) -> None:
+def _time(
+    store: Store, run: Run, scenes: Sequence[str], units: Sequence[Unit], limits: Limits, seed: int, console: Console
+) -> None:
     console.print(f"timing {len(units)} units, one at a time, in random order (seed {seed})", highlight=False)
     started, load = time.monotonic(), os.getloadavg()
     store.clear_timings(run)
@@ -123,8 +128,8 @@ def _time(store: Store, run: Run, units: Sequence[Unit], limits: Limits, seed: i
         "clock": "CPU time of the process (all threads), cost of reading the clock taken off; wall time beside it",
         "unit": "build outside the clock, warm, then one call advance(n); 'sampled': one step at a time, state read",
         "primary": {
-            scene: {name: getattr(p, name) for name in ("name", "unit", "law", "because", "state")}
-            for scene, p in PRIMARY.items()
+            scene: {name: getattr(primary_of(scene), name) for name in ("name", "unit", "law", "because", "state")}
+            for scene in scenes
         },
         "lane_seconds": round(time.monotonic() - started, 1),
         "load_before": load,

@@ -11,7 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from adapters import registry
-from validation.scenes import CATALOGUE
+from validation.catalogue import CATALOGUE
 
 
 def scene_names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -16,13 +16,21 @@ from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
 from validation.decisive import FILE, measure_all, measured_of, write
 from validation.experiments import candidates_of, cured_of
-from validation.tuning import SEARCHED, Score, Search, search
+from validation.tuning import Score, Search, groups, search
+
+
+def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Groups that are searched, as a user named them."""
+    unknown = sorted(set(names) - set(groups())) if names else []
+    if unknown:
+        raise click.BadParameter(f"{unknown[0]!r} is not one of {', '.join(groups())}")
+    return names
 
 
 @main.command()
 @click.argument("engine")
 @click.option("--profile", default="tuned", show_default=True, help="Profile to start from.")
-@click.option("--group", multiple=True, type=click.Choice(list(SEARCHED)), help="Scenes of one kind; all by default.")
+@click.option("--group", multiple=True, callback=known_groups, help="Scenes of one kind; all by default.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--decisive", "which", is_flag=True, help="Measure which settings of its cures matter, and keep it.")
@@ -47,7 +55,7 @@ def tune(
     known = load(engine).facts.dimensions
     dimensions = dim or ((2,) if known == {2} else (2, 3))
     found = []
-    for name in group or SEARCHED:
+    for name in group or groups():
 
         def said(changes: Mapping[str, Any], score: Score) -> None:
             console.print(f"  {_text(changes)}: {_score(score)}", markup=False, highlight=False, style="dim")

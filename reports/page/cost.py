@@ -28,8 +28,8 @@ from reports.page.source import Bench, Source
 from reports.page.verdicts import slug
 from reports.speed import duration
 from reports.wording import number, reproduce
-from validation.bench.primary import PRIMARY
 from validation.cells import format_dt
+from validation.posed import primary_of
 
 Plain = Mapping[Hashable, Any]
 
@@ -116,7 +116,7 @@ def _cheapest(table: pd.DataFrame) -> tuple[list[tuple[str, str, list[LevelCell]
         for level in levels:
             found = group[(group["level"] == level) & group["tied"]].sort_values("cost")
             cells.append(_cheapest_cell(found.to_dict("records")))
-        out.append((f"{scene} {dimension}-D", PRIMARY[str(scene)].name, cells))
+        out.append((f"{scene} {dimension}-D", primary_of(str(scene)).name, cells))
     return out, [level_text(level) for level in levels]
 
 
@@ -147,7 +147,7 @@ def _level_tables(table: pd.DataFrame, column: str, smallest: float, ranked: boo
             rows.append((str(engine), str(profile), [_level_cell(by_level[level], column, ranked) for level in levels]))
         names = [level_text(level) if column == "cost" else duration(level) for level in levels]
         anchor = slug("level", column, scene, dimension)
-        out.append(LevelTable(anchor, str(scene), int(str(dimension)), PRIMARY[str(scene)].name, names, rows))
+        out.append(LevelTable(anchor, str(scene), int(str(dimension)), primary_of(str(scene)).name, names, rows))
     return out
 
 
@@ -176,7 +176,7 @@ def _multiples(bench: Bench) -> list[Figure]:
 
 
 def _multiple(scene: str, dimension: int, table: pd.DataFrame) -> Figure:
-    primary, style = PRIMARY[scene], styled(table)
+    primary, style = primary_of(scene), styled(table)
     x_scale, x_ticks = log_scale([*table["cost_low"], *table["cost_high"]], 1.3)
     y_scale, axis, _ = error_axis(list(table["shown"]), with_unit(primary.name, primary.unit), 3.0)
     x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", x_ticks))

@@ -1,4 +1,7 @@
-"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; effective against asked restitution."""
+"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; effective against asked restitution.
+
+Which metrics of which scenes show a restitution, the scenes say (`validation.canonical.Restitution`).
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,8 @@ from reports.page.figures import Figure
 from reports.page.source import Plain, Source
 from reports.palette import colours_of, shape_of
 from reports.wording import number
+from validation.canonical import Restitution
 from validation.posed import resolve
-from validation.tolerances import APEXES
 
 #: Materials that people know, with the coefficient that is usually quoted for them.
 PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
@@ -45,11 +48,20 @@ class Explorer:
     maps: list[Figure]
     effective: list[Effective]
     answers: list[str]
+    scene: str
+
+
+def _shown(source: Source, series: bool) -> tuple[str, Restitution] | None:
+    """First scene of the run that shows restitution as a series of heights, or as a ratio of speeds."""
+    told = ((scene, resolve(scene).restitution) for scene in source.scenes)
+    return next(((scene, found) for scene, found in told if found and bool(found.heights) is series), None)
 
 
 def explorer(source: Source) -> Explorer | None:
-    """None if the run has no bounce and no impact."""
-    heights, rebounds = _heights(source), _rebounds(source)
+    """None if no scene of the run shows restitution."""
+    bounced, struck = _shown(source, True), _shown(source, False)
+    heights = _heights(source, *bounced) if bounced else {}
+    rebounds = _rebounds(source, *struck) if struck else []
     if not heights and not rebounds:
         return None
     colours = colours_of(source.engines)
@@ -61,21 +73,23 @@ def explorer(source: Source) -> Explorer | None:
         for engine, profile in source.columns if heights.get((engine, profile))
     ]  # fmt: skip
     measured = sorted({float(e) for entry in series for e in entry["heights"]})
-    data = {"presets": PRESETS, "faint": FAINT, "apexes": APEXES, "measured": measured, "series": series}
-    return Explorer(
-        data, _picture(heights, 0.8), _maps(rebounds), _effective(rebounds, source.columns), _answers(rebounds)
-    )
+    shown = bounced[1].heights if bounced else 0
+    data = {"presets": PRESETS, "faint": FAINT, "apexes": shown, "measured": measured, "series": series}
+    effective = _effective(rebounds, source.columns)
+    said = _answers(rebounds)
+    return Explorer(data, _picture(heights, 0.8), _maps(rebounds), effective, said, struck[0] if struck else "")
 
 
-def _heights(source: Source) -> dict[tuple[str, str], dict[float, list[float]]]:
+def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
     """Mean apex heights over drop heights, h_n/h0 for n = 1.., by engine and profile and restitution (planar first)."""
     sums: dict[tuple[str, str], dict[float, dict[int, list[float]]]] = defaultdict(lambda: defaultdict(dict))
-    rows = [r for r in source.of(scene="bounce") if r["metric"].startswith("apex[") and r["value"] is not None]
+    first = f"{shown.metric}["
+    rows = [r for r in source.of(scene=scene) if r["metric"].startswith(first) and r["value"] is not None]
     for row in sorted(rows, key=lambda r: r["dimension"]):
-        place = sums[row["engine"], row["profile"]][row["params"]["e"]]
-        n = int(row["metric"][5:-1])
+        place = sums[row["engine"], row["profile"]][row["params"][shown.asked]]
+        n = int(row["metric"][len(first) : -1])
         if row["iterations"] is None and row["dimension"] == min(r["dimension"] for r in rows):
-            place.setdefault(n, []).append(row["value"] / row["params"]["height"])
+            place.setdefault(n, []).append(row["value"] / row["params"][shown.scale])
     found: dict[tuple[str, str], dict[float, list[float]]] = defaultdict(dict)
     for column, by_e in sums.items():
         for e, by_n in by_e.items():
@@ -84,10 +98,13 @@ def _heights(source: Source) -> dict[tuple[str, str], dict[float, list[float]]]:
     return found
 
 
-def _rebounds(source: Source) -> list[Plain]:
-    """Rebound ratios of the impact scene: a zero-gravity scene, so that the ratio is the restitution."""
-    rows = source.of(scene="impact", metric="rebound_ratio")
-    return [row for row in rows if row["value"] is not None and row["iterations"] is None]
+def _rebounds(source: Source, scene: str, shown: Restitution) -> list[Plain]:
+    """Ratios of speeds with what they were asked to be and the speed: ``asked``, ``got``, ``speed``."""
+    rows = source.of(scene=scene, metric=shown.metric)
+    return [
+        {**row, "asked": row["params"][shown.asked], "got": row["value"], "speed": row["params"][shown.scale]}
+        for row in rows if row["value"] is not None and row["iterations"] is None
+    ]  # fmt: skip
 
 
 def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]], e: float) -> Figure:
@@ -122,15 +139,15 @@ def _maps(rebounds: Sequence[Plain]) -> list[Figure]:
     if not rebounds:
         return []
     dimension = min(row["dimension"] for row in rebounds)
-    speeds = sorted({row["params"]["v"] for row in rebounds})
-    return [_map([r for r in rebounds if r["params"]["v"] == v and r["dimension"] == dimension], v) for v in speeds]
+    speeds = sorted({row["speed"] for row in rebounds})
+    return [_map([r for r in rebounds if r["speed"] == v and r["dimension"] == dimension], v) for v in speeds]
 
 
 def _map(rows: Sequence[Plain], speed: float) -> Figure:
     table = pd.DataFrame(
         {
-            "engine": row["engine"], "profile": row["profile"], "asked": row["params"]["e"], "got": row["value"],
-            "label": f"{row['engine']}/{row['profile']}: asked {row['params']['e']:g}, got {number(row['value'], 4)}",
+            "engine": row["engine"], "profile": row["profile"], "asked": row["asked"], "got": row["got"],
+            "label": f"{row['engine']}/{row['profile']}: asked {row['asked']:g}, got {number(row['got'], 4)}",
         }
         for row in rows
     )  # fmt: skip
@@ -159,8 +176,8 @@ def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) ->
     found = []
     for engine, profile in columns:
         own = [row for row in rebounds if (row["engine"], row["profile"]) == (engine, profile)]
-        for e in sorted({row["params"]["e"] for row in own}):
-            values = [(row["value"], row["params"]["v"]) for row in own if row["params"]["e"] == e]
+        for e in sorted({row["asked"] for row in own}):
+            values = [(row["got"], row["speed"]) for row in own if row["asked"] == e]
             speeds = ", ".join(f"{v:g}" for v in sorted({speed for _, speed in values}))
             found.append(Effective(engine, profile, e, min(values)[0], max(values)[0], speeds))
     return found
@@ -168,12 +185,11 @@ def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) ->
 
 def _answers(rebounds: Sequence[Plain]) -> list[str]:
     """For each engine as shipped that misses: how wrong its restitution is at the scene's own values, and the cure."""
-    defaults = {p.name: p.default for p in resolve("impact").parameters}
+    own = [row for row in rebounds if not row["slot"]["params"]]
     said = []
-    own = [r for r in rebounds if all(r["params"][k] == defaults[k] for k in ("e", "v"))]
     for engine in dict.fromkeys(row["engine"] for row in own):
-        values = {row["profile"]: row["value"] for row in own if row["engine"] == engine}
-        shipped, asked = values.get("default"), defaults["e"]
+        values = {row["profile"]: row["got"] for row in own if row["engine"] == engine}
+        shipped, asked = values.get("default"), own[0]["asked"]
         if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
             continue
         better = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}

@@ -30,9 +30,9 @@ from reports.page.charts import (
 )
 from reports.speed import duration
 from reports.wording import number
-from validation.bench.primary import PRIMARY
 from validation.cells import format_dt
 from validation.convergence import Convergence
+from validation.posed import primary_of
 
 #: Said of charts in which marks were moved.
 DODGED = "Marks that coincide stand side by side; below 1e-6 an error counts as exact."
@@ -76,7 +76,7 @@ def error_against_step(entries: Iterable[Convergence], scene: str, dimension: in
     table = pd.DataFrame(rows)
     if len(table) == 0 or table["dt"].nunique() < 2:
         return None
-    primary = PRIMARY[scene]
+    primary = primary_of(scene)
     ticks = sorted(set(table["dt"]))
     names = " : ".join(f"abs(datum.value - {dt!r}) < 1e-9 ? '{format_dt(dt)}'" for dt in ticks) + " : ''"
     scale = alt.Scale(type="log", domain=[ticks[0] / 1.25, ticks[-1] * 1.25], nice=False)
@@ -120,7 +120,7 @@ def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure |
     table = table[table["cost"].notna() & table["error"].notna()]
     if len(table) == 0:
         return None
-    primary = PRIMARY[scene]
+    primary = primary_of(scene)
     table["shown"] = gutter(table["error"])
     table["label"] = [_point_text(row) for row in table.to_dict("records")]
     x_scale, x_ticks = log_scale([*table["cost_low"], *table["cost_high"]], 1.2)

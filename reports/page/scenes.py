@@ -15,8 +15,7 @@ from reports.page.figures import Figure
 from reports.page.source import Source
 from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
 from reports.wording import number
-from validation.bench.primary import PRIMARY, Primary
-from validation.canonical import CanonicalScene
+from validation.canonical import CanonicalScene, Primary
 from validation.cells import Observation, format_dt
 from validation.convergence import Convergence, Extrapolation, convergence, declared_errors, extrapolations
 from validation.plan import QUICK_DT
@@ -68,7 +67,7 @@ def _section(
         slug("scene", scene),
         canonical,
         *split_figure(canonical.figure),
-        PRIMARY.get(scene),
+        canonical.primary,
         [scene_verdicts(source, scene, dimension) for dimension in dimensions],
         [row for row in rows if row],
         [entry for entry in orders if entry.scene == scene],
@@ -89,9 +88,9 @@ def _iteration_table(observations: Sequence[Observation]) -> pd.DataFrame:
 
 def _iterations(errors: pd.DataFrame, scene: str, dimension: int) -> Figure | None:
     table = errors[(errors["scene"] == scene) & (errors["dimension"] == dimension)]
-    if scene not in PRIMARY:
+    primary = resolve(scene).primary
+    if primary is None:
         return None
-    primary = PRIMARY[scene]
     return figures.error_against_iterations(table, scene, dimension, QUICK_DT, with_unit(primary.name, primary.unit))
 
 

@@ -1,10 +1,14 @@
 """Detection power: every planted fault is caught by a named receipt or check that the healthy toy passes."""
 
+import math
+
+import numpy as np
 import pytest
 
 from adapters.conformance import CHECKS
+from adapters.lift import lower_pose
 from adapters.needs import Needs
-from adapters.planted_faults import CAUGHT_BY
+from adapters.planted_faults import CAUGHT_BY, _turned
 from adapters.receipts import receipts
 
 #: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
@@ -65,3 +69,12 @@ def test_healthy_toy_holds_every_receipt_in_both_dimensions(toy, dt):
     for dimension in (2, 3):
         needs = Needs(dimension, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81)
         assert [slip for slip in receipts(engine, "default", needs, dt) if not slip.holds] == []
+
+
+def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
+    """A turn from x towards the vertical, whatever the pose was before."""
+    half = 0.3
+    pose = np.array([[1.0, 0.0, 2.0, math.cos(half), 0.0, -math.sin(half), 0.0]])
+    lowered, outside = lower_pose(_turned(pose, 0.25))
+    assert lowered[0] == pytest.approx([1.0, 2.0, 2.0 * half + 0.25], abs=1e-15) and outside == 0.0
+    assert _turned(lowered, -0.25)[0, 2] == pytest.approx(2.0 * half, abs=1e-15)

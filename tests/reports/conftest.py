@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from adapters.trajectory import load_trajectory
-from validation.bench.primary import PRIMARY
 from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot, prepare
 from validation.execution import execute
+from validation.posed import primary_of
 from validation.store import Store
 from validation.tracks import record, representatives
 
@@ -64,7 +64,7 @@ def _bench(store: Store) -> None:
     dts = (1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)
     slots = [
         Slot("impact", tuple(params.items()), 2, *who, dt)
-        for who in SERIES for dt in dts for params in PRIMARY["impact"].variations(dt)
+        for who in SERIES for dt in dts for params in primary_of("impact").variations(dt)
     ]  # fmt: skip
     run, _ = store.start("bench quick: impact", slots)
     for slot in slots:
@@ -72,7 +72,7 @@ def _bench(store: Store) -> None:
     timings = []
     for k, (engine, profile) in enumerate(SERIES):
         for dt in dts:
-            first = Slot("impact", tuple(PRIMARY["impact"].variations(dt)[0].items()), 2, engine, profile, dt)
+            first = Slot("impact", tuple(primary_of("impact").variations(dt)[0].items()), 2, engine, profile, dt)
             timings += _timings("work", first, round(0.5 / dt), (k + 1) * 1e-5 / dt)
         for scene in ("empty", "flight"):
             timings += _timings("overhead", Slot(scene, (), 2, engine, profile, DT), 100, (k + 1) * 1e-4)

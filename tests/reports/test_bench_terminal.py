@@ -11,9 +11,8 @@ from rich.console import Console
 from reports import speed
 from reports.command import benching
 from validation.bench import timing as timings
-from validation.bench.primary import PRIMARY
 from validation.cells import Observation, Outcome, Slot
-from validation.posed import resolve
+from validation.posed import primary_of, resolve
 from validation.store import Store
 
 DT, STEPS = 1 / 240, 100
@@ -44,7 +43,7 @@ def printed(tmp_path):
     def show(busy=()):
         store = Store(tmp_path / f"results-{len(stores)}")
         stores.append(store)
-        delays = [variation["delay"] for variation in PRIMARY["impact"].variations(DT)]
+        delays = [variation["delay"] for variation in primary_of("impact").variations(DT)]
         truth = resolve("impact").complete({})["e"]
         cells = [
             Observation(slot_of(engine, delay), f"{engine} {delay}", 1, "1.0", Outcome.OK,

@@ -7,7 +7,7 @@ import shlex
 import pytest
 
 from reports.wording import cell, mark_of, markdown, measured, number, params_text, quantity, reproduce, row_id
-from validation.scenes import CATALOGUE
+from validation.catalogue import CATALOGUE
 
 SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engine": "chipmunk", "profile": "tuned",
         "dt": 1 / 240, "iterations": None, "ulp": 0}  # fmt: skip

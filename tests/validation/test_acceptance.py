@@ -7,6 +7,7 @@ import pytest
 from validation import acceptance
 from validation.acceptance import MOVES, accepted, band, propose, slots_to_move
 from validation.canonical import Check
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.deviation import Deviation
 from validation.findings import Family, Finding, Findings, row_key
@@ -327,7 +328,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
 
 
 def test_a_study_has_no_scatter_and_the_least_of_bands():
-    study = next(study for study in acceptance.STUDIES if study.scene == "incline")
+    study = CATALOGUE["incline"].studies[0]
     why, (value, width, _) = acceptance._entry(row_of(metric=study.name, floor=None, truth=1.0, tolerance=0.125))
     assert (why, value, width) == ("", 0.5, pytest.approx(0.00125))
 

@@ -181,7 +181,7 @@ def test_a_unit_closes_when_its_interval_is_narrow(clockwork):
 
 
 def test_a_series_ends_where_a_pile_takes_too_long(clockwork):
-    sizes = size_units([("clockwork", "one")], [2], [], [1, 2, 3])
+    sizes = size_units([("clockwork", "one")], [2], [], [], [1, 2, 3])
     steps = {1: 10, 3: 3000, 6: 10}  # 1 ms, 0.3 s: the limit of 0.25 s leaves room for a busy machine
     slow = [replace(u, steps=steps[u.bodies]) for u in sizes]
     timings = timed(slow, replace(PATIENT, size_seconds=0.25, most=3))
@@ -203,7 +203,7 @@ def test_what_is_timed_ends_where_the_judged_run_ends(engine):
 
 
 def test_pyramids_have_as_many_boxes_as_they_say_and_none_overlaps():
-    for u in size_units([("reference", "classical")], [2], [3], [1, 4, 13]):
+    for u in size_units([("reference", "classical")], [2], [("stack", "n")], [3], [1, 4, 13]):
         scene = scene_of(u.slot)
         free = [b for b in scene.bodies if b.motion == "free"]
         assert len(free) == u.bodies

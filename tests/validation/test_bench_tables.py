@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from validation.bench.agreement import agreement, ratios
-from validation.bench.primary import PRIMARY
 from validation.bench.reading import bench_runs, overhead, scaling, scaling_fits, timings_summary
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.timing import Timing
 from validation.bench.work import COST_LEVELS, ERROR_LEVELS, error_at_equal_time, time_at_equal_error, work_points
 from validation.cells import Observation, Outcome, Slot
 from validation.plan import Request
-from validation.posed import resolve
+from validation.posed import primary_of, resolve
 from validation.store import Store
 
 STEPS = (1 / 60, 1 / 240, 1 / 960)
@@ -29,7 +28,7 @@ def store(tmp_path):
 
 
 def impact_slot(engine, dt, phase=0, iterations=None, profile="default"):
-    delay = PRIMARY["impact"].variations(dt)[phase]["delay"]
+    delay = primary_of("impact").variations(dt)[phase]["delay"]
     return Slot("impact", (("delay", delay),), 2, engine, profile, dt, iterations)
 
 

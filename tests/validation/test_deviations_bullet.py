@@ -10,12 +10,12 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 from adapters import needs, run
 from adapters.bullet import BulletEngine
 from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, fall
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.deviation import Deviation
 from validation.deviations import covering
 from validation.deviations.bullet import DEVIATIONS, sliding_with_drag
 from validation.execution import execute
-from validation.scenes import CATALOGUE
 
 ENGINE = BulletEngine()
 VERSION = "3.2.7"

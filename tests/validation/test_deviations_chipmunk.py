@@ -15,9 +15,9 @@ from adapters.scene import Scene
 from adapters.stepping import run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
+from validation.catalogue import CATALOGUE
 from validation.deviation import Deviation
 from validation.deviations.chipmunk import DEVIATIONS, flight, predicted_bounce
-from validation.scenes import CATALOGUE
 
 ENGINE = ChipmunkEngine()
 

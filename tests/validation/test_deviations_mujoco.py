@@ -16,9 +16,9 @@ from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.stepping import run
 from validation.canonical import Check
+from validation.catalogue import CATALOGUE
 from validation.deviations import covering
 from validation.deviations.mujoco import DEVIATIONS, box_on_face
-from validation.scenes import CATALOGUE
 
 ENGINE = MujocoEngine()
 VERSION = "4.0.1"

@@ -6,12 +6,11 @@ from importlib.metadata import EntryPoint
 import pytest
 from packaging.specifiers import SpecifierSet
 
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, parse_dt
 from validation.findings import Family, Finding, FindingsError, Known, Unsupported, files, known_of, row_key
 from validation.plan import in_quick_suite
 from validation.rows import rows_of
-from validation.scenes import CATALOGUE
-from validation.studies import STUDIES
 
 ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
 SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)
@@ -89,7 +88,7 @@ def test_every_member_is_a_row_that_the_quick_suite_states(engine):
         assert in_quick_suite(slot), key
         canonical = CATALOGUE[scene]
         stated = {check.metric for check in canonical.checks(canonical.scene(slot.dimension, dict(given)), slot.dt)}
-        assert metric in stated | {study.name for study in STUDIES if study.scene == scene}, key
+        assert metric in stated | {study.name for study in canonical.studies}, key
 
 
 # ---- what a row's standing is --------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ def test_the_same_plan_of_other_code_is_another_run(tmp_path, monkeypatch):
     store = Store(tmp_path)
     first, _ = store.start("test", SLOTS)
     store.add(first, observed(SLOTS[0]))
-    monkeypatch.setattr("validation.store.code_hash", lambda: "other code")
+    monkeypatch.setattr("validation.store.code_hash", lambda asked: "other code")
     second, done = store.start("test", SLOTS)
     assert second.id != first.id
     assert done == set()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adapters.trajectory import Trajectory
-from validation.scenes import CATALOGUE
+from validation.catalogue import CATALOGUE
 
 DTS = (1 / 60, 1 / 240, 1 / 1000)
 

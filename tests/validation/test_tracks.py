@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.scenes import CATALOGUE
 from validation.tracks import record, recording_from_bytes, representatives
 
 DT = 1.0 / 240.0

@@ -11,8 +11,17 @@ pytest.importorskip("pymunk", reason="pymunk is an optional engine")
 @pytest.fixture
 def small(monkeypatch):
     """Two touching boxes searched with, one held out."""
-    monkeypatch.setattr(tuning, "SEARCHED", {"stand": (("stack", {"n": 2.0, "duration": 2.0}),)})
-    monkeypatch.setattr(tuning, "HELD_OUT", {"stand": (("stack", {"n": 1.0, "duration": 2.0}),)})
+    cells = {False: (("stack", {"n": 2.0, "duration": 2.0}),), True: (("stack", {"n": 1.0, "duration": 2.0}),)}
+    monkeypatch.setattr(tuning, "cells_of", lambda group, held_out=False: cells[held_out])
+
+
+def test_scenes_say_what_is_searched_together():
+    assert tuning.groups() == ["impact", "stand", "slide"]
+    searched, held_out = tuning.cells_of("impact"), tuning.cells_of("impact", held_out=True)
+    assert {scene for scene, _ in searched} == {"impact", "bounce"}
+    assert searched and held_out and not [cell for cell in held_out if cell in searched]
+    with pytest.raises(KeyError):
+        tuning.cells_of("everything")
 
 
 def test_more_sweeps_are_found_where_too_few_are_the_fault(small, monkeypatch):

@@ -1,7 +1,7 @@
 """Speed against error: what an answer of a given error costs on each engine.
 
+    canonical.py   a scene's ONE declared error, the state in which it is timed, and its steps (in `validation`)
     sweep.py       which cells: every scene x engine x profile over steps and iterations
-    primary.py     the ONE declared error of each scene, and the state in which it is timed
        |  accuracy first, in worker processes: observations of a run in the store
        v
     units.py       what is timed: the work points, an empty scene and a free body, piles of 1 to 1000 boxes

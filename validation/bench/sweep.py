@@ -1,9 +1,7 @@
 """What is run for its error, and what is timed: every engine and profile over steps and iteration counts.
 
-quick
-    three steps from 1/60 s down; a second iteration count on the stack only.
-full
-    steps by halves as far as a simulated second stays affordable, and iteration counts over two decades.
+Each scene declares its steps and iteration counts (`validation.canonical.Steps`), for the quick and the full suite;
+here stands what is scaled.
 
 A single contact is solved by one sweep, so iterations are swept there only to let each engine be as cheap as it
 honestly can.
@@ -17,47 +15,24 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from adapters.registry import find
-from validation.bench.primary import primary_of
 from validation.bench.reading import POINT
 from validation.bench.units import Unit, iteration_units, overhead_units, size_units, work_unit
 from validation.bench.work import accuracy
+from validation.canonical import Suite
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Slot, slot_from_dict
-from validation.plan import Request, Suite, slots
+from validation.plan import Request, slots
+from validation.posed import primary_of, resolve
 
-#: What two cores do in half a minute: ten boxes, or sixteen long bounces, cannot go to small steps.
-QUICK_STEPS = {
-    "impact": (1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0),
-    "bounce": (1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0),
-    "stack": (1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0),
-    "incline": (1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0),
-}
 #: Step at which cost with every step sampled is timed as well.
 SAMPLED_DT = 1.0 / 240.0
 
 
-def _halves(first: float, last: float) -> tuple[float, ...]:
-    rates = [first]
-    while rates[-1] < last:
-        rates.append(2.0 * rates[-1])
-    return tuple(1.0 / rate for rate in rates)
-
-
-#: Finest step per scene: a ball is cheap, ten boxes at 1/1920 s take an engine some seconds per cell.
-FULL_STEPS = {
-    "impact": _halves(30.0, 1920.0),
-    "bounce": _halves(60.0, 7680.0),
-    "stack": _halves(30.0, 1920.0),
-    "incline": _halves(30.0, 1920.0),
-}
-QUICK_ITERATIONS: dict[str, tuple[int, ...]] = {"stack": (50,)}
-FULL_ITERATIONS = {"impact": (1,), "bounce": (1,), "stack": (4, 10, 30, 100), "incline": (1, 4, 30)}
-
-
 @dataclass(frozen=True)
 class Scaling:
-    """Sizes of the piles: columns of n boxes, pyramids of r rows; iteration counts and the pyramid they run on."""
+    """Sizes of the piles: scenes of n bodies, pyramids of r rows; iteration counts and the pyramid they run on."""
 
-    columns: tuple[int, ...]
+    counts: tuple[int, ...]
     rows: tuple[int, ...]
     iterations: tuple[int, ...]
     iteration_rows: int
@@ -81,12 +56,17 @@ class Sweep:
 
     def steps(self, scene: str) -> Sequence[float]:
         """Steps [s] of a scene."""
-        return tuple(self.dts) or (QUICK_STEPS if self.request.suite == "quick" else FULL_STEPS)[scene]
+        return tuple(self.dts) or resolve(scene).steps.dts(self.request.suite)
 
     def counts(self, scene: str) -> Sequence[int]:
         """Iteration counts of a scene beside each profile's own."""
-        table = QUICK_ITERATIONS if self.request.suite == "quick" else FULL_ITERATIONS
-        return tuple(self.iterations) or table.get(scene, ())
+        return tuple(self.iterations) or resolve(scene).steps.counts(self.request.suite)
+
+
+def benched(suite: Suite) -> list[str]:
+    """Scenes that a bench of a suite runs where none is named: those that declare an error, and steps for the suite."""
+    ours = [(name, scene.steps) for name, scene in CATALOGUE.items() if scene.primary]
+    return [name for name, steps in ours if steps.quick or suite == "full"]
 
 
 def accuracy_slots(sweep: Sweep) -> list[Slot]:
@@ -125,10 +105,11 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     ]
     dimensions = tuple(request.dimensions) or (2, 3)
     units += overhead_units(engines, dimensions)
-    if "stack" in request.scenes:
+    scaled = [(scene, size) for scene in request.scenes if (size := resolve(scene).size)]
+    if scaled:
         sizes = SCALING[suite]
         shown = dimensions[:1] if suite == "quick" else dimensions
-        units += size_units(engines, shown, sizes.columns, sizes.rows)
+        units += size_units(engines, shown, scaled, sizes.counts, sizes.rows)
         units += iteration_units(engines, shown, sizes.iterations, sizes.iteration_rows)
     return units
 

@@ -41,7 +41,7 @@ class Timing:
     state_hash
         Over the bits of the poses and twists at the end of the timed call.
     error
-        Primary error of what was timed (see `validation.bench.primary`); None where there is no such thing.
+        Primary error of what was timed (see `validation.canonical.Primary`); None where there is no such thing.
     void
         Why this timing must not be used; empty if it may.
     """

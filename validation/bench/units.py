@@ -1,11 +1,10 @@
-r"""What is timed, and the bench's own scenes: an empty one, one free body, and piles of any size.
+r"""What is timed: scenes of the catalogue, at any size where they have one, and the bench's own scenes.
 
 empty      only the floor: what a step costs before there is any physics
 flight     one free body that meets nothing
-stack      n boxes, one on the other (the catalogue's)
 pyramid            +---+
                 +---+ +---+          rows of r, r-1, ... 1 boxes, each on the two below it;
-             +---+ +---+ +---+       like the column it is in equilibrium, nothing may move
+             +---+ +---+ +---+       in equilibrium, nothing may move
            =====================
 """
 
@@ -24,11 +23,10 @@ from adapters.needs import needs
 from adapters.registry import find, load
 from adapters.scene import Body, Pair, Scene
 from adapters.stepping import posed_for, step_count
-from validation.bench.primary import PRIMARY
 from validation.bench.timing import Purpose
 from validation.canonical import GRAVITY
 from validation.cells import Slot
-from validation.posed import resolve
+from validation.posed import primary_of, resolve
 from validation.scenes.parts import ball, cube, floor, upward
 
 SIDE = 1.0
@@ -78,8 +76,8 @@ class Unit:
 
 
 def work_unit(slot: Slot, cell: str, error: float | None, sampled: bool = False) -> Unit:
-    """Unit that times a work point in the state its scene declares (`validation.bench.primary`)."""
-    primary, scene = PRIMARY[slot.scene], scene_of(slot)
+    """Unit that times a work point in the state its scene declares (`validation.canonical.Primary`)."""
+    primary, scene = primary_of(slot.scene), scene_of(slot)
     warm_up = step_count(primary.warm_up, slot.dt) if primary.warm_up else 0
     steps = step_count(primary.window or scene.duration, slot.dt)
     return Unit("work", slot, cell, _free(scene), warm_up, steps, error, sampled)
@@ -98,10 +96,15 @@ def overhead_units(engines: Sequence[tuple[str, str]], dimensions: Sequence[int]
 
 
 def size_units(
-    engines: Sequence[tuple[str, str]], dimensions: Sequence[int], columns: Sequence[int], rows: Sequence[int]
+    engines: Sequence[tuple[str, str]],
+    dimensions: Sequence[int],
+    scenes: Sequence[tuple[str, str]],
+    counts: Sequence[int],
+    rows: Sequence[int],
 ) -> Iterator[Unit]:
-    """Columns of n boxes and pyramids of r rows, at the profile's own iterations."""
-    sizes = [("stack", "n", n) for n in columns] + [("pyramid", "rows", r) for r in rows]
+    """Scenes of n bodies (name, parameter that is n) and pyramids of r rows, at the profile's own iterations."""
+    sizes = [(scene, parameter, n) for scene, parameter in scenes for n in counts]
+    sizes += [("pyramid", "rows", r) for r in rows]
     for dimension in dimensions:
         for scene, parameter, size in sizes:
             for engine, profile in engines:
@@ -123,10 +126,8 @@ def iteration_units(
 
 
 def _pile_unit(purpose: Purpose, slot: Slot) -> Unit:
-    size = slot.params[0][1]
-    bodies = int(size if slot.scene == "stack" else size * (size + 1) / 2)
     steps = step_count(SETTLING, slot.dt)
-    return Unit(purpose, slot, "", bodies, steps, steps)
+    return Unit(purpose, slot, "", _free(scene_of(slot)), steps, steps)
 
 
 def runs(slot: Slot) -> bool:

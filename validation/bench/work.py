@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from validation.bench.primary import PRIMARY
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot
-from validation.posed import resolve
+from validation.posed import primary_of, resolve
 from validation.store import Run, Store
 
 #: Errors at which costs are compared.
@@ -42,7 +41,7 @@ def work_points(store: Store, run: Run) -> pd.DataFrame:
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
     for observation in store.observations(run):
         slot = observation.slot
-        if slot.scene in PRIMARY:
+        if resolve(slot.scene).primary:
             groups[tuple(getattr(slot, name) for name in POINT)].append(observation)
     summary = timings_summary(store, run)
     work = summary[summary["purpose"] == "work"] if len(summary) else summary
@@ -61,7 +60,7 @@ def work_points(store: Store, run: Run) -> pd.DataFrame:
 def accuracy(members: Sequence[Observation]) -> dict[str, Any]:
     """Identity, primary error and outcome of one work point from the observations of its cells."""
     first = min(members, key=lambda observation: _position(observation.slot))
-    primary = PRIMARY[first.slot.scene]
+    primary = primary_of(first.slot.scene)
     errors = [_error(observation) for observation in members]
     bad = [o for o in members if o.outcome is not Outcome.OK]
     missing = [reason for value, reason in errors if value is None]
@@ -85,7 +84,7 @@ def _position(slot: Slot) -> int:
     """Place of a slot among the variations of its scene; the first is the one that is timed."""
     canonical, given = resolve(slot.scene), dict(slot.params)
     complete = canonical.complete(given)
-    for k, params in enumerate(PRIMARY[slot.scene].variations(slot.dt)):
+    for k, params in enumerate(primary_of(slot.scene).variations(slot.dt)):
         if all(complete[name] == value for name, value in params.items()):
             return k
     return 10**6
@@ -96,7 +95,7 @@ def _error(observation: Observation) -> tuple[float | None, str]:
         return None, observation.reason
     slot = observation.slot
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return PRIMARY[slot.scene].error(scene, slot.dt, observation.metrics)
+    return primary_of(slot.scene).error(scene, slot.dt, observation.metrics)
 
 
 def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:

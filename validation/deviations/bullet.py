@@ -23,8 +23,8 @@ from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import Measured
+from validation.catalogue import CATALOGUE
 from validation.deviation import Deviation
-from validation.scenes import CATALOGUE
 
 #: Gaps are differences of lengths of some ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
 GAP_ROUND_OFF = 1e-14

@@ -24,8 +24,8 @@ from adapters.needs import needs
 from adapters.scene import Disc, Scene
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
 from validation.deviation import Deviation, Law
-from validation.scenes.bounce import BOUNCE
 
 PROFILES = {"default": default_profile, "tuned": tuned_profile}
 VERSIONS = ("7.3.",)
@@ -87,7 +87,7 @@ def bounce_law(profile: str, metric: str) -> Law:
 
     def law(scene: Scene, dt: float) -> tuple[float, float] | None:
         predicted = predicted_bounce(scene, profile, dt)
-        value = BOUNCE.measure(scene, predicted)[metric][0] if predicted else None
+        value = CATALOGUE["bounce"].measure(scene, predicted)[metric][0] if predicted else None
         # A speed of exactly 2 g dt, the threshold of rest, may fall on either side of it: one sample later or earlier.
         band = dt + ROUND_OFF if metric == "rest_time" else ROUND_OFF
         return None if value is None else (value, band)

@@ -63,14 +63,18 @@ class BoxOnFace:
 
     def slide(self, steps: int, velocity: float = 0.0) -> list[tuple[float, float]]:
         """Position and velocity along the face from a touching start, at samples 0 ... ``steps``."""
+        return [(pose[0], twist[0]) for pose, twist in self.motion(steps, velocity)]
+
+    def motion(self, steps: int, velocity: float = 0.0) -> list[tuple[Triple, Triple]]:
+        """Poses and twists (along, up, turn) from a touching start, at samples 0 ... ``steps``."""
         pose, twist = (0.0, self.half_height, 0.0), (velocity, 0.0, 0.0)
-        path, acceleration = [(0.0, velocity)], (*self.load, 0.0)
+        path, acceleration = [(pose, twist)], (*self.load, 0.0)
         dt = self.law.dt
         for _ in range(steps):
             acceleration = self._solve(pose, twist, acceleration)
             twist = _along(twist, acceleration, dt)
             pose = _along(pose, twist, dt)
-            path.append((pose[0], twist[0]))
+            path.append((pose, twist))
         return path
 
     def _contacts(self, pose: Triple) -> list[tuple[float, float, float]]:

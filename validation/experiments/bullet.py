@@ -26,6 +26,12 @@ CURED: tuple[Cured, ...] = (
 
 _NO_DRAG = {"linearDamping": 0.0, "angularDamping": 0.0}
 
+#: A blow without anything that its law does not have.
+_BARE = _NO_DRAG | {
+    "contactProcessingThreshold": 0.0, "contactERP": 0.0, "contactSlop": 0.0, "restitutionVelocityThreshold": 1e-4,
+    "solverResidualThreshold": 0.0,
+}  # fmt: skip
+
 EXPERIMENTS: tuple[Experiment, ...] = (
     *(
         Experiment(
@@ -111,5 +117,116 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         {"contactProcessingThreshold": 0.0},
         dimension=3,
         idle=(_NO_DRAG,),
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-shipped-contact",
+            "without speculation, push-out, slop, drag and thresholds the blow is exact; without drag alone it is not",
+            "default",
+            scene,
+            metric,
+            _BARE,
+            idle=(_NO_DRAG,),
+        )
+        for scene, metric in (
+            ("head_on", "rebound_ratio"),
+            ("off_centre", "spin"),
+            ("flat_box", "rebound_ratio"),
+            ("stacked_balls", "small_speed"),
+            ("cradle", "speed[4]"),
+            ("galperin", "large_speed"),
+        )
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-push-out",
+            "without push-out (and slop) the blow is exact",
+            "one",
+            scene,
+            metric,
+            {"contactERP": 0.0, "contactSlop": 0.0},
+            idle=({"iterations": 1000},),
+        )
+        for scene, metric in (
+            ("head_on", "rebound_ratio"),
+            ("off_centre", "spin"),
+            ("flat_box", "rebound_ratio"),
+            ("stacked_balls", "small_speed"),
+            ("cradle", "speed[4]"),
+            ("galperin", "large_speed"),
+        )
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-within-slop",
+            "without slop it is exact; more sweeps change nothing",
+            "tuned",
+            scene,
+            metric,
+            {"contactSlop": 0.0},
+            params,
+            idle=({"iterations": 1000},),
+        )
+        for scene, params, metric in (
+            ("stacked_balls", {"e": 0.5, "ratio": 1.0}, "small_speed"),
+            ("cradle", {}, "energy_defect"),
+        )
+    ),
+    *(
+        Experiment(
+            "heavy-on-light-sweeps",
+            "solved to the end (no residual stop, 10000 sweeps) the pair stands",
+            profile,
+            "heavy_on_light",
+            metric,
+            {"solverResidualThreshold": 0.0, "iterations": 10000},
+        )
+        for profile, metric in (
+            ("default", "drift"),
+            ("default", "penetration"),
+            ("tuned", "settle_time"),
+            ("tuned", "kinetic_energy"),
+            ("tuned", "impulse_scatter"),
+            ("tuned", "interface_impulse[1]"),
+            ("one", "drift"),
+            ("one", "penetration"),
+        )
+    ),
+    *(
+        Experiment(
+            "pinch-sweeps",
+            "solved to the end (no residual stop, 1000 sweeps) the grip holds",
+            profile,
+            "pinch",
+            metric,
+            {"solverResidualThreshold": 0.0, "iterations": 1000},
+            {"margin": margin},
+            idle=({"solverResidualThreshold": 0.0},),
+        )
+        for profile, margin, metric in (
+            ("default", 1.05, "creep"),
+            ("default", 100.0, "turned"),
+            ("default", 100.0, "grip"),
+            ("default", 100.0, "carried"),
+            ("tuned", 100.0, "creep"),
+            ("tuned", 100.0, "grip"),
+        )
+    ),
+    *(
+        Experiment(
+            "slide-drag-and-switching",
+            "without drag and with a wider margin the box stops where it should, level; without drag alone it tips",
+            "default",
+            "slide",
+            metric,
+            _NO_DRAG | {"contactBreakingThreshold": 0.1},
+            idle=idle,
+        )
+        for metric, idle in (
+            ("stopping_distance", ({"contactBreakingThreshold": 0.1},)),
+            ("braking", ({"contactBreakingThreshold": 0.1},)),
+            ("hop", (_NO_DRAG,)),
+            ("turned", (_NO_DRAG,)),
+        )
     ),
 )

@@ -71,4 +71,48 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("tuned", "impulse_scatter", 1),
         )
     ),
+    *(
+        Experiment(
+            "flat-box-fixed-sweeps",
+            "with 100 sweeps the corners are solved",
+            profile,
+            "flat_box",
+            metric,
+            {"iterations": 100},
+        )
+        for profile in ("default", "tuned")
+        for metric in ("rebound_ratio", "edge_speed", "sideways", "impulse")
+    ),
+    *(
+        Experiment(
+            "heavy-on-light-fixed-sweeps",
+            "with 100000 sweeps from a start inside the slop the pair stands; such a start alone does not help",
+            profile,
+            "heavy_on_light",
+            metric,
+            {"iterations": 100000, **_INSIDE},
+            params,
+            idle=(_INSIDE,),
+        )
+        for profile, params, metric in (
+            ("default", {}, "settle_time"),
+            ("default", {}, "kinetic_energy"),
+            ("default", {"ratio": 1e4}, "drift"),
+            ("default", {"ratio": 1e4}, "interface_impulse[1]"),
+            ("tuned", {}, "penetration"),
+            ("tuned", {"ratio": 1e4}, "drift"),
+        )
+    ),
+    *(
+        Experiment(
+            "slide-touching-start",
+            "with more sweeps, or from a start inside the slop, nothing lifts off; a smaller slop changes nothing",
+            "default",
+            "slide",
+            "hop",
+            off,
+            idle=({"collision_slop": 1e-5},),
+        )
+        for off in ({"iterations": 1000}, _INSIDE)
+    ),
 )

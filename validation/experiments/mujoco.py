@@ -24,34 +24,133 @@ CURED: tuple[Cured, ...] = (
     Cured("bounce", ({}, {"e": 0.5}, {"e": 1.0})),
     Cured("stack", ({}, {"n": 2.0}, {"n": 20.0})),
     Cured("incline", ({}, {"ratio": 0.999}), ("creep",)),
+    Cured("head_on", ({}, {"e": 1.0, "ratio": 1.0})),
+    Cured("pinch", ({}, {"margin": 1.05}, {"margin": 100.0})),
 )
 
-EXPERIMENTS: tuple[Experiment, ...] = tuple(
-    Experiment(
-        "stack-touching-start",
-        "with a margin of 1 mm touching faces are in contact from the start, and nothing falls; stiffer contacts from "
-        "a touching start fall all the same",
-        "default",
-        "stack",
-        "penetration",
-        {"margin": 1e-3},
-        {"n": n},
-        dimension=dimension,
-        idle=({"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)},),
+#: Restitution in the step after contact, as the tuned profile has it for blows.
+_REFLECT = {
+    "cone": "elliptic", "tolerance": 0.0, "smooth_condim": 1, "solref": "reflect",
+    "solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0), "kappa_elastic": 0.0, "kappa_plastic": 0.0,
+}  # fmt: skip
+#: What holds and carries, as the tuned profile has it for rest.
+_HOLD = _REFLECT | {"impratio": 100.0, "kappa_plastic": 0.1, "margin": 1.703125e-07}
+_SLIDE = _HOLD | {"solreffriction": (0.05, 1.0)}
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    tuple(
+        Experiment(
+            "stack-touching-start",
+            "with a margin of 1 mm touching faces are in contact from the start, and nothing falls; stiffer contacts "
+            "from a touching start fall all the same",
+            "default",
+            "stack",
+            "penetration",
+            {"margin": 1e-3},
+            {"n": n},
+            dimension=dimension,
+            idle=({"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)},),
+        )
+        for n in (2.0, 10.0)
+        for dimension in (2, 3)
     )
-    for n in (2.0, 10.0)
-    for dimension in (2, 3)
-) + tuple(
-    Experiment(
-        "incline-pyramid-threshold",
-        "with an elliptic cone the box slides as soon as it should; solving further or a noslip pass changes nothing: "
-        "it is the pyramid, whose edges share their softness between friction and the normal",
-        "default",
-        "incline",
-        "threshold",
-        {"cone": "elliptic"},
-        dimension=dimension,
-        idle=({"tolerance": 0.0}, {"noslip_iterations": 10}),
+    + tuple(
+        Experiment(
+            "incline-pyramid-threshold",
+            "with an elliptic cone the box slides as soon as it should; solving further or a noslip pass changes "
+            "nothing: it is the pyramid, whose edges share their softness between friction and the normal",
+            "default",
+            "incline",
+            "threshold",
+            {"cone": "elliptic"},
+            dimension=dimension,
+            idle=({"tolerance": 0.0}, {"noslip_iterations": 10}),
+        )
+        for dimension in (2, 3)
     )
-    for dimension in (2, 3)
+    + (
+        Experiment(
+            "head-on-solver-tolerance",
+            "solved to round-off, or without the friction rows of smooth pairs, they cancel",
+            "default",
+            "head_on",
+            "momentum_defect",
+            {"tolerance": 0.0},
+            {"e": 0.5, "ratio": 1e6},
+        ),
+        Experiment(
+            "off-centre-soft-contact",
+            "a contact of one step does not turn the bar under the ball; solving further does nothing",
+            "default",
+            "off_centre",
+            "momentum_defect",
+            _REFLECT,
+            idle=({"tolerance": 0.0},),
+        ),
+        *(
+            Experiment(
+                family,
+                "with the velocity reflected in the step after contact it is exact; solving further does nothing",
+                "default",
+                scene,
+                metric,
+                _REFLECT,
+                params,
+                idle=({"tolerance": 0.0},),
+            )
+            for family, scene, metric, params in (
+                ("stacked-balls-soft-contact", "stacked_balls", "small_speed", {}),
+                ("stacked-balls-soft-contact", "stacked_balls", "energy_lost", {}),
+                ("cradle-soft-contact", "cradle", "speed[4]", {}),
+                ("cradle-soft-contact", "cradle", "energy_defect", {"apart": 0.0, "n": 3.0}),
+                ("galperin-soft-contact", "galperin", "large_speed", {}),
+            )
+        ),
+        *(
+            Experiment(
+                "heavy-on-light-soft-contact",
+                "with rigid contacts the pair carries; solving further does nothing",
+                "default",
+                "heavy_on_light",
+                metric,
+                _HOLD,
+                {"ratio": 1e4},
+                idle=({"tolerance": 0.0},),
+            )
+            for metric in ("kinetic_energy", "interface_impulse[1]")
+        ),
+        *(
+            Experiment(
+                "pinch-viscous-friction",
+                "stiff friction (impratio 100) on an elliptic cone holds; solving further does not",
+                "default",
+                "pinch",
+                metric,
+                {"impratio": 100.0, "cone": "elliptic"},
+                {"margin": margin},
+                idle=({"tolerance": 0.0},),
+            )
+            for margin, metric in ((1.05, "creep"), (100.0, "creep"), (1.05, "grip"), (1.05, "carried"))
+        ),
+        *(
+            Experiment(
+                "slide-pyramid",
+                "an elliptic cone does not know the heading; solving the pyramid further does nothing",
+                "default",
+                "slide",
+                metric,
+                off,
+                {"heading": heading},
+                3,
+                idle=({"tolerance": 0.0},),
+            )
+            for metric, heading, off in (
+                ("stopping_distance", 22.5, {"cone": "elliptic"}),
+                ("stopping_distance", 45.0, {"cone": "elliptic"}),
+                ("end_speed", 45.0, {"cone": "elliptic"}),
+                ("astray", 22.5, _SLIDE),
+                ("turned", 22.5, _SLIDE),
+            )
+        ),
+    )
 )

@@ -17,12 +17,31 @@ from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
-from validation import metrics, tolerances
-from validation.canonical import GRAVITY, CanonicalScene, Measured, Parameter, Track
+from validation import bounds, metrics
+from validation.canonical import (
+    GRAVITY,
+    CanonicalScene,
+    Check,
+    Measured,
+    Parameter,
+    Params,
+    Primary,
+    Restitution,
+    Searched,
+    Steps,
+    Track,
+    Variation,
+    halves,
+)
 from validation.scenes.parts import ball, floor, upward
-from validation.tolerances import APEXES
 
 RADIUS = 0.5
+#: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
+APEXES = 5
+#: An arc counts if its launch speed is above this many g dt: shorter ones are a handful of samples.
+RESOLVED = 20.0
+#: Sixteen drop heights [m], 1 cm apart: about half a step of 1/240 s each, so that phases are spread.
+HEIGHTS = tuple(round(1.0 + 0.01 * k, 2) for k in range(16))
 
 
 def rest_time(e: float, height: float, g: float = GRAVITY) -> float:
@@ -30,7 +49,7 @@ def rest_time(e: float, height: float, g: float = GRAVITY) -> float:
     return math.inf if e >= 1.0 else math.sqrt(2.0 * height / g) * (1.0 + e) / (1.0 - e)
 
 
-def make(dimension: int, params: Mapping[str, float]) -> Scene:
+def make(dimension: int, params: Params) -> Scene:
     """Build the scene; it runs past rest by a tenth, or for APEXES + 1 arcs if e = 1."""
     e, height, g = params["e"], params["height"], params["g"]
     fall = math.sqrt(2.0 * height / g)
@@ -106,14 +125,111 @@ def clearance(e: float, height: float, g: float, t: float) -> float:
     return 0.0
 
 
-BOUNCE = CanonicalScene(
-    "bounce",
-    1,
-    "Dropped ball, from the first bounce to rest",
-    __doc__ or "",
-    "h_n = e^(2n) h0,  t_rest = sqrt(2 h0/g) (1 + e)/(1 - e)",
-    (2, 3),
-    (
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """What a bounce that is found within a step, and not at its time, may be off by.
+
+    A fixed-step method finds the ball at a depth within (0, v dt], which costs (1 - e^2) v dt of height, and knows
+    speeds to half a step of gravity, which costs e (1 + e) v dt / 2; errors shrink by e^2 with each later bounce.
+    """
+    e, height, g = scene.params["e"], scene.params["height"], scene.params["g"]
+    per_bounce = 1.0 - e * e + 0.5 * e * (1.0 + e)
+    speed, bound = math.sqrt(2.0 * g * height), 0.0
+    found, velocity_error = [], []
+    because = "impact located within a step: per bounce (1 - e^2 + e (1+e)/2) v dt, shrinking by e^2; + g dt^2/8"
+    for n in range(1, APEXES + 1):
+        bound = e * e * bound + per_bounce * speed * dt
+        speed *= e
+        if speed <= RESOLVED * g * dt:
+            break
+        apex = bound + g * dt * dt / 8.0
+        velocity_error.append(apex * g / speed)
+        name = f"apex[{n}]"
+        found.append(Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt"))
+    found.append(_growth_check(height, g, dt, truth["apex_growth"]))
+    if len(velocity_error) >= 3:
+        found.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
+    if "rest_time" in truth:
+        found.append(_rest_check(e, height, g, dt, truth["rest_time"]))
+    return found
+
+
+def _growth_check(height: float, g: float, dt: float, truth: float) -> Check:
+    """No bounce may add energy, whatever e <= 1; an impact that is found late adds none either.
+
+    The semi-implicit step keeps ``H = v^2/2 + g y - s g v dt/2`` in flight, s = +1 velocity first, -1 position first; a
+    mid-point step has s = 0. An impact replaces the velocity -|v| that its step began with by e |v|, in the place of
+    gravity; the body then moves by e |v| dt (s = +1), by -|v| dt (s = -1, with the old velocity) or by the mean
+    (s = 0). At any height y, so however late or early the contact was found,
+
+        H after - H before  =  -(1 - e^2) v^2/2 - (1 - e) g |v| dt/2  <=  0,   and 0 for e = 1.
+
+    So no allowance for the location of an impact is owed: whoever reflects gravity's own g dt as well gains |v| dt of
+    height at every bounce and is to be seen. What is left is the start: released at rest at a sample, the ball moves on
+    a parabola whose top lies half a step beside that sample, g (dt/2)^2/2 = g dt^2/8 above it.
+    """
+    because = (
+        "e <= 1 adds no energy and both step orders keep their energy through a late impact: only the top of the first "
+        "parabola lies up to g dt^2/8 above the sample of release"
+    )
+    bound = g * dt * dt / 8.0 / height + bounds.ROUND_OFF
+    return Check("apex_growth", "1", truth, bound, because, "conservation of energy")
+
+
+def _interval_check(e: float, height: float, g: float, dt: float, error: list[float], truth: float) -> Check:
+    """Intervals (v_n + v_(n+1))/g carry both speed errors and one step of impact location."""
+    v = [math.sqrt(2.0 * g * height) * e**n for n in range(4)]
+    first, second = (v[1] + v[2]) / g, (v[2] + v[3]) / g
+    slack = [(error[n] + error[n + 1]) / g + dt for n in (0, 1)]
+    bound = (slack[1] + second / first * slack[0]) / (first - slack[0]) if first > slack[0] else math.inf
+    because = "speed errors of the two arcs over g, plus one step of impact location, for both intervals"
+    return Check("apex_interval_ratio", "1", truth, bound, because, "t_n = (v_n + v_(n+1))/g")
+
+
+def _rest_check(e: float, height: float, g: float, dt: float, truth: float) -> Check:
+    """Allowance for the rest time: location of every bounce, unresolved tail, scatter of phases."""
+    speed = math.sqrt(2.0 * g * height)
+    bounces = math.log(speed / (2.0 * g * dt)) / math.log(1.0 / e) if e > 0.0 and speed > 2.0 * g * dt else 1.0
+    tail = 4.0 / (1.0 - e)
+    # One bounce found late by a uniform phase changes its speed by (1 - e^2)/e g dt u, u uniform (sd 0.289), and
+    # all later times by 2/(1 - e) of that over g; phases are independent, four standard deviations.
+    scatter = 4.0 * math.sqrt(bounces) * 2.0 / (1.0 - e) * (1.0 - e * e) / e * 0.289 if e > 0.0 else 0.0
+    bound = (bounces + tail + scatter + 1.0) * dt
+    because = (
+        f"one step for each of {bounces:.0f} bounces, the tail below 2 g dt lasts 4 dt/(1-e), "
+        "impact phases scatter (4 sd)"
+    )
+    return Check("rest_time", "s", truth, bound, because, "geometric series of bounce times")
+
+
+def apex_error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Largest distance of a resolved apex from its height, relative to the drop."""
+    e, height, g = scene.params["e"], scene.params["height"], scene.params["g"]
+    speed, errors = math.sqrt(2.0 * g * height), []
+    for n in range(1, APEXES + 1):
+        value = found[f"apex[{n}]"][0]
+        if e**n * speed <= RESOLVED * g * dt or value is None:
+            break
+        errors.append(abs(value - e ** (2 * n) * height) / height)
+    return (max(errors), "") if errors else (None, "no apex is resolved at this step")
+
+
+def rebound(params: Params, height: float) -> float:
+    """Restitution that a first apex shows: h_1 = e^2 h_0."""
+    return math.sqrt(max(height, 0.0) / params["height"])
+
+
+def _from_all_heights(*restitutions: float) -> tuple[Variation, ...]:
+    return tuple(Variation({"e": e, "height": height}) for e in restitutions for height in HEIGHTS)
+
+
+SCENE = CanonicalScene(
+    name="bounce",
+    version=1,
+    title="Dropped ball, from the first bounce to rest",
+    figure=__doc__ or "",
+    law="h_n = e^(2n) h0,  t_rest = sqrt(2 h0/g) (1 + e)/(1 - e)",
+    dimensions=(2, 3),
+    parameters=(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter(
             "height",
@@ -128,10 +244,34 @@ BOUNCE = CanonicalScene(
         Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
         Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
     ),
-    make,
-    exact,
-    measure,
-    sampling,
-    track,
-    tolerances.bounce_checks,
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
+    track=track,
+    quick=(*_from_all_heights(0.8), *(Variation({"e": e, "height": HEIGHTS[0]}) for e in (0.5, 0.95, 1.0))),
+    full=_from_all_heights(0.5, 0.8, 0.95, 1.0),
+    planted=({"e": 0.8}, {"e": 1.0}),  # energy that a bounce adds shows only where it takes none away
+    primary=Primary(
+        "apex error",
+        "h0",
+        f"largest |h_n - e^2n h0| / h0 over {len(HEIGHTS)} drop heights and all resolved apexes "
+        f"(e^n v0 > {RESOLVED:g} g dt, n <= {APEXES})",
+        "heights are what one sees of a bounce, and the phase of the first impact decides them: a single "
+        "height may be right by luck at any step",
+        lambda dt: [{"height": height} for height in HEIGHTS],
+        apex_error,
+        "the whole scene: fall, bounces, rest",
+    ),
+    # Sixteen long bounces: half a minute on two cores does not reach small steps.
+    steps=Steps((1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0), halves(60.0, 7680.0), full_iterations=(1,)),
+    searched=Searched(
+        "impact",
+        ({"e": 0.5, "height": 1.0}, {"e": 1.0, "height": 1.0}, {"height": 1.03}, {"height": 1.1}),
+        ({"height": 1.07}, {"e": 1.0, "height": 1.05}),
+    ),
+    words={"apex": "rebounds at {value}", "apex=0": metrics.SILENT},
+    seen_as={"apex[1]": rebound},
+    restitution=Restitution("apex", "e", "height", APEXES),
 )

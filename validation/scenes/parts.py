@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from adapters.scene import Body, Box, Disc, HalfSpace, Sphere
 
 
@@ -41,3 +43,24 @@ def cube(name: str, dimension: int, mass: float, side: float, height: float) -> 
     inertia: float | tuple[float, float, float] = moment if dimension == 2 else (moment,) * 3
     shape = Box((0.5 * side,) * dimension)
     return Body(name, shape, mass, inertia, pose_at(dimension, upward(dimension, height)))
+
+
+def along(dimension: int, x: float, height: float = 0.0) -> tuple[float, ...]:
+    """Vector with ``x`` along the first axis and ``height`` along the vertical."""
+    return (x, *(0.0,) * (dimension - 2), height)
+
+
+def at(body: Body, dimension: int, position: tuple[float, ...], velocity: tuple[float, ...] = ()) -> Body:
+    """The same body at ``position``, not turned, moving with ``velocity`` without spin."""
+    spin = (0.0,) if dimension == 2 else (0.0, 0.0, 0.0)
+    return replace(body, pose=pose_at(dimension, position), twist=(*(velocity or (0.0,) * dimension), *spin))
+
+
+def block(name: str, dimension: int, mass: float, width: float, height: float) -> Body:
+    """Uniform box at the origin, as deep as it is wide; I = m (a^2 + b^2)/12 about each principal axis."""
+    upright = mass * (width**2 + height**2) / 12.0
+    inertia: float | tuple[float, float, float] = upright
+    if dimension == 3:
+        inertia = (upright, upright, mass * width**2 / 6.0)
+    half = (*(0.5 * width,) * (dimension - 1), 0.5 * height)
+    return Body(name, Box(half), mass, inertia, pose_at(dimension, (0.0,) * dimension))

@@ -1,0 +1,304 @@
+"""Scenes of impacts: truths against integrations that know neither impulses nor restitution, and planted faults.
+
+At e = 1 an impact is what a stiff spring without damping does: bodies are integrated through it by a symplectic method,
+step by step. For e < 1 the laws of conservation and Newton's law are solved as linear equations.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes import galperin, stacked_balls
+
+DT = 1 / 240
+
+
+def spring_line(mass, radius, x, v, wall=None, stiffness=1e7, duration=1.0, steps=200_000):
+    """Velocities of balls on a line that repel like springs where they overlap; ``wall``: solid below that place."""
+    mass, radius, x, v = (np.array(values, float) for values in (mass, radius, x, v))
+    h = duration / steps
+
+    def force(x):
+        out = np.zeros_like(x)
+        for k in range(len(x) - 1):
+            push = stiffness * max(0.0, radius[k] + radius[k + 1] - (x[k + 1] - x[k]))
+            out[k] -= push
+            out[k + 1] += push
+        if wall is not None:
+            out[0] += stiffness * max(0.0, radius[0] - (x[0] - wall))
+        return out
+
+    f = force(x)
+    for _ in range(steps):
+        v = v + 0.5 * h * f / mass
+        x = x + h * v
+        f = force(x)
+        v = v + 0.5 * h * f / mass
+    return v
+
+
+def made(name, dimension=2, **params):
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(dimension, params)
+    return canonical, scene, canonical.exact(scene)
+
+
+def ended(scene, velocities, spin=None):
+    """A record that ends with these velocities along the first axis or the vertical; impulses are not reported."""
+    width = 3 if scene.dimension == 2 else 6
+    pose = np.array([[body.pose for body in scene.bodies]] * 2)
+    twist = np.zeros((2, len(scene.bodies), width))
+    for body, axis, speed in velocities:
+        twist[-1, body, axis] = speed
+    if spin is not None:
+        twist[-1, spin[0], 2] = spin[1]
+    return Trajectory(np.array([0.0, DT]), pose, twist, None, DT, "completed")
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, DT)
+        if check.bound is not None
+        and measured[check.metric][0] is not None
+        and not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+# ---- two balls ----
+
+
+@pytest.mark.parametrize(("ratio", "v1", "v2"), [(1.0, 4.0, -2.0), (3.0, 4.0, -2.0), (0.1, 1.0, 0.0)])
+def test_two_balls_swap_what_springs_between_them_swap(ratio, v1, v2):
+    _, scene, truth = made("head_on", ratio=ratio, e=1.0, v1=v1, v2=v2)
+    start = [body.pose[0] for body in scene.bodies]
+    mass = [body.mass for body in scene.bodies]
+    found = spring_line(mass, [0.5, 0.5], start, [v1, v2], duration=0.1)
+    assert found == pytest.approx([truth["first_speed"], truth["second_speed"]], abs=1e-3)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize("ratio", [1e-3, 3.0, 1e6])
+def test_two_balls_solve_the_equations_of_momentum_and_restitution(e, ratio):
+    _, scene, truth = made("head_on", ratio=ratio, e=e)
+    (m1, m2), (v1, v2) = [b.mass for b in scene.bodies], [b.twist[0] for b in scene.bodies]
+    found = np.linalg.solve([[m1, m2], [-1.0, 1.0]], [m1 * v1 + m2 * v2, e * (v1 - v2)])
+    assert found == pytest.approx([truth["first_speed"], truth["second_speed"]], rel=1e-9, abs=1e-9)
+    assert truth["impulse"] == pytest.approx(m1 * (v1 - found[0]), rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_blow_of_two_balls_that_is_off_fails(size):
+    canonical, scene, truth = made("head_on")
+    good = [(0, 0, truth["first_speed"]), (1, 0, truth["second_speed"])]
+    assert failing(canonical, scene, ended(scene, good)) == set()
+    soft = [(0, 0, truth["first_speed"] * (1.0 - size)), good[1]]
+    assert failing(canonical, scene, ended(scene, soft)) == {"rebound_ratio", "first_speed", "momentum_defect"}
+    heavy = [good[0], (1, 0, truth["second_speed"] * (1.0 - size))]
+    assert failing(canonical, scene, ended(scene, heavy)) == {"rebound_ratio", "second_speed", "momentum_defect"}
+
+
+# ---- a bar that is struck beside its centre ----
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3, 0.6])
+def test_a_bar_turns_as_if_a_spring_had_pushed_it(offset):
+    """A point mass on a stiff spring over a bar that moves and turns in the plane; its face stays the bar's line."""
+    _, scene, truth = made("off_centre", offset=offset, e=1.0)
+    bar, ball = scene.bodies
+    m, big, moment, stiffness, h = ball.mass, bar.mass, bar.inertia, 1e9, 2.5e-7
+    y, face, angle = ball.pose[1] - 0.25, bar.pose[1] + 0.25, 0.0
+    v, up, spin = ball.twist[1], bar.twist[1], 0.0
+    y, face = y + v * 0.052, face + up * 0.052  # 0.5 ms before they meet
+    for _ in range(8000):
+        push = stiffness * max(0.0, face - offset * math.sin(angle) - y)
+        v, up, spin = v + h * push / m, up - h * push / big, spin + h * push * offset / moment
+        y, face, angle = y + h * v, face + h * up, angle + h * spin
+    assert [v, up, spin] == pytest.approx([truth["ball_speed"], truth["bar_speed"], truth["spin"]], abs=2e-3)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_a_blow_beside_the_centre_conserves_both_momenta_and_loses_what_newton_s_law_takes(e):
+    _, scene, truth = made("off_centre", e=e)
+    (bar, ball), d = scene.bodies, scene.params["offset"]
+    before = ball.mass * ball.twist[1] + bar.mass * bar.twist[1]
+    assert ball.mass * truth["ball_speed"] + bar.mass * truth["bar_speed"] == pytest.approx(before, abs=1e-12)
+    # Angular momentum about the bar's centre, counter-clockwise: the ball stands d to the left.
+    assert -d * ball.mass * (truth["ball_speed"] - ball.twist[1]) + bar.inertia * truth["spin"] == pytest.approx(
+        0.0, abs=1e-12
+    )
+    closing = bar.twist[1] - ball.twist[1]
+    point = truth["bar_speed"] - d * truth["spin"]
+    assert truth["ball_speed"] - point == pytest.approx(e * closing, abs=1e-12)
+    assert truth["energy_lost"] == pytest.approx(1.0 - e * e, abs=1e-15)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_bar_that_turns_wrongly_fails(size):
+    canonical, scene, truth = made("off_centre")
+    speeds = [(1, 1, truth["ball_speed"]), (0, 1, truth["bar_speed"])]
+    assert failing(canonical, scene, ended(scene, speeds, (0, truth["spin"]))) == set()
+    assert failing(canonical, scene, ended(scene, speeds, (0, truth["spin"] * (1.0 - size)))) == {"spin", "energy_lost"}
+    wrong = [(1, 1, truth["ball_speed"] * (1.0 - size)), speeds[1]]
+    assert failing(canonical, scene, ended(scene, wrong, (0, truth["spin"]))) == {
+        "ball_speed",
+        "energy_lost",
+        "momentum_defect",
+    }
+    aside = [*speeds, (0, 0, size * scene.params["v"])]
+    assert failing(canonical, scene, ended(scene, aside, (0, truth["spin"]))) == {"momentum_defect"}
+
+
+# ---- a box that lands flat ----
+
+
+@pytest.mark.parametrize("aspect", [1.0, 4.0])
+def test_a_flat_box_rebounds_as_two_springs_at_its_corners_make_it(aspect):
+    """At e = 1: two stiff springs under a rigid box that may turn; nothing turns it."""
+    _, scene, truth = made("flat_box", e=1.0, aspect=aspect, mu=0.0)
+    box, h, stiffness = scene.bodies[1], 1e-6, 1e8
+    y, v, angle, spin, arm = 0.5 + 1e-4, box.twist[1], 0.0, 0.0, 0.5 * aspect
+    for _ in range(2000):
+        left, right = (stiffness * max(0.0, 0.5 - y - side * arm * math.sin(angle)) for side in (-1.0, 1.0))
+        v, spin = v + h * (left + right) / box.mass, spin + h * arm * (right - left) / box.inertia
+        y, angle = y + h * v, angle + h * spin
+    assert (v / scene.params["v"], spin) == (pytest.approx(truth["rebound_ratio"], abs=1e-3), truth["edge_speed"])
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_one_pass_over_the_corners_fails(size):
+    """It leaves less speed and some spin, or throws the box aside."""
+    canonical, scene, truth = made("flat_box")
+    v = scene.params["v"]
+    good = [(1, 1, truth["rebound_ratio"] * v)]
+    assert failing(canonical, scene, ended(scene, good)) == set()
+    slow = [(1, 1, truth["rebound_ratio"] * v - size * v)]
+    assert failing(canonical, scene, ended(scene, slow)) == {"rebound_ratio"}
+    assert failing(canonical, scene, ended(scene, good, (1, size))) == {"edge_speed"}
+    assert failing(canonical, scene, ended(scene, [*good, (1, 0, size)])) == {"sideways"}
+
+
+# ---- impacts one after the other ----
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
+def test_the_small_ball_is_thrown_as_springs_throw_it(ratio):
+    _, scene, truth = made("stacked_balls", ratio=ratio, e=1.0)
+    balls = scene.bodies[1:]
+    found = spring_line(
+        [b.mass for b in balls], [0.5, 0.2], [b.pose[1] for b in balls], [b.twist[1] for b in balls], wall=0.0,
+        duration=scene.duration,
+    )  # fmt: skip
+    assert found == pytest.approx([truth["large_speed"], truth["small_speed"]], abs=2e-3)
+
+
+@pytest.mark.parametrize(("ratio", "e"), [(10.0, 0.9), (1e6, 1.0), (3.0, 0.5)])
+def test_the_first_meeting_is_the_closed_form(ratio, e):
+    params = CATALOGUE["stacked_balls"].complete({"ratio": ratio, "e": e})
+    _, (_, large, small), *_ = stacked_balls.impacts(params)
+    v, m, big = params["v"], params["mass"], params["mass"] * ratio
+    assert small == pytest.approx(v * (big * e + big * e * (1 + e) - m) / (big + m), rel=1e-12)
+    assert large == pytest.approx(v * (big * e - m * e * (1 + e) - m) / (big + m), rel=1e-9)
+
+
+def test_a_light_ball_is_almost_three_times_as_fast():
+    _, scene, truth = made("stacked_balls", ratio=1e6, e=1.0)
+    assert truth["small_speed"] == pytest.approx(3.0 * scene.params["v"], rel=1e-5)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_throw_that_is_off_fails(size):
+    canonical, scene, truth = made("stacked_balls")
+    good = [(1, 1, truth["large_speed"]), (2, 1, truth["small_speed"])]
+    assert failing(canonical, scene, ended(scene, good)) == set()
+    off = [good[0], (2, 1, truth["small_speed"] * (1.0 - size))]
+    assert failing(canonical, scene, ended(scene, off)) == {"small_speed", "energy_lost"}
+    off = [(1, 1, truth["large_speed"] * (1.0 - size)), good[1]]
+    assert failing(canonical, scene, ended(scene, off)) == {"large_speed", "energy_lost"}
+
+
+def test_impacts_that_lie_within_some_steps_are_not_judged():
+    canonical = CATALOGUE["stacked_balls"]
+    scene = canonical.scene(2, {"apart": 0.01})
+    assert {check.bound for check in canonical.checks(scene, DT)} == {None}
+    assert None not in {check.bound for check in canonical.checks(scene, 1 / 960)}
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_a_row_with_gaps_hands_the_blow_on_as_springs_do(n):
+    _, scene, truth = made("cradle", n=float(n))
+    found = spring_line(
+        [1.0] * n, [0.5] * n, [b.pose[0] for b in scene.bodies], [b.twist[0] for b in scene.bodies],
+        duration=scene.duration,
+    )  # fmt: skip
+    assert found == pytest.approx([truth[f"speed[{k}]"] for k in range(1, n + 1)], abs=1e-3)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_row_that_loses_or_keeps_some_of_the_blow_fails(size):
+    canonical, scene, _ = made("cradle")
+    good = [(3, 0, 2.0)]
+    assert failing(canonical, scene, ended(scene, good)) == set()
+    kept = [(3, 0, 2.0 * (1.0 - size)), (0, 0, 2.0 * size)]
+    assert failing(canonical, scene, ended(scene, kept)) == {"speed[1]", "speed[4]", "energy_defect"}
+    lost = [(3, 0, 2.0 * (1.0 - size))]
+    assert failing(canonical, scene, ended(scene, lost)) == {"speed[4]", "energy_defect", "momentum_defect"}
+
+
+def test_touching_balls_are_judged_by_what_both_laws_conserve():
+    canonical, scene, truth = made("cradle", n=3.0, apart=0.0)
+    v = scene.params["v"]
+    for speeds in ((-v / 3, 2 * v / 3, 2 * v / 3), (0.0, 0.0, v)):
+        assert failing(canonical, scene, ended(scene, [(k, 0, s) for k, s in enumerate(speeds)])) == set()
+    together = [(k, 0, v / 3) for k in range(3)]
+    assert failing(canonical, scene, ended(scene, together)) == {"energy_defect"}
+    assert set(truth) == {"momentum_defect", "energy_defect"}
+
+
+# ---- the digits of pi ----
+
+
+@pytest.mark.parametrize(("ratio", "count"), [(1.0, 3), (3.0, 5), (16.0, 12), (100.0, 31), (1e4, 314), (1e6, 3141)])
+def test_impacts_count_the_digits_of_pi(ratio, count):
+    params = CATALOGUE["galperin"].complete({"ratio": ratio})
+    found = galperin.impacts(params)
+    assert len(found) == galperin.count(params) == count
+    _, small, large = found[-1]
+    assert small <= large * (1.0 + 1e-9) + 1e-9, "the small ball cannot catch up any more"
+    assert count < 2 or found[-2][1] > found[-2][2] or found[-2][1] < 0.0, (
+        "before the last impact there was one to come"
+    )
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0])
+def test_the_closed_form_is_what_springs_between_ball_ball_and_wall_make(ratio):
+    _, scene, truth = made("galperin", ratio=ratio)
+    balls = scene.bodies[1:]
+    found = spring_line(
+        [b.mass for b in balls], [0.1, 0.4], [b.pose[0] for b in balls], [b.twist[0] for b in balls], wall=0.0,
+        duration=scene.duration,
+    )  # fmt: skip
+    assert found == pytest.approx([truth["small_speed"], truth["large_speed"]], abs=5e-3)
+
+
+@pytest.mark.parametrize("ratio", [16.0, 100.0, 1e4])
+def test_the_closed_form_is_the_end_of_the_impacts(ratio):
+    _, scene, truth = made("galperin", ratio=ratio)
+    _, small, large = galperin.impacts(scene.params)[-1]
+    assert (small, large) == (
+        pytest.approx(truth["small_speed"], abs=1e-9),
+        pytest.approx(truth["large_speed"], abs=1e-9),
+    )
+
+
+def test_one_impact_too_few_and_a_soft_one_fail():
+    canonical, scene, truth = made("galperin")
+    _, small, large = galperin.impacts(scene.params)[-2]
+    assert failing(canonical, scene, ended(scene, [(1, 0, small), (2, 0, large)])) == {"small_speed"}
+    for size in (0.1, 0.01, 0.001):
+        soft = [(1, 0, truth["small_speed"]), (2, 0, truth["large_speed"] * (1.0 - size))]
+        assert failing(canonical, scene, ended(scene, soft)) == {"large_speed", "energy_defect"}

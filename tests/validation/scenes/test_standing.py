@@ -1,0 +1,208 @@
+"""Scenes of bodies that stand, are held or slide to a stop: forces balanced anew, motion integrated, faults planted."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes import pinch
+
+DT = 1 / 240
+G = 9.81
+
+
+def made(name, dimension=2, **params):
+    canonical = CATALOGUE[name]
+    return canonical, canonical.scene(dimension, params)
+
+
+def at_rest(scene, impulses, duration=3.0):
+    """A planar record in which nothing moves and each pair (a, b) carries its impulse on b, step by step."""
+    n = round(duration / DT) + 1
+    pose = np.array([[body.pose for body in scene.bodies]] * n)
+    pairs = np.array(list(impulses))
+    each = np.array([impulses[tuple(pair)] for pair in pairs])
+    a, b = np.tile(pairs[:, 0], n), np.tile(pairs[:, 1], n)
+    rows = Contacts(a, b, *(np.zeros((n * len(pairs), 2)) for _ in range(2)), np.tile(each, (n, 1)), np.zeros(len(a)))
+    record = ContactRecord(np.arange(n), len(pairs) * np.arange(n + 1), rows)
+    return Trajectory(np.arange(n) * DT, pose, np.zeros_like(pose), record, DT, "completed")
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, trajectory.dt)
+        if not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+def scaled(trajectory, share):
+    """The same record with all impulses a share of what they were."""
+    rows = replace(trajectory.contacts.rows, impulse=share * trajectory.contacts.rows.impulse)
+    return replace(trajectory, contacts=replace(trajectory.contacts, rows=rows))
+
+
+# ---- a ball in a groove ----
+
+
+def groove(left, right):
+    """Scene and its record at rest, from a triangle of forces that is solved anew."""
+    canonical, scene = made("v_groove", left=left, right=right)
+    normals = np.array([body.shape.normal for body in scene.bodies[:2]]).T
+    loads = np.linalg.solve(normals, [0.0, scene.params["mass"] * G])
+    return canonical, scene, at_rest(scene, {(k, 2): loads[k] * DT * normals[:, k] for k in (0, 1)}), loads
+
+
+@pytest.mark.parametrize(("left", "right"), [(45.0, 45.0), (60.0, 20.0), (10.0, 80.0), (85.0, 85.0)])
+def test_the_triangle_of_forces_holds_a_ball_that_touches_both_planes(left, right):
+    canonical, scene, trajectory, loads = groove(left, right)
+    for body in scene.bodies[:2]:
+        assert np.dot(body.shape.normal, scene.bodies[2].pose[:2]) == pytest.approx(0.5, abs=1e-12)
+    assert (loads > 0.0).all() and failing(canonical, scene, trajectory) == set()
+    if left == right:
+        assert loads == pytest.approx([G / (2.0 * math.cos(math.radians(left)))] * 2)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_plane_that_pushes_too_little_and_a_ball_that_moves_fail(size):
+    canonical, scene, trajectory, _ = groove(60.0, 20.0)
+    assert failing(canonical, scene, scaled(trajectory, 1.0 - size)) == {"load[left]", "load[right]"}
+    sunk = trajectory.pose.copy()
+    sunk[1:, 2, 1] -= size
+    assert failing(canonical, scene, replace(trajectory, pose=sunk)) == {"displacement"}
+    moving = trajectory.twist.copy()
+    moving[:, 2, 0] = size
+    assert failing(canonical, scene, replace(trajectory, twist=moving)) == {"settle_time", "kinetic_energy"}
+
+
+# ---- a heavy box on a light one ----
+
+
+@pytest.mark.parametrize("ratio", [1.0, 100.0, 1e6])
+def test_a_pair_that_carries_passes_and_one_that_does_not_fails(ratio):
+    canonical, scene = made("heavy_on_light", ratio=ratio)
+    heavy, both = ratio * G, (1.0 + ratio) * G
+    good = at_rest(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, heavy * DT])})
+    assert failing(canonical, scene, good) == set()
+    for size in (0.1, 0.01, 0.001):
+        assert failing(canonical, scene, scaled(good, 1.0 - size)) == {"interface_impulse[1]", "interface_impulse[2]"}
+        sunk = good.pose.copy()
+        sunk[1:, 2, 1] -= size
+        assert failing(canonical, scene, replace(good, pose=sunk)) == {"penetration"}
+        aside = good.pose.copy()
+        aside[1:, 2, 0] += size
+        assert failing(canonical, scene, replace(good, pose=aside)) == {"drift"}
+    light = at_rest(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, 0.99 * heavy * DT])})
+    assert failing(canonical, scene, light) == {"interface_impulse[2]"}
+
+
+# ---- a grip ----
+
+
+@pytest.mark.parametrize("margin", [1.05, 2.0, 100.0])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_a_grip_in_balance_passes_however_wall_and_pad_share_the_weight(margin, share):
+    canonical, scene = made("pinch", margin=margin)
+    p, force = scene.params, pinch.grip(scene.params)
+    weight = p["mass"] * G
+    # The pad's balance: pressed by its force, pushed back by the box; the floor carries it and its share.
+    wall = np.array([force, share * weight]) * DT
+    pad = np.array([force, -(1.0 - share) * weight]) * DT
+    floor = np.array([0.0, p["pad"] * G + (1.0 - share) * weight]) * DT
+    box = wall - pad + np.array([0.0, -weight]) * DT
+    assert box == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert pad + floor + DT * (np.array(scene.bodies[3].force) + [0.0, -p["pad"] * G]) == pytest.approx(
+        [0, 0], abs=1e-12
+    )
+    good = at_rest(scene, {(0, 3): floor, (1, 2): wall, (2, 3): pad})
+    assert failing(canonical, scene, good) == set()
+    for size in (0.1, 0.01, 0.001):
+        assert failing(canonical, scene, scaled(good, 1.0 - size)) == {"grip", "carried"}
+        sinking = good.pose.copy()
+        sinking[:, 2, 1] -= size * good.t
+        assert failing(canonical, scene, replace(good, pose=sinking)) == {"creep"}
+        turning = good.twist.copy()
+        turning[-1, 2, 2] = 10.0 * size
+        assert failing(canonical, scene, replace(good, twist=turning)) == {"turned"}
+
+
+def test_the_grip_is_as_strong_as_its_margin_says():
+    """Friction of both faces at the limit, over the weight."""
+    for margin in (1.0, 1.05, 7.0):
+        _, scene = made("pinch", margin=margin, mu=0.3)
+        force = -scene.bodies[3].force[0]
+        assert 2.0 * 0.3 * force / (scene.params["mass"] * G) == pytest.approx(margin)
+
+
+# ---- a box that slides to a stop ----
+
+
+def sliding(scene, dt, mu=None, offset=0.0):
+    """Independent integration: dv/dt = -mu g along the motion, in many small steps, and at rest once it has stopped.
+
+    ``offset`` in steps shifts what is sampled, as step orders do.
+    """
+    p = scene.params
+    mu = p["mu"] if mu is None else mu
+    x, v, path, fine = 0.0, p["v"], [], 200
+    h = dt / fine
+    for k in range(round(scene.duration / dt) * fine + fine):
+        if k % fine == 0:
+            path.append((x, v))
+        before, v = v, max(0.0, v - mu * p["g"] * h)
+        x += 0.5 * (before + v) * h
+    path = np.array(path)
+    n = len(path)
+    pose = np.array([[body.pose for body in scene.bodies]] * n)
+    twist = np.zeros((n, 2, pose.shape[2] if pose.shape[2] == 3 else 6))
+    heading = np.array([1.0]) if scene.dimension == 2 else np.array(
+        [math.cos(math.radians(p["heading"])), math.sin(math.radians(p["heading"]))]
+    )  # fmt: skip
+    flat = scene.dimension - 1
+    place = path[:, 0] + offset * dt * (path[:, 1] - p["v"])
+    pose[:, 1, :flat], twist[:, 1, :flat] = np.outer(place, heading), np.outer(path[:, 1], heading)
+    return Trajectory(np.arange(n) * dt, pose, twist, None, dt, "completed")
+
+
+@pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
+@pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
+@pytest.mark.parametrize(("dimension", "heading"), [(2, 0.0), (3, 0.0), (3, 30.0)])
+def test_coulomb_s_law_integrated_stops_where_the_formula_says_in_every_step_order(dimension, heading, dt, offset):
+    canonical, scene = made("slide", dimension, heading=heading)
+    trajectory = sliding(scene, dt, offset=offset)
+    assert failing(canonical, scene, trajectory) == set()
+    if not offset:
+        way = canonical.measure(scene, trajectory)["stopping_distance"][0]
+        assert way == pytest.approx(canonical.exact(scene)["stopping_distance"], abs=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_slide_with_wrong_friction_a_hop_a_turn_or_a_bend_fails(size):
+    canonical, scene = made("slide", 3)
+    wrong = failing(canonical, scene, sliding(scene, DT, mu=0.4 * (1.0 - size)))
+    assert "braking" in wrong
+    assert size < 0.02 or "stopping_distance" in wrong
+    good = sliding(scene, DT)
+    raised = good.pose.copy()
+    raised[10, 1, 2] += size
+    assert failing(canonical, scene, replace(good, pose=raised)) == {"hop"}
+    turned = good.pose.copy()
+    turned[10:, 1, 3:] = [math.cos(0.5 * size), 0.0, 0.0, math.sin(0.5 * size)]
+    assert failing(canonical, scene, replace(good, pose=turned)) == {"turned"}
+    bent = good.pose.copy()
+    bent[-1, 1, 1] += size
+    assert failing(canonical, scene, replace(good, pose=bent)) == {"astray"}
+    late = good.twist.copy()
+    late[-1, 1, 1] = size
+    assert failing(canonical, scene, replace(good, twist=late)) == {"end_speed"}
+
+
+def test_a_pyramid_of_friction_fails_at_45_degrees():
+    """mu/sqrt(2) along a diagonal of the L1 cone."""
+    canonical, scene = made("slide", 3, heading=45.0)
+    assert {"braking", "stopping_distance"} <= failing(canonical, scene, sliding(scene, DT, mu=0.4 / math.sqrt(2.0)))

@@ -1,0 +1,70 @@
+"""What every scene of the catalogue owes: figure, reasons, cells that exist, checks that planted cells state."""
+
+import pytest
+
+from validation.canonical import CanonicalScene
+from validation.catalogue import CATALOGUE
+from validation.plan import QUICK_DT
+
+DT = QUICK_DT
+
+
+def cells(canonical: CanonicalScene):
+    """Every set of parameters that the scene declares."""
+    yield from (variation.params for suite in ("quick", "full") for variation in canonical.variations(suite))
+    yield canonical.representative
+    yield from canonical.planted
+    if canonical.searched:
+        yield from (*canonical.searched.cells, *canonical.searched.held_out)
+    if canonical.primary:
+        yield from canonical.primary.variations(DT)
+
+
+def families(checks):
+    return {check.metric.partition("[")[0] for check in checks}
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_a_scene_says_what_it_is(name):
+    canonical = CATALOGUE[name]
+    assert canonical.name == name and canonical.title and canonical.law
+    drawn = [line for line in canonical.figure.splitlines() if line.startswith("    ")]
+    assert len(drawn) >= 3, "its docstring opens with a drawing"
+    for parameter in canonical.parameters:
+        assert parameter.unit and parameter.because
+        assert parameter.low <= parameter.default <= parameter.high
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_cell_it_declares_can_be_made_and_has_judged_checks(name):
+    canonical = CATALOGUE[name]
+    for dimension in canonical.dimensions:
+        for params in cells(canonical):
+            scene = canonical.scene(dimension, params)
+            assert (scene.name, scene.version, scene.dimension) == (name, canonical.version, dimension)
+            assert any(check.bound is not None for check in canonical.checks(scene, DT)), params
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_faults_are_planted_where_each_of_its_checks_is_stated(name):
+    canonical = CATALOGUE[name]
+    (dimension, *_) = canonical.dimensions
+    stated = {
+        family
+        for variation in canonical.variations("quick")
+        for family in families(canonical.checks(canonical.scene(dimension, variation.params), DT))
+    }
+    planted = [families(canonical.checks(canonical.scene(dimension, params), DT)) for params in canonical.planted]
+    assert stated == set().union(*planted)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_bounds_know_the_scene_and_the_step_only(name):
+    """The same cell stated twice is judged alike, and truth lies within its own bounds."""
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(canonical.dimensions[0], canonical.representative)
+    assert canonical.checks(scene, DT) == canonical.checks(scene, DT)
+    truth = canonical.exact(scene)
+    for check in canonical.checks(scene, DT):
+        if check.bound is not None:
+            assert check.truth == truth[check.metric] and check.bound > 0.0

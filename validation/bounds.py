@@ -1,0 +1,122 @@
+"""The vocabulary of stated tolerances: bounds that scenes owe, each with the reason for it.
+
+A bound is derived from the scene and the step alone: truth + step + round-off. It cannot see which engine is judged,
+and an iteration count earns no allowance. What only one scene owes is derived in that scene's file; what several owe
+stands here, once.
+
+Natural units of a step of length dt under gravity g
+    x1 = g dt^2     the distance that one step of free fall adds
+    v1 = g dt       the speed that one step of free fall adds
+A fixed-step method that locates contact within a step cannot be asked for less than a few of these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from validation.canonical import Check
+
+#: A thousand velocity updates of one unit of round-off (2.2e-16) each, and a factor of five for the order of
+#: additions: what is left of an answer that has an exact law at every step length.
+ROUND_OFF = 1e-12
+#: A body slower than this share of v1 does not move: in a hundred steps it gains less than one step of free fall.
+STILL = 0.01
+#: Impacts that follow each other within this many steps are one to a method of fixed steps: one step finds the first,
+#: late, the next moves the bodies apart, and the second is found late as well.
+APART = 4.0
+#: Loads and energies of what stands are averaged over this much time at the end [s].
+WINDOW = 1.0
+
+
+@dataclass(frozen=True)
+class Bound:
+    """How far a value may be from its truth, in its own unit, and why."""
+
+    value: float
+    because: str
+
+    def check(self, metric: str, unit: str, truth: float, source: str) -> Check:
+        """The check of one metric with this bound; ``source`` is where its truth comes from."""
+        return Check(metric, unit, truth, self.value, self.because, source)
+
+
+# ---- answers that every step length gives exactly ----
+
+
+def exact(scale: float = 1.0) -> Bound:
+    """A law that holds at every dt; ``scale`` is the size of the numbers that are added, in the metric's unit."""
+    return Bound(ROUND_OFF * scale, "exact law at every dt: only round-off of at most 1000 velocity updates remains")
+
+
+def bookkeeping(scale: float = 1.0) -> Bound:
+    """Sums that a conservation law ties to each other, whatever the contact law."""
+    return Bound(ROUND_OFF * scale, "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law")
+
+
+# ---- what stands ----
+
+
+def slips(interfaces: int, g: float, dt: float) -> Bound:
+    """Drift [m] of what stands on ``interfaces`` contacts: a body's drift is the sum of the slips below it."""
+    because = "each of n interfaces may slip by what one step of free fall adds, and slips add up: n g dt^2"
+    return Bound(interfaces * (g * dt * dt), because)
+
+
+def found_late(g: float, dt: float, place: float) -> Bound:
+    """Overlap [m] of one contact; ``place`` [m] is the coordinate whose round-off it is told to.
+
+    An overlap belongs to one interface: if its contact is missing for one step (it starts at a gap of exactly 0, which
+    may count as open), the upper body falls relative to the lower one with at most the full g, since the lower one is
+    held or falls too, and adds x1. The next step finds the contact; more than x1 needs a contact that was missing
+    twice or held too little.
+    """
+    because = "one interface whose contact is found one step late: one step of free fall, g dt^2, whatever lies above"
+    return Bound(g * dt * dt + ROUND_OFF * place, because)
+
+
+def landed(speed: float, g: float, dt: float, place: float) -> Bound:
+    """Place [m] of what came to rest by an impact at ``speed`` [m/s]; ``place`` [m] as in `found_late`.
+
+    The impact is found up to one step late, speed dt deep, and nothing says that a solver must push out what it finds.
+    """
+    because = "the impact is found up to one step late, v dt deep, and the rest one more step of free fall: + g dt^2"
+    return Bound(speed * dt + g * dt * dt + ROUND_OFF * place, because)
+
+
+def still_energy(mass: float, g: float, dt: float) -> Bound:
+    """Kinetic energy [J] of bodies of ``mass`` in all that do not move."""
+    because = "n bodies below the speed that counts as motion, v1/100 = g dt/100"
+    return Bound(0.5 * mass * (STILL * (g * dt)) ** 2, because)
+
+
+def settled(interfaces: int, dt: float, duration: float) -> Bound:
+    """Time [s] until what starts at rest on ``interfaces`` contacts is at rest again."""
+    because = "moving at v1/100 for longer would use up the drift of n g dt^2; and the last second must be at rest"
+    return Bound(min(interfaces / STILL * dt, duration - WINDOW), because)
+
+
+def carried(dt: float) -> Bound:
+    """Mean load over the last `WINDOW`, relative to the weight that is carried."""
+    because = "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted"
+    return Bound(2.0 * STILL * dt / WINDOW, because)
+
+
+def steady() -> Bound:
+    """Standard deviation of a load from step to step, relative to the weight that is carried."""
+    because = "a body slower than v1/100 changes its momentum by at most 2 m v1/100 a step"
+    return Bound(2.0 * STILL, because)
+
+
+# ---- what sticks or slides ----
+
+
+def stuck(g: float, dt: float, duration: float) -> Bound:
+    """Mean speed [m/s] of what sticks."""
+    because = "a sticking box may move by what one step of free fall adds, g dt^2, over the whole run"
+    return Bound(g * dt * dt / duration, because)
+
+
+def driven(g: float, dt: float, window: float) -> Bound:
+    """Mean acceleration [m/s^2] over ``window`` seconds under constant forces."""
+    because = "constant force is exact in every scheme: only motion below v1/100 = g dt/100 is forgiven"
+    return Bound(STILL * g * dt / window, because)

@@ -1,0 +1,108 @@
+"""The catalogue of canonical scenes: ours, and those that other installed packages bring.
+
+    [project.entry-points."contact_crosscheck.scenes"]
+    drop = "mypackage.drop:SCENE"
+
+A scene is loaded when it is first asked for. One of another package that cannot be loaded is left out, with the
+reason (`broken`, which ``crosscheck doctor`` says); it costs nothing else.
+"""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+
+from adapters.plain import NAME, one_line
+from adapters.scene import SceneError
+from validation.canonical import CanonicalScene
+from validation.scenes import OURS
+
+GROUP = "contact_crosscheck.scenes"
+#: A scene's name is written in commands, tables, anchors and files.
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@cache
+def _entries() -> dict[str, EntryPoint]:
+    """Entry points of other packages by scene; what takes the name of one of ours is not among them."""
+    return {entry.name: entry for entry in sorted(entry_points(group=GROUP)) if entry.name not in OURS}
+
+
+@cache
+def _loaded(name: str) -> CanonicalScene | SceneError:
+    """The scene called ``name``, or why it cannot be had."""
+    if name in OURS:
+        ours: CanonicalScene = import_module(f"validation.scenes.{name}").SCENE
+        return ours
+    entry = _entries()[name]
+    where = f"scene: {one_line(name, NAME)} of {one_line(entry.value, NAME)}"
+    if not _NAME.fullmatch(name) or len(name) > NAME:
+        return SceneError(f"{where} is not a name of small letters, digits and underscores")
+    try:
+        found = entry.load()
+    except (Exception, SystemExit) as error:  # a package of others may raise anything; only its scene may suffer
+        return SceneError(f"{where} cannot be loaded: {type(error).__name__}: {one_line(error)}")
+    if not isinstance(found, CanonicalScene) or found.name != name:
+        return SceneError(f"{where} is not a CanonicalScene of that name")
+    return found
+
+
+def module_of(name: str) -> str:
+    """Module that a scene comes from."""
+    return f"validation.scenes.{name}" if name in OURS else _entries()[name].module
+
+
+def broken() -> list[str]:
+    """One line for each scene of another package that cannot be had."""
+    return [str(found) for name in _entries() if isinstance(found := _loaded(name), SceneError)]
+
+
+def forget() -> None:
+    """Look again at what is installed."""
+    _entries.cache_clear()
+    _loaded.cache_clear()
+
+
+class _Catalogue(Mapping[str, CanonicalScene]):
+    """Scenes by name: ours in their order, then those of others by name."""
+
+    def __getitem__(self, name: str) -> CanonicalScene:
+        if name not in OURS and name not in _entries():
+            raise KeyError(name)
+        found = _loaded(name)
+        if isinstance(found, SceneError):
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        yield from OURS
+        yield from (name for name in _entries() if isinstance(_loaded(name), CanonicalScene))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+CATALOGUE: Mapping[str, CanonicalScene] = _Catalogue()
+
+
+def matching(pattern: str) -> list[CanonicalScene]:
+    """Scenes whose name is, or matches the glob, ``pattern``.
+
+    Raises
+    ------
+    SceneError
+        If there is none ("did you mean"), or it cannot be loaded.
+    """
+    found = [scene for name, scene in CATALOGUE.items() if fnmatch.fnmatchcase(name, pattern)]
+    if found:
+        return found
+    if pattern in _entries() and isinstance(reason := _loaded(pattern), SceneError):
+        raise reason
+    close = difflib.get_close_matches(pattern, CATALOGUE, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(CATALOGUE)}"
+    raise SceneError(f"scene: there is no scene called {pattern!r}, {hint}")

@@ -1,0 +1,76 @@
+"""What columns of bodies at rest have in common: bodies 1, 2, ... stand on each other, body 0 is the floor.
+
+Truth, metrics and checks for a scene whose bodies start in equilibrium, each on the one before it: nothing moves, and
+interface i carries the weight of the bodies from i upwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from adapters.scene import Scene
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.bounds import WINDOW
+from validation.canonical import Check, Measured
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Equilibrium; loads are relative to the weight above."""
+    truth = dict.fromkeys(("settle_time", "drift", "penetration", "kinetic_energy", "impulse_scatter"), 0.0)
+    return truth | {f"interface_impulse[{i}]": 1.0 for i in range(1, len(scene.bodies))}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Everything from poses and impulses, the same routine for every engine."""
+    g = math.hypot(*scene.gravity)
+    speed = metrics.body_speeds(scene, trajectory)
+    late = trajectory.t > trajectory.t[-1] - WINDOW
+    energy = metrics.kinetic_energy(scene, trajectory)
+    measured: dict[str, Measured] = {
+        "settle_time": metrics.last_motion(trajectory.t, speed.max(axis=1), bounds.STILL * g * trajectory.dt),
+        "drift": (metrics.lateral_drift(trajectory), ""),
+        "penetration": (metrics.deepest_overlap(scene, trajectory), ""),
+        "kinetic_energy": (float(energy[late].mean()), ""),
+    }
+    scatter: list[float] = []
+    for i in range(1, len(scene.bodies)):
+        above = sum(body.mass for body in scene.bodies[i:]) * g * trajectory.dt
+        mean, deviation = metrics.interface_load(trajectory, i - 1, i, above, WINDOW)
+        measured[f"interface_impulse[{i}]"] = mean
+        if deviation is not None:
+            scatter.append(deviation)
+    none = (None, "impulses are not available")
+    measured["impulse_scatter"] = (max(scatter), "") if scatter else none
+    return measured
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Positions add up along the column, overlaps do not: n g dt^2 of drift, g dt^2 of overlap however high it is."""
+    n, g, mass = len(scene.bodies) - 1, math.hypot(*scene.gravity), sum(body.mass for body in scene.bodies[1:])
+    top = scene.bodies[-1].pose[scene.dimension - 1]  # heights are rounded relative to the column's
+    allowed = {
+        "settle_time": ("s", bounds.settled(n, dt, scene.duration)),
+        "drift": ("m", bounds.slips(n, g, dt)),
+        "penetration": ("m", bounds.found_late(g, dt, top)),
+        "kinetic_energy": ("J", bounds.still_energy(mass, g, dt)),
+        "impulse_scatter": ("1", bounds.steady()),
+    }
+    source = "static equilibrium"
+    found = [bound.check(name, unit, truth[name], source) for name, (unit, bound) in allowed.items()]
+    loads = [name for name in truth if name.startswith("interface_impulse")]
+    return found + [bounds.carried(dt).check(name, "1", truth[name], "weight above the interface") for name in loads]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step; contacts over the last second."""
+    return Sampling(1, max(0.0, scene.duration - WINDOW))
+
+
+def displacement(found: Mapping[str, Measured], size: float) -> Measured:
+    """Larger of the drift and the deepest overlap, in units of ``size`` [m]."""
+    drift, penetration = found["drift"], found["penetration"]
+    if drift[0] is None or penetration[0] is None:
+        return None, drift[1] or penetration[1]
+    return max(drift[0], penetration[0]) / size, ""

@@ -1,0 +1,80 @@
+"""A heavy box stands on a light one and should stay there.
+
+        +---+  r m
+        |   |             the lower interface carries (1 + r) m g,
+        +---+  m          the upper one r m g
+        |   |             nothing moves, drifts or sinks
+    ==============
+
+The light box is pressed between two large forces that all but cancel. What a solver leaves of them, or softness in
+units of the light box's own mass, squeezes it out or lets the heavy one sink in. It starts exactly touching.
+"""
+
+from __future__ import annotations
+
+from adapters.scene import Pair, Scene
+from validation import columns
+from validation.canonical import GRAVITY, CanonicalScene, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import cube, floor, upward
+
+SIDE = 1.0
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the pair."""
+    light = cube("light", dimension, params["mass"], SIDE, 0.5 * SIDE)
+    heavy = cube("heavy", dimension, params["ratio"] * params["mass"], SIDE, 1.5 * SIDE)
+    return Scene(
+        "heavy_on_light",
+        1,
+        dimension,
+        (floor(dimension), light, heavy),
+        (Pair(restitution=0.0, friction=params["mu"]),),
+        upward(dimension, -params["g"]),
+        params["duration"],
+        params,
+    )
+
+
+def track(scene: Scene) -> Track:
+    """The heavy box stays where it is."""
+    top = scene.bodies[-1]
+    return Track(top.name, lambda t: top.pose[: scene.dimension])
+
+
+SCENE = CanonicalScene(
+    name="heavy_on_light",
+    version=1,
+    title="Heavy box on a light one, in equilibrium",
+    figure=__doc__ or "",
+    law="nothing moves; each interface carries the weight above it, whatever the ratio of masses",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("ratio", 100.0, "1", "mass of the upper box over that of the lower", 1e-3, 1e6),
+        Parameter("mu", 0.5, "1", "friction of every pair", 0.0, 10.0),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("mass", 1.0, "kg", "of the lower box", 0.0, 1e6, positive=True),
+        Parameter("duration", 5.0, "s", "long enough for a slow sinking to show", 1.0, 1e4),
+    ),
+    make=make,
+    exact=columns.exact,
+    measure=columns.measure,
+    rule=columns.checks,
+    sampling=columns.sampling,
+    track=track,
+    quick=(Variation({}), Variation({"ratio": 1e4})),
+    full=tuple(Variation({"ratio": 10.0**k}, (None, 1, 10, 100)) for k in range(7)),
+    planted=({},),
+    primary=Primary(
+        "displacement",
+        "side",
+        "larger of the sideways drift and the deepest overlap within 5 s, per side of a box, at the default ratio",
+        "nothing may move, so whatever did is error, sideways or into the neighbour",
+        lambda dt: [{}],
+        lambda scene, dt, found: columns.displacement(found, SIDE),
+        "the standing pair, half a second after the start",
+        0.5,
+        0.25,
+    ),
+    smooth=("penetration",),
+)

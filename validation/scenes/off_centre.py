@@ -1,0 +1,200 @@
+"""A ball strikes a free bar beside its centre of mass.
+
+             o  m
+             | v                 1/k = 1/m + 1/M + d^2/I
+        +----v-----------+       J = (1 + e) k (v - V)
+        |      +  M, I   |       bar:  V' = V - J/M,  spin d J/I
+        +----------------+       ball: v' = v - J/m   (down is positive)
+             |-d-|
+
+The face is smooth, so that nothing acts along it, and the bar may move towards the ball. With d = 0 the law of two
+balls is left; far out the bar gives way, as if it were lighter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, ball, block
+
+RADIUS, WIDTH, HEIGHT = 0.25, 2.0, 0.5
+#: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s; the bar must
+#: not turn into the ball meanwhile.
+AFTERMATH = 0.2
+#: Time until contact [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
+DELAY = 0.0525
+#: Phases of the contact within a step; the primary error is the supremum over them.
+PHASES = 16
+
+
+def _moment(params: Params) -> float:
+    """Moment of inertia about the axis that the blow turns the bar about [kg m^2]."""
+    return params["ratio"] * params["mass"] * (WIDTH**2 + HEIGHT**2) / 12.0
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the ball reaches the upper face, left of the centre, after ``delay`` seconds."""
+    p = params
+    bar = at(
+        block("bar", dimension, p["ratio"] * p["mass"], WIDTH, HEIGHT),
+        dimension,
+        along(dimension, 0.0, -0.5 * HEIGHT - p["rise"] * p["delay"]),
+        along(dimension, 0.0, p["rise"]),
+    )
+    striker = at(
+        ball("ball", dimension, p["mass"], RADIUS, 0.0),
+        dimension,
+        along(dimension, -p["offset"], RADIUS + p["v"] * p["delay"]),
+        along(dimension, 0.0, -p["v"]),
+    )
+    pairs = (Pair(restitution=p["e"], friction=0.0),)
+    return Scene("off_centre", 1, dimension, (bar, striker), pairs, (0.0,) * dimension, p["delay"] + AFTERMATH, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Newton's law at the point that is struck, with the bar's own mass there."""
+    p = scene.params
+    m, big, moment, d, e = p["mass"], p["ratio"] * p["mass"], _moment(p), p["offset"], p["e"]
+    closing = p["v"] + p["rise"]
+    reduced = 1.0 / (1.0 / m + 1.0 / big + d * d / moment)
+    impulse = (1.0 + e) * reduced * closing
+    return {
+        "ball_speed": impulse / m - p["v"],
+        "bar_speed": p["rise"] - impulse / big,
+        "spin": impulse * d / moment,
+        "impulse": impulse,
+        "energy_lost": 1.0 - e * e,
+        "momentum_defect": 0.0,
+    }
+
+
+def _energy(params: Params, ball_speed: float, bar_speed: float, spin: float) -> float:
+    m, big = params["mass"], params["ratio"] * params["mass"]
+    return 0.5 * (m * ball_speed**2 + big * bar_speed**2 + _moment(params) * spin**2)
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Velocities at the end; energy in units of what the closing speed has at the point that is struck."""
+    p, d = scene.params, scene.dimension
+    bar, striker = (float(v) for v in trajectory.twist[-1, :, d - 1])
+    # A blow down on the left turns the bar counter-clockwise: about +z in the plane, about -y in space.
+    spin = float(trajectory.twist[-1, 0, 2] if d == 2 else -trajectory.twist[-1, 0, 4])
+    impulse = metrics.total_impulse(trajectory, 0, 1)
+    change = p["mass"] * (striker + p["v"]) + p["ratio"] * p["mass"] * (bar - p["rise"])
+    lost = _energy(p, p["v"], p["rise"], 0.0) - _energy(p, striker, bar, spin)
+    sideways = float(np.abs(trajectory.twist[-1, :, : d - 1]).max())
+    return {
+        "ball_speed": (striker, ""),
+        "bar_speed": (bar, ""),
+        "spin": (spin, ""),
+        "impulse": (None, impulse[1]) if impulse[0] is None else (float(impulse[0][-1]), ""),
+        "energy_lost": (lost / _available(p), ""),
+        "momentum_defect": (math.hypot(change / (p["mass"] * (p["v"] + p["rise"])), sideways / p["v"]), ""),
+    }
+
+
+def _available(p: Params) -> float:
+    """Energy of the closing speed at the point that is struck, k (v - V)^2/2 [J]."""
+    reduced = 1.0 / (1.0 / p["mass"] + 1.0 / (p["ratio"] * p["mass"]) + p["offset"] ** 2 / _moment(p))
+    return 0.5 * reduced * (p["v"] + p["rise"]) ** 2
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """The face is level and smooth until the blow: exact at every step, whenever within it the blow is found."""
+    p = scene.params
+    closing = p["v"] + p["rise"]
+    source = "Newton's law of restitution at the point that is struck; conservation of momentum and angular momentum"
+    scales = {
+        "ball_speed": ("m/s", closing),
+        "bar_speed": ("m/s", closing),
+        "spin": ("rad/s", closing * max(1.0, p["offset"] * p["mass"] / _moment(p))),
+        "impulse": ("N s", p["mass"] * closing),
+        # A difference of energies: round-off of all of them, in units of what there is to lose.
+        "energy_lost": ("1", _energy(p, p["v"], p["rise"], 0.0) / _available(p)),
+    }
+    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
+    defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
+    return [*found, defect]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step, with contacts from the start: the impulse is summed over the contact."""
+    return Sampling(1, 0.0)
+
+
+def track(scene: Scene) -> Track:
+    """The ball: straight down, then with what the blow leaves it."""
+    p, after = scene.params, exact(scene)["ball_speed"]
+
+    def position(t: float) -> tuple[float, ...]:
+        since = t - p["delay"]
+        return along(scene.dimension, -p["offset"], RADIUS + since * (-p["v"] if since < 0.0 else after))
+
+    return Track("ball", position)
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Larger error of the two speeds and of the spin half a bar away, relative to the closing speed."""
+    p, truth = scene.params, exact(scene)
+    off = []
+    for name, arm in (("ball_speed", 1.0), ("bar_speed", 1.0), ("spin", 0.5 * WIDTH)):
+        value, reason = found[name]
+        if value is None:
+            return None, reason
+        off.append(arm * abs(value - truth[name]))
+    return max(off) / (p["v"] + p["rise"]), ""
+
+
+SCENE = CanonicalScene(
+    name="off_centre",
+    version=1,
+    title="Ball strikes a free bar beside its centre",
+    figure=__doc__ or "",
+    law="J = (1 + e) (v - V)/(1/m + 1/M + d^2/I),  spin' = d J/I",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("offset", 0.6, "m", "distance of the blow from the centre of mass, at most 0.7 m", 0.0, 0.7),
+        Parameter("ratio", 2.0, "1", "mass of the bar over that of the ball", 1e-3, 1e6),
+        Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
+        Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
+        Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
+        Parameter("delay", DELAY, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        Parameter("mass", 0.5, "kg", "of the ball", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
+    track=track,
+    quick=(Variation({}), Variation({"offset": 0.3, "e": 1.0})),
+    full=tuple(
+        Variation({"offset": d, "e": e, "ratio": r})
+        for d in (0.0, 0.3, 0.6)
+        for e in (0.0, 0.5, 0.8, 1.0)
+        for r in (0.5, 2.0, 100.0)
+    ),
+    planted=({},),
+    primary=Primary(
+        "velocity error",
+        "1",
+        f"largest error of the ball's, the bar's and its end's speed over the closing speed, {PHASES} contact times",
+        "a blow beside the centre tests what a central one cannot: the mass that a turning body has where it is struck",
+        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        error,
+        "the whole scene: approach, blow, departure",
+    ),
+    words={
+        "ball_speed": "sends the ball off with {value}",
+        "bar_speed": "leaves the bar with {value}",
+        "spin": "turns the bar with {value}",
+        "energy_lost": "takes {value} of the energy that the blow has",
+    },
+)

@@ -1,0 +1,153 @@
+"""A box is held between a wall and a pad that presses on it: grip by friction alone.
+
+    wall |+-----+| pad  |
+         || box ||      | <-- N       sticks if W <= 2 mu N:  margin = 2 mu N/W >= 1
+         |+-----+|      |             creep 0; the wall pushes back with N,
+         |   W   |      |             wall and pad together carry W
+    =====================
+
+The pad is a block on a smooth floor, pressed by a constant force through its centre, so that it carries its share of
+the weight into the floor. How wall and pad share the weight is not determined; their sum is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Body, HalfSpace, Pair, Scene
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.bounds import WINDOW
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, block, floor, upward
+
+SIDE, PAD = 0.5, 2.0
+
+
+def grip(params: Params) -> float:
+    """Normal force with which the pad presses [N]."""
+    return params["margin"] * params["mass"] * params["g"] / (2.0 * params["mu"])
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: all faces touch exactly, the box hangs at half the pad's height."""
+    p = params
+    wall = Body("wall", HalfSpace(along(dimension, 1.0), 0.0), motion="fixed")
+    box = at(block("box", dimension, p["mass"], SIDE, SIDE), dimension, along(dimension, 0.5 * SIDE, 0.5 * PAD))
+    pad = at(block("pad", dimension, p["pad"], PAD, PAD), dimension, along(dimension, SIDE + 0.5 * PAD, 0.5 * PAD))
+    pad = Body(pad.name, pad.shape, pad.mass, pad.inertia, pad.pose, force=along(dimension, -grip(p)))
+    pairs = (Pair(restitution=0.0, friction=p["mu"]), Pair("floor", "*", 0.0, 0.0))
+    bodies = (floor(dimension), wall, box, pad)
+    return Scene("pinch", 1, dimension, bodies, pairs, upward(dimension, -p["g"]), p["duration"], p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Equilibrium; loads are relative to the grip and to the weight."""
+    return {"creep": 0.0, "turned": 0.0, "grip": 1.0, "carried": 1.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Creep and turn of the box over the second half of the run; loads over the last second."""
+    p, d, dt = scene.params, scene.dimension, trajectory.dt
+    sunk = metrics.mean_rate(trajectory.t, -trajectory.pose[:, 2, d - 1])
+    spin = float(np.linalg.norm(trajectory.twist[-1, 2, d:]))
+    measured: dict[str, Measured] = {"creep": sunk, "turned": (spin * 0.5 * SIDE, "")}
+    wall, pad = _late(trajectory, 1, 2), _late(trajectory, 2, 3)
+    if wall is None or pad is None:
+        return measured | dict.fromkeys(("grip", "carried"), (None, metrics.UNAVAILABLE))
+    weight = p["mass"] * p["g"]
+    measured["grip"] = (float(wall[:, 0].mean() / (grip(p) * dt)), "")
+    measured["carried"] = (float((wall[:, -1] - pad[:, -1]).mean() / (weight * dt)), "")
+    return measured
+
+
+def _late(trajectory: Trajectory, a: int, b: int) -> Array | None:
+    """Impulses on body b from body a, step by step over the last second, (s, d) [N s]; None if not reported."""
+    contacts = trajectory.contacts
+    if contacts is None:
+        return None
+    late = trajectory.t[contacts.step] > trajectory.t[-1] - WINDOW
+    found = contacts.impulse_between(a, b)[late]
+    return None if len(found) == 0 or np.isnan(found).any() else found
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """A box that sticks may slip by one step of fall; loads are told by the momentum of what does not move."""
+    p = scene.params
+    g = p["g"]
+    source = "Coulomb's law, static; equilibrium of forces"
+    still = bounds.STILL * g * dt
+    turn = bounds.Bound(still, "a box whose edges are slower than v1/100 = g dt/100 does not turn")
+    # What is left of v1/100 before and after the last second is momentum, towards the wall of the pad as well.
+    share = bounds.carried(dt)
+    pressed = bounds.Bound(share.value * (p["mass"] + p["pad"]) * g / grip(p), share.because)
+    return [
+        bounds.stuck(g, dt, scene.duration).check("creep", "m/s", truth["creep"], source),
+        turn.check("turned", "m/s", truth["turned"], source),
+        pressed.check("grip", "1", truth["grip"], source),
+        share.check("carried", "1", truth["carried"], source),
+    ]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step; contacts over the last second."""
+    return Sampling(1, max(0.0, scene.duration - WINDOW))
+
+
+def track(scene: Scene) -> Track:
+    """The box stays where it is."""
+    return Track("box", lambda t: scene.bodies[2].pose[: scene.dimension])
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Acceleration that leads as far astray as the creep within the run, in g."""
+    value, reason = found["creep"]
+    return (None, reason) if value is None else (2.0 * abs(value) / (scene.params["g"] * scene.duration), "")
+
+
+SCENE = CanonicalScene(
+    name="pinch",
+    version=1,
+    title="Box held between a wall and a pad that presses on it",
+    figure=__doc__ or "",
+    law="sticks if W <= 2 mu N: creep 0, the wall carries N, wall and pad carry W",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("margin", 2.0, "1", "2 mu N/W: how much more the grip could hold", 1.0, 1e4),
+        Parameter("mu", 0.5, "1", "friction of wall and pad", 0.0, 10.0, positive=True),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        Parameter("pad", 4.0, "kg", "mass of the pad; it stands on the floor", 0.0, 1e6, positive=True),
+        Parameter("duration", 3.0, "s", "the second half is measured", 2.0, 1e3),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
+    track=track,
+    quick=(Variation({}), Variation({"margin": 1.05}), Variation({"margin": 100.0})),
+    full=tuple(Variation({"margin": m}) for m in (1.01, 1.05, 1.2, 2.0, 5.0, 20.0, 100.0)),
+    planted=({}, {"margin": 1.05}),
+    primary=Primary(
+        "creep",
+        "g",
+        "2 creep/(g T) of the box over the run T, margins 2, 1.05 and 100",
+        "a grip that creeps loses what it holds, however slowly; in the unit in which sliding on an incline is told",
+        lambda dt: [{}, {"margin": 1.05}, {"margin": 100.0}],
+        error,
+        "the held box, half a second after the start",
+        0.5,
+        0.25,
+    ),
+    smooth=("creep",),
+    words={
+        "creep": "lets the box creep down at {value}",
+        "turned": "turns the box: its edges move with {value}",
+        "grip": "grips with {value} of the force that presses",
+        "carried": "carries {value} of the weight it holds",
+    },
+)

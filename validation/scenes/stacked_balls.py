@@ -1,0 +1,186 @@
+"""A small ball follows a large one onto a floor, a gap apart, and is thrown back higher than it came from.
+
+          o  m
+          |  v             1. the large ball hits the floor: it leaves with e v
+          gap              2. it meets the small one at (1 + e) v:
+        ( M )                 v_m = v (M e + M e (1 + e) - m)/(M + m)   upwards
+          |  v                v_M = v (M e - m e (1 + e) - m)/(M + m)
+    ==============         3. a large ball that is thrown down hits the floor again, and may
+                              catch up with the small one: followed until they have parted
+
+Each impact is between two bodies, with the next one well apart in time, so that the law of pairs decides and no law of
+several contacts at once: v_m is almost 3 v for a light ball and e = 1. No gravity: speeds are what the impacts make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+from adapters.scene import Pair, Scene, SceneError
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import ball, floor, upward
+
+LARGE, SMALL = 0.5, 0.2
+#: Time until the large ball hits the floor [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
+DELAY = 0.0525
+#: Phases of the first impact within a step; the primary error is the supremum over them.
+PHASES = 16
+#: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
+AFTERMATH = 0.35
+#: Impacts that are followed at most.
+MOST = 20
+
+
+def _gap(params: Params) -> float:
+    """Gap between the balls [m]: they meet ``apart`` seconds after the large one has left the floor."""
+    return (1.0 + params["e"]) * params["v"] * params["apart"]
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene; it ends when everything has parted for good."""
+    p = params
+    height = LARGE + p["v"] * p["delay"]
+    large = ball("large", dimension, p["ratio"] * p["mass"], LARGE, height, -p["v"])
+    small = ball("small", dimension, p["mass"], SMALL, height + LARGE + _gap(p) + SMALL, -p["v"])
+    pairs = (Pair(restitution=p["e"], friction=0.0),)
+    duration = impacts(p)[-1][0] + AFTERMATH
+    return Scene(
+        "stacked_balls", 1, dimension, (floor(dimension), large, small), pairs, upward(dimension, 0.0), duration, p
+    )
+
+
+def impacts(params: Params) -> list[tuple[float, float, float]]:
+    """Time [s] of every impact, and the speeds of the large and the small ball after it, upwards [m/s].
+
+    Between impacts both move straight. After the balls have met only the floor can be next, and after the floor only
+    the other ball, so that the order is never in doubt; it ends when the small one is the faster, upwards.
+
+    Raises
+    ------
+    SceneError
+        If there are more than `MOST` of them: small restitutions gather infinitely many.
+    """
+    p, e, share = params, params["e"], params["ratio"] / (1.0 + params["ratio"])
+    time, height, gap = p["delay"], 0.0, _gap(p)  # of the large ball over the floor, and between the balls
+    large, small = e * p["v"], -p["v"]
+    found = [(time, large, small)]
+    while large > small or large < 0.0:
+        if len(found) > MOST:
+            raise SceneError(f"stacked_balls.e: {e:g} with ratio {p['ratio']:g} makes more than {MOST} impacts")
+        meet = large > small
+        wait = gap / (large - small) if meet else height / -large
+        time, height, gap = time + wait, height + wait * large, gap + wait * (small - large)
+        if meet:
+            closing = large - small
+            large, small = large - (1.0 + e) * (1.0 - share) * closing, small + (1.0 + e) * share * closing
+        else:
+            large *= -e
+        found.append((time, large, small))
+    return found
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Newton's law, pair after pair in order of time."""
+    p = scene.params
+    _, large, small = impacts(p)[-1]
+    before = 0.5 * (1.0 + p["ratio"]) * p["mass"] * p["v"] ** 2
+    after = 0.5 * p["mass"] * (small**2 + p["ratio"] * large**2)
+    return {"small_speed": small, "large_speed": large, "energy_lost": 1.0 - after / before}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Velocities at the end, and the share of the energy that is gone."""
+    p, up = scene.params, scene.dimension - 1
+    large, small = (float(v) for v in trajectory.twist[-1, 1:, up])
+    before = 0.5 * (1.0 + p["ratio"]) * p["mass"] * p["v"] ** 2
+    after = 0.5 * p["mass"] * (small**2 + p["ratio"] * large**2)
+    return {"small_speed": (small, ""), "large_speed": (large, ""), "energy_lost": (1.0 - after / before, "")}
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Impacts that lie steps apart are exact pair by pair; closer ones are one to a method of fixed steps."""
+    p, times = scene.params, [time for time, _, _ in impacts(scene.params)]
+    source = "Newton's law of restitution and conservation of momentum, pair after pair"
+    scales = {
+        "small_speed": ("m/s", 3.0 * p["v"]),
+        "large_speed": ("m/s", p["v"]),
+        "energy_lost": ("1", 1.0 + 9.0 / p["ratio"]),
+    }
+    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
+    apart = min(later - earlier for earlier, later in pairwise(times))
+    return found if apart >= bounds.APART * dt else [check.unjudged() for check in found]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step; impulses are not judged here."""
+    return Sampling(1, None)
+
+
+def track(scene: Scene) -> Track:
+    """The small ball: straight from impact to impact."""
+    start, known = scene.bodies[2].pose[scene.dimension - 1], impacts(scene.params)
+
+    def position(t: float) -> tuple[float, ...]:
+        height, since, speed = start, 0.0, -scene.params["v"]
+        for time, _, after in known:
+            if t < time:
+                break
+            height, since, speed = height + speed * (time - since), time, after
+        return upward(scene.dimension, height + speed * (t - since))
+
+    return Track("small", position)
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Larger error of the two speeds, over the speed of the fall."""
+    truth, off = exact(scene), []
+    for name in ("small_speed", "large_speed"):
+        value, reason = found[name]
+        if value is None:
+            return None, reason
+        off.append(abs(value - truth[name]) / scene.params["v"])
+    return max(off), ""
+
+
+SCENE = CanonicalScene(
+    name="stacked_balls",
+    version=1,
+    title="Small ball on a large one: thrown back up to three times as fast",
+    figure=__doc__ or "",
+    law="v_m = v (M e + M e (1 + e) - m)/(M + m)",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("ratio", 10.0, "1", "mass of the large ball over that of the small one", 1e-2, 1e6),
+        Parameter("e", 0.9, "1", "coefficient of restitution of all pairs", 0.1, 1.0),
+        Parameter("v", 2.0, "m/s", "of both balls, downwards", 0.0, 1e2, positive=True),
+        Parameter("apart", 0.05, "s", "time between the impacts; 12 steps of 1/240 s", 0.0, 1.0, positive=True),
+        Parameter("delay", DELAY, "s", "time until the floor: sets the phase within a step", 0.0, 10.0, positive=True),
+        Parameter("mass", 0.5, "kg", "of the small ball", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
+    track=track,
+    quick=(Variation({}), Variation({"ratio": 1000.0, "e": 1.0}), Variation({"ratio": 1.0, "e": 0.5})),
+    full=tuple(Variation({"ratio": r, "e": e}) for r in (1.0, 3.0, 10.0, 1e3, 1e6) for e in (0.3, 0.5, 0.9, 1.0)),
+    planted=({},),
+    primary=Primary(
+        "speed error",
+        "1",
+        f"larger error of the balls' speeds at the end over that of the fall, over {PHASES} phases of the first impact",
+        "what the second impact makes of the first shows whether they are resolved one by one; the worst phase counts",
+        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        error,
+        "the whole scene: fall, two or three impacts, departure",
+    ),
+    words={
+        "small_speed": "throws the small ball up with {value}",
+        "large_speed": "leaves the large ball with {value}",
+        "energy_lost": "takes {value} of the energy",
+    },
+)
