@@ -39,6 +39,7 @@ SUBJECTS = {
     "validation/findings/files.py": ("validation/test_findings.py",),
     "validation/acceptance.py": ("validation/test_acceptance.py",),
     "validation/bounds.py": ("validation/test_worked_bounds.py", "validation/test_tolerances.py"),
+    "validation/columns.py": ("validation/test_worked_bounds.py", "validation/scenes/test_standing.py"),
     "validation/scenes/impact.py": ("validation/test_worked_bounds.py", "validation/test_bench_primary.py"),
     "validation/scenes/bounce.py": ("validation/test_worked_bounds.py", "validation/test_tolerances.py"),
     "validation/scenes/stack.py": ("validation/test_worked_bounds.py", "validation/test_bench_primary.py"),

@@ -63,7 +63,7 @@ SCENE = CanonicalScene(
     sampling=columns.sampling,
     track=track,
     quick=(Variation({}), Variation({"ratio": 1e4})),
-    full=tuple(Variation({"ratio": 10.0**k}, (None, 1, 10, 100)) for k in range(7)),
+    full=tuple(Variation({"ratio": 10.0**k}, (None, 1, 10, 100)) for k in range(6)),
     planted=({},),
     primary=Primary(
         "displacement",
