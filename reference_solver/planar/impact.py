@@ -35,11 +35,11 @@ from reference_solver.planar.columns import (
     B,
 )
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity
+from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses
 from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.clock import HELD, LEFT, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
     CREEP,
@@ -48,8 +48,10 @@ from reference_solver.stepping.impacts import (
     OPEN_ENDED,
     REBOUNDED,
     RELEASED,
+    SERIES_DRIFT,
     SERIES_ENDS,
     STRUCK,
+    drifts_aside,
 )
 from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NOISE, ROUND_OFF, UNSOLVED
 from reference_solver.stepping.options import Options
@@ -231,6 +233,13 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
             continue
         returns = 2.0 * leaves / pull
         if returns <= left * (1.0 - e):
+            slip = tangent_velocity(sub.start, rows, c)
+            gain = (tangent_velocity(bodies.twist, rows, c) - slip) / length
+            slip = slip if abs(slip) > NOISE * rows.real[c, SPEED] else 0.0
+            aside = drifts_aside(slip, gain, rows.real[c, FRICTION], pull, returns, e)
+            extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
+            if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
+                continue
             rows.integer[c, ENDING] = SERIES_ENDS
             new = True
         elif returns * BOUNCES < left:

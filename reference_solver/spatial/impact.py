@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
@@ -13,7 +15,7 @@ from reference_solver.spatial.prepare import measure_speed, set_response
 from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, length, row
-from reference_solver.stepping.clock import LEFT
+from reference_solver.stepping.clock import LEFT, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
     CREEP,
@@ -22,9 +24,11 @@ from reference_solver.stepping.impacts import (
     OPEN_ENDED,
     REBOUNDED,
     RELEASED,
+    SERIES_DRIFT,
     SERIES_ENDS,
     STRUCK,
     TURNED,
+    drifts_aside,
 )
 from reference_solver.stepping.noise import NOISE, SPEED_SHARE
 from reference_solver.stepping.options import Options
@@ -157,11 +161,18 @@ def end_series(
         for p in range(manifolds.points[m]):
             if manifolds.impact[m, p] == 0 or manifolds.ending[m, p] != OPEN_ENDED or e == 0.0:
                 continue
-            leaves = velocity_at(v, w, manifolds, m, p)[2]
-            pull = (leaves - velocity_at(v_last, w_last, manifolds, m, p)[2]) / time
+            u, u_last = velocity_at(v, w, manifolds, m, p), velocity_at(v_last, w_last, manifolds, m, p)
+            leaves = u[2]
+            pull = (leaves - u_last[2]) / time
             if leaves <= 0.0 or pull <= 0.0:
                 continue
             if 2.0 * leaves <= pull * left * (1.0 - e):
+                slip, gain = math.hypot(u[0], u[1]), math.hypot(u_last[0] - u[0], u_last[1] - u[1]) / time
+                slip = slip if slip > NOISE * manifolds.speed[m, p] else 0.0
+                aside = drifts_aside(slip, gain, manifolds.friction[m], pull, 2.0 * leaves / pull, e)
+                extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+                if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
+                    continue
                 manifolds.ending[m, p] = SERIES_ENDS
                 new = True
             elif 2.0 * leaves * BOUNCES < pull * left:

@@ -79,6 +79,12 @@ def count_event(clock: Array, tally: Array, weight: float) -> None:
 
 
 @kernel
+def is_patient(clock: Array) -> bool:
+    """Whether half of the soft events that the step may have are left."""
+    return bool(clock[HELD] == 0.0 and clock[JAMMED] == 0.0 and clock[SOFT] < 0.5 * clock[PATIENCE])
+
+
+@kernel
 def hold_rest(clock: Array, tally: Array) -> None:
     """Let what is left of the step go by the impulse-level scheme."""
     clock[HELD] = 1.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from reference_solver.compilation import kernel
+
 #: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
 #: sub-step and released there.
 OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
@@ -10,8 +12,24 @@ OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
 NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
 #: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
 BOUNCES = 32
+#: A series of rebounds is held from where friction, which acts at its impacts only, moves bodies by no more than this
+#: share of the smaller half width other than it would in a contact; as long as half of a step's patience is left.
+SERIES_DRIFT = 1e-11
 #: An impact is soft that closes no more than this share of the smaller half width in a step. Without loads all others
 #: are hard, and of bodies caught between others they have no end, each slower than the one before.
 CREEP = 1e-6
 #: Passes that mark ending series of rebounds; each marks at least one row more.
 SERIES_PASSES = 4
+
+
+@kernel
+def drifts_aside(slip: float, gain: float, friction: float, pull: float, returns: float, e: float) -> float:
+    """How far friction at impacts only moves bodies along their contact, beside what it does in a contact [m].
+
+    Flights of the times T e^k under the accelerations a, which friction takes from what slips or would: a T^2 / 2 of
+    each, T^2 / (1 - e^2) of all.
+    """
+    if friction == 0.0:
+        return 0.0
+    acceleration = max(abs(gain), friction * pull if slip != 0.0 else 0.0)
+    return acceleration * returns * returns / (2.0 * (1.0 - e * e))

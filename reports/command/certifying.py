@@ -34,6 +34,7 @@ PARTS = (
     "columns",
     "conservation",
     "rotation",
+    "random_scenes",
     "falling",
     "turning",
     "turning_in_space",
