@@ -40,6 +40,7 @@ from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.clock import (
     CONFINED,
+    CRAWL,
     ESCAPED,
     HASTE,
     HELD,
@@ -202,9 +203,9 @@ def sub_step(
     if options.restitution and release(bodies, rows, problem, options, tally):
         enter_contacts(bodies, rows, ledger)
         enter_release(bodies, rows, sub, options, end)
-    haste = end < SHORT * options.dt
-    if end < left and (haste or not (curved == end and sub.clock[OUTCOME] == SHORTENED)):
-        count_event(sub.clock, tally, HASTE if haste else 1.0)
+    haste, shortened = end < SHORT * options.dt, curved == end and sub.clock[OUTCOME] == SHORTENED
+    if end < left and (haste or not shortened):
+        count_event(sub.clock, tally, (CRAWL if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

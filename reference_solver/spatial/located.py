@@ -37,6 +37,7 @@ from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.stepping.clock import (
+    CRAWL,
     EVENTS,
     HASTE,
     HELD,
@@ -133,9 +134,9 @@ def sub_step(
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
         enter_release(bodies, manifolds, sub, options, end)
-    haste = end < SHORT * options.dt
-    if end < left and (haste or not (smooth == end and sub.clock[OUTCOME] == SHORTENED)):
-        count_event(sub.clock, tally, HASTE if haste else 1.0)
+    haste, shortened = end < SHORT * options.dt, smooth == end and sub.clock[OUTCOME] == SHORTENED
+    if end < left and (haste or not shortened):
+        count_event(sub.clock, tally, (CRAWL if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

@@ -36,6 +36,9 @@ MANY_BODIES = 8
 REBOUND = 0.25
 #: What a soft event counts that follows within a thousandth of a step: such ones come in crowds.
 HASTE = 4.0
+#: What a phase counts that its error cut to less than a thousandth of a step: a slip that turns while it ends has some
+#: fifty.
+CRAWL = 0.1
 
 
 @kernel
