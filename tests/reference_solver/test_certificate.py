@@ -92,14 +92,16 @@ def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
         assert cone_defect((pt, 0.0, pn + 0.01 * size), (off[1], 0.0, off[0]), 0.0, mu, step) > 1e-5 * size
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
+#: In space a step that jams goes by the fixed-step law (E28), which leaves overlaps: a defect, not an expectation.
+OVERLAPS_IN_SPACE = pytest.mark.xfail(reason="held steps in space leave overlaps of a hundredth", strict=True)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "restitution"), [(2, 0.0), (2, 0.5), pytest.param(3, 0.0, marks=OVERLAPS_IN_SPACE), (3, 0.5)]
+)
 def test_the_reference_holds(dimension, restitution):
     certificate = pile(dimension, "reference", restitution=restitution).certificate
-    # In space what jams goes by the fixed-step law: it overlaps, and the certificate says so.
-    overlaps = dimension == 3 and restitution == 0.0
-    assert certificate["holds"] != overlaps and certificate["held_steps"] >= overlaps
-    assert all(reason.startswith("bodies overlap") for reason in certificate["reasons"])
+    assert certificate["holds"] and certificate["reasons"] == ()
     assert certificate["solves"] > 0
 
 
@@ -118,9 +120,9 @@ def test_the_works_of_a_run_are_its_kinetic_energy(dimension, profile):
     start = sum(0.5 * (0.3 * i) ** 2 for i in range(4))
     simulation = pile(dimension, profile)
     works = [simulation.certificate[name] for name in ("load_work", "contact_work", "surface_work")]
-    # 130 steps of round-off, each a few units in the last place of some 100 J; where rows turn, of what the control of
-    # a phase's length leaves (`phase.ERROR`), 1e-11 of some 10 J.
-    allowed = 4e-14 if profile == "classical" else 1e-10
+    # 130 steps of round-off, each a few units in the last place of some 100 J; in space, where rows turn, of what the
+    # control of a phase's length leaves (`phase.ERROR`), 1e-11 of some 10 J.
+    allowed = 1e-10 if profile == "reference" and dimension == 3 else 4e-14
     assert kinetic_energy(simulation) - start == pytest.approx(sum(works), abs=130 * allowed)
 
 
