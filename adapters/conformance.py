@@ -33,7 +33,7 @@ RECEIPT_STEPS = (1.0 / 60.0, 1.0 / 240.0)
 #: What a start state or a normal may be off: round-off, and the root and product of a quaternion's components.
 ROUND_OFF = 1e-9
 #: What impulses may miss of a momentum of order 1 [N s]: a solver that stops at a tolerance reports the forces of its
-#: last iterate. The root of a tolerance of 1e-8 on its cost is 1e-4 (MuJoCo as shipped: 2e-5 in a step), times ten.
+#: last iterate. The root of a tolerance of 1e-8 on its cost is 1e-4 (2e-5 in a step, measured), times ten.
 BOOKKEEPING = 1e-3
 
 

@@ -1,6 +1,7 @@
 """The plugin line: what an engine promises and what a simulation gives back.
 
-An adapter is one file with one final subclass of `Engine` and one of `Simulation`. It translates, refuses what
+An adapter is one final subclass of `Engine` and one of `Simulation`, in the engine's folder
+(`adapters.engine_folder`). It translates, refuses what
 it cannot honour (`Engine.refuses`), and reads back what the engine now holds. It never approximates in silence,
 never sees a scene's truth, and contains no loop over steps: the only one is `adapters.stepping.run`.
 """
@@ -11,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,6 +142,20 @@ class Simulation(ABC):
 ProfileRule = Callable[[Needs, float], list[Setting]]
 
 
+#: What a profile is among those of its engine. Comparisons and marks select on it, never on a profile's name.
+Role = Literal["shipped", "textbook", "tuned", "one", "solution", "matched"]
+ROLES: Mapping[Role, str] = {
+    "shipped": "what a user gets who changes nothing",
+    "textbook": "a textbook's method at a fixed cost",
+    "tuned": "best stock settings, chosen by what a scene needs",
+    "one": "one set of stock settings for all scenes",
+    "solution": "solves its contact problem and says whether it did; what fails there is a defect",
+    "matched": "made to follow the textbook's law by settings that nobody ships; in no ranking",
+}
+#: Name of the profile in the rows of an engine that cannot be asked for its own.
+NOT_KNOWN = "?"
+
+
 @dataclass(frozen=True)
 class EngineFacts:
     """Constant facts of an engine, shown by ``crosscheck describe`` and in the fairness sheet."""
@@ -155,6 +170,14 @@ class EngineFacts:
     known_bad_versions: Mapping[str, str] = field(default_factory=dict)
     #: Profiles that step differently, by name.
     profile_schemes: Mapping[str, Scheme] = field(default_factory=dict)
+    #: What the profiles are, by name; one that is none of these has no role.
+    roles: Mapping[str, Role] = field(default_factory=dict)
+    #: Colour of the engine in pictures, ``#rrggbb``; reports choose one where it is empty.
+    colour: str = ""
+
+    def profile(self, role: Role) -> str | None:
+        """Name of the profile with this role, if there is one."""
+        return next((name for name, own in self.roles.items() if own == role), None)
 
 
 class Engine(ABC):

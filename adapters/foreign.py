@@ -10,14 +10,27 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
+from importlib import import_module
 from importlib.metadata import EntryPoint
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, cast
 
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Setting, Simulation
+from adapters.engine import (
+    ROLES,
+    Declared,
+    Engine,
+    EngineError,
+    EngineFacts,
+    Quirk,
+    Role,
+    Scheme,
+    Setting,
+    Simulation,
+)
 from adapters.isolation import Child, IsolationError, Lost
 from adapters.needs import Needs
 from adapters.plain import NAME, one_line, plain
@@ -129,6 +142,31 @@ def serve(connection: Connection) -> None:
         connection.send_bytes(json.dumps(_settings(found.engine, asked)).encode())
 
 
+def importable(module: str) -> str:
+    """Import a module of somebody else in a process that may die: why that fails, or nothing."""
+    try:
+        child = Child(serve_import)
+    except IsolationError as error:
+        return str(error)
+    try:
+        child.send(module.encode())
+        return child.receive(PATIENCE).decode()
+    except Lost as lost:
+        return f"{lost} while it was imported"
+    finally:
+        child.stop()
+
+
+def serve_import(connection: Connection) -> None:
+    """Import one module and say what came of it; runs in the child."""
+    try:
+        import_module(connection.recv_bytes().decode())
+        said = ""
+    except BaseException as error:  # whatever it raises
+        said = said_by(error)
+    connection.send_bytes(said.encode())
+
+
 def _settings(engine: Engine, asked: Mapping[str, Any]) -> dict[str, Any]:
     try:
         given = engine.settings(asked["profile"], Needs(**asked["needs"]), asked["dt"])
@@ -194,6 +232,7 @@ def plain_facts(facts: EngineFacts) -> dict[str, Any]:
     data = {name: getattr(facts, name) for name in facts.__dataclass_fields__}
     data["scheme"] = vars(facts.scheme)
     data["quirks"] = [vars(quirk) for quirk in facts.quirks]
+    data["roles"] = dict(facts.roles)
     data["profile_schemes"] = {name: vars(scheme) for name, scheme in facts.profile_schemes.items()}
     return dict(plain(data))
 
@@ -222,7 +261,21 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         tuple(Quirk(**{key: str(text) for key, text in quirk.items()}) for quirk in data["quirks"]),
         {str(version): str(why) for version, why in data["known_bad_versions"].items()},
         {str(name): _scheme(scheme) for name, scheme in data["profile_schemes"].items()},
+        {str(name): _role(role) for name, role in data["roles"].items()},
+        _colour(data["colour"]),
     )
+
+
+def _role(role: Any) -> Role:
+    if role not in ROLES:
+        raise ValueError(f"role is {one_line(role, NAME)!r}, possible are {', '.join(ROLES)}")
+    return cast(Role, role)
+
+
+def _colour(text: Any) -> str:
+    if text and not (isinstance(text, str) and re.fullmatch(r"#[0-9a-fA-F]{6}", text)):
+        raise ValueError(f"colour is {one_line(text, NAME)!r}, #rrggbb is needed")
+    return text or ""
 
 
 def _scheme(data: Mapping[str, Any]) -> Scheme:

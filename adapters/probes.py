@@ -34,7 +34,7 @@ GRAVITY = 9.81
 REBOUND_SPEED, REBOUND_RADIUS, REBOUND_MASS = 2.0, 0.5, 1.0
 REBOUND_PHASES = (0.1, 0.37, 0.6, 0.87)
 REBOUND_LEAD = 3
-#: Time that a rebound may take [s]: twice what the softest contact known here takes (MuJoCo as shipped, 0.1 s).
+#: Time that a rebound may take [s]: twice what the softest contact known here takes (0.1 s).
 REBOUND_TIME = 0.2
 #: Sliding: least speed at the start [m/s] and time [s].
 SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5

@@ -7,13 +7,11 @@ import os
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
-from adapters.engine import Engine, EngineError, EngineFacts
+from adapters.engine import Engine, EngineError, EngineFacts, Role
 from adapters.foreign import Found, checked_facts, probe, said_by
 from adapters.plain import NAME, is_visible, one_line
 
 GROUP = "contact_crosscheck.engines"
-#: Order in which our own engines are shown; others follow by name.
-SHOWN_FIRST = ("reference", "chipmunk", "bullet", "mujoco")
 #: Environment variable with the engines that must be installed, separated by commas: where an engine that is not
 #: there must be a failure rather than rows that say so, as in a check of every change.
 REQUIRED = "CROSSCHECK_REQUIRE_ENGINES"
@@ -39,11 +37,21 @@ def _entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=is_ours)}
 
 
+def entry(name: str) -> EntryPoint | None:
+    """Registration of the engine called ``name``; None if there is none."""
+    return _entries().get(name)
+
+
 def names() -> list[str]:
-    """Names of all registered engines, ours first."""
+    """Names of all registered engines: ours first, of these who promises a solution, then who lives in the plane."""
     registered = _entries()
-    ours = [name for name in SHOWN_FIRST if name in registered]
-    return ours + sorted(set(registered) - set(ours))
+    return sorted(registered, key=lambda name: (not is_ours(registered[name]), *_place(registered[name]), name))
+
+
+def _place(entry: EntryPoint) -> tuple[bool, int]:
+    """Where an engine is shown among ours, or among those of others, which nobody asks for it."""
+    told = _facts(entry) if is_ours(entry) else None
+    return (told.profile("solution") is None, min(told.dimensions)) if told else (True, 0)
 
 
 @cache
@@ -102,11 +110,37 @@ def facts(name: str) -> EngineFacts | None:
     entry = _entries().get(name)
     if entry is None or not is_ours(entry):
         return find(name).facts if entry else None
+    return _facts(entry)
+
+
+@cache
+def _facts(entry: EntryPoint) -> EngineFacts | None:
     try:
         told: EngineFacts = entry.load().facts
     except ImportError:
         return None
     return told
+
+
+def profile_of(name: str, role: Role) -> str | None:
+    """Profile of an engine that has this role; None if it has none, or cannot be asked."""
+    told = facts(name)
+    return told.profile(role) if told else None
+
+
+def solver() -> str:
+    """Name of our own solver: the engine of ours that promises a solution.
+
+    Raises
+    ------
+    EngineError
+        If there is none.
+    """
+    for name, entry in _entries().items():
+        told = _facts(entry) if is_ours(entry) else None
+        if told is not None and told.profile("solution"):
+            return name
+    raise EngineError("engine: our own solver is not registered, install contact-crosscheck again")
 
 
 def load(name: str) -> Engine:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from adapters.engine import Array, Contacts
 
 Finish = Literal["completed", "diverged"]
+#: A number read from a trajectory, or None and why there is none.
+Measured = tuple[float | None, str]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The short answers: which engine to use for a scene, what is wrong with whom, and what cures it.
 
-One line per engine and scene that fails, in words: "mujoco/default bounce: rebounds at 0.105 whatever e is asked;
+One line per engine and scene that fails, in words: "engine/profile bounce: rebounds at 0.105 whatever e is asked;
 tuned cures it". Everything is read off the judged rows at the profiles' own iteration counts.
 """
 
@@ -64,7 +64,7 @@ class Choice:
 
     @property
     def line(self) -> str:
-        """``mujoco/tuned (0.2 ms/s), reference/reference``."""
+        """``engine/profile (0.2 ms/s), another/profile``."""
         if not self.good and not self.nearest:
             return UNASKED
         return ", ".join(self.good) if self.good else f"nobody passes every row; nearest is {self.nearest}"
@@ -106,7 +106,7 @@ def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
 
 
 def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float) -> str:
-    """``chipmunk/tuned (2-D only, 1.2 ms/s)``."""
+    """``engine/profile (2-D only, 1.2 ms/s)``."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
     if math.isfinite(price):

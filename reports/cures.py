@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters import registry
+from adapters.engine_folder import belongs_of
 from reports.wording import params_text
 from validation.cells import Observation
 from validation.decisive import ALONE, COMPLETES, NEEDED, decisive
-from validation.experiments import belongs_of
 from validation.posed import resolve
 
 #: What a setting's part in a cure is called.

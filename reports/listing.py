@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from adapters import registry
+from adapters import engine_folder, registry
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import SceneError
@@ -126,7 +126,7 @@ def doctor() -> dict[str, Any]:
         packages[name] = str(path.parent)
         if path.parent.parent != home:
             problems.append(f"the package {name!r} on this path is not ours: {path.parent}")
-    problems += broken()
+    problems += broken() + engine_folder.problems()
     found = engines()
     for engine in found:
         if engine["reason"]:
@@ -141,7 +141,7 @@ def doctor() -> dict[str, Any]:
         folder = cache_folder()
     except ImportError as error:
         folder = None
-        problems.append(f"reference: its compiler cannot be loaded: {one_line(error)}")
+        problems.append(f"{registry.solver()}: its compiler cannot be loaded: {one_line(error)}")
     return {
         "machine": machine(),
         "commit": commit(),

@@ -8,12 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from adapters import registry
+from adapters.engine_folder import folder_of
 from validation.catalogue import CATALOGUE
 from validation.scenes import OURS
 
 ROOT = Path(__file__).parent.parent
 LINE = ["reference_solver", "adapters", "validation", "reports"]
 ENGINES = ["pymunk", "pybullet", "mujoco"]
+#: Folders of our engines, by name.
+FOLDERS = {name: folder_of(name) for name in registry.names() if registry.is_ours(registry.entry(name))}
+SOLVER = registry.solver()
 
 
 def imported(path):
@@ -31,25 +36,69 @@ def test_each_package_imports_only_what_stands_to_its_left(package):
         assert not forbidden & set(imported(path)), path
 
 
-def test_only_adapters_import_engines():
-    for package in ("reference_solver", "validation", "reports"):
+def test_only_an_engine_s_own_folder_imports_it():
+    for package in LINE:
         for path in (ROOT / package).rglob("*.py"):
-            assert not set(ENGINES) & set(imported(path)), path
+            if not set(path.parents) & set(FOLDERS.values()):
+                assert not set(ENGINES) & set(imported(path)), path
 
 
-def test_engines_are_named_in_validation_only_by_deviations_experiments_and_findings():
-    names = ("chipmunk", "pymunk", "bullet", "mujoco")
-    for path in (ROOT / "validation").rglob("*.py"):
-        if {"deviations", "experiments", "findings"} & set(path.parts):
-            continue
-        text = path.read_text().lower()
-        assert not [name for name in names if name in text], path
+@pytest.mark.parametrize("engine", FOLDERS)
+def test_an_engine_s_folder_imports_the_shared_vocabulary_and_no_other_engine(engine):
+    """What a new engine's folder may lean on is what every other one may; ours uses its solver as well."""
+    for path in FOLDERS[engine].rglob("*.py"):
+        named = set(re.findall(r"^\s*(?:from|import) (adapters\.\w+)", path.read_text(), re.MULTILINE))
+        assert not {f"adapters.{other}" for other in FOLDERS if other != engine} & named, path
+        if engine != SOLVER:
+            assert "reference_solver" not in set(imported(path)), path
+
+
+def test_the_shared_vocabulary_knows_no_engine_s_folder():
+    for path in (ROOT / "adapters").glob("*.py"):
+        assert not {f"adapters.{name}" for name in FOLDERS} & set(whole_imports(path)), path
+
+
+def own_words():
+    """What must be said of an engine in its own folder only: names, packages, profiles, colours."""
+    words = {}
+    for name in FOLDERS:
+        facts = registry.facts(name)
+        spoken = {name, facts.package, facts.package.partition("-")[0]} - {"contact-crosscheck", "contact"}
+        words[name] = spoken | set(registry.adapter(name).profiles) | {facts.colour}
+    return words
+
+
+#: Words of engines where they mean something else, or where our own solver is meant.
+OTHER_WORDS = {
+    ("adapters/engine.py", "one"): "a role",
+    ("adapters/engine.py", "tuned"): "a role",
+    ("reports/palette.py", "one"): "a role",
+    ("reports/palette.py", "tuned"): "a role",
+    ("reports/page/choosing.py", "tuned"): "a role",
+    ("reports/command/tuning.py", "tuned"): "a role",
+    ("reports/tables.py", "default"): "the default of a parameter",
+}
+
+
+def test_no_engine_profile_or_colour_is_special_outside_its_folder():
+    """Whoever adds or drops an engine opens no other file."""
+    found = set()
+    words = own_words()
+    for package in LINE[1:]:
+        for path in (ROOT / package).rglob("*.*"):
+            inside = path.relative_to(ROOT)
+            if path.suffix not in (".py", ".j2", ".js", ".css") or set(path.parents) & set(FOLDERS.values()):
+                continue
+            found |= {(str(inside), word) for word in scenes_named(path, set().union(*words.values()))}
+            if path.suffix in (".py", ".js", ".j2"):
+                text = path.read_text().lower()
+                assert not [name for name in FOLDERS if name != SOLVER and re.search(rf"\b{name}\b", text)], path
+    assert found == set(OTHER_WORDS)
 
 
 #: Words that are scenes' names as well, where they mean something else.
 OTHER_MEANINGS = {
     ("adapters/conformance.py", "impact"): "a regime of `Needs`",
-    ("adapters/mujoco.py", "impact"): "a regime of `Needs`",
     ("adapters/needs.py", "impact"): "a regime of `Needs`",
     ("adapters/receipts.py", "impact"): "a regime of `Needs`",
     ("adapters/probes.py", "slide"): "a probe",
@@ -67,13 +116,13 @@ def scenes_named(path, names):
     return {value for value in found if isinstance(value, str) and value in names}
 
 
-def test_a_scene_is_named_only_in_its_own_file_in_findings_and_in_laws():
+def test_a_scene_is_named_only_in_its_own_file_and_in_the_folders_of_engines():
     """Whoever adds a scene opens no other file; `validation/scenes/__init__.py` registers ours."""
     names, found = set(CATALOGUE), {}
     for package in LINE[1:]:
         for path in (ROOT / package).rglob("*.*"):
             inside = path.relative_to(ROOT)
-            apart = {"deviations", "experiments", "findings", "scenes", "published"} & set(inside.parts[:-1])
+            apart = {"scenes", "published"} & set(inside.parts[:-1]) or set(path.parents) & set(FOLDERS.values())
             if path.suffix in (".py", ".j2", ".js") and not apart:
                 found |= {(str(inside), name): path for name in scenes_named(path, names)}
     assert set(found) == set(OTHER_MEANINGS)

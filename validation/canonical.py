@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from adapters.scene import Scene, SceneError
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Measured, Sampling, Trajectory
 
 #: Standard gravity as the field's examples use it [m/s^2].
 GRAVITY = 9.81
@@ -92,10 +92,6 @@ class Check:
     def unjudged(self) -> Check:
         """The same number, shown and not judged: its scene is too large for a tolerance."""
         return Check(self.metric, self.unit, None, None, f"not judged, its tolerance is not finite; {self.because}", "")
-
-
-#: A measured value, or None and why there is none.
-Measured = tuple[float | None, str]
 
 
 @dataclass(frozen=True)

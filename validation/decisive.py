@@ -5,8 +5,8 @@
     shipped profile + fewer and fewer      where no change is enough alone: what cannot be left out any more
 
 Every number is the worst of the same checks of the same cells, run by `validation.switching`. What came out stands
-beside the experiments as data (`FILE`), with the release that it was measured with; ``crosscheck tune ENGINE
---decisive`` measures it again.
+beside the engine's experiments as data (``decisive.csv``), with the release that it was measured with; ``crosscheck
+tune ENGINE --decisive`` measures it again.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
+from adapters.experiment import Cured
 from adapters.registry import find, load
 from validation.cells import Observation, Slot, prepare, settings_of
-from validation.experiments import Cured, belongs_of, cured_of
+from validation.plan import QUICK_DT
 from validation.switching import observe, readings, switched
 
-#: What was measured, one line per engine, scene and setting.
-FILE = Path(__file__).parent / "experiments" / "decisive.csv"
 #: How a setting decides: it is enough by itself; or the check fails without it; or it completes a set that is enough,
 #: in which another might stand for it.
 ALONE, NEEDED, COMPLETES = "alone", "needed", "completes"
@@ -62,7 +62,7 @@ class Part:
 class Decisive:
     """The changes of one cure, measured; ``before`` and ``after`` are the worst error over tolerance of its checks.
 
-    ``cells`` and ``metrics`` are those of `validation.experiments.Cured`.
+    ``cells`` and ``metrics`` are those of `adapters.experiment.Cured`.
     """
 
     engine: str
@@ -99,6 +99,14 @@ def _joined(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
+def slots_of(engine: str, target: Cured) -> list[Slot]:
+    """Cells of a cure as the shipped profile has them."""
+    return [
+        Slot(target.scene, tuple(sorted(cell.items())), target.dimension, engine, target.shipped, QUICK_DT)
+        for cell in target.cells
+    ]
+
+
 def measure(engine: str, target: Cured, jobs: int = 1) -> Decisive:
     """Switch the changes of a cure, one by one.
 
@@ -107,7 +115,7 @@ def measure(engine: str, target: Cured, jobs: int = 1) -> Decisive:
     ValueError
         If the target is none: its checks pass as shipped, or one fails with all changes made.
     """
-    own = target.slots(engine)
+    own = slots_of(engine, target)
     changes = {slot: changes_of(slot, target.better) for slot in own}
     belongs = belongs_of(engine)
     every = dict.fromkeys(name for each in changes.values() for name in each)
@@ -178,7 +186,11 @@ def measure_all(engine: str, jobs: int = 1) -> list[Decisive]:
 @cache
 def measured_of(engine: str) -> tuple[Decisive, ...]:
     """What was measured of ``engine`` and is listed; nothing for an engine that nobody measured."""
-    return tuple(entry for entry in (read(FILE) if FILE.exists() else ()) if entry.engine == engine)
+    path = inside(engine, DECISIVE)
+    try:
+        return tuple(entry for entry in (read(path) if path else ()) if entry.engine == engine)
+    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are read by a test
+        return ()
 
 
 def decisive(engine: str, scene: str, shipped: str, better: str) -> Decisive | None:
@@ -207,13 +219,11 @@ def _entry(rows: Sequence[Mapping[str, str]]) -> Decisive:
 
 
 def write(entries: Iterable[Decisive], path: Path) -> None:
-    """Write a list of measured cures; of an engine that is measured again, the others stay."""
-    entries = list(entries)
-    kept = [entry for entry in (read(path) if path.exists() else []) if entry.engine not in {e.engine for e in entries}]
+    """Write a list of measured cures."""
     with path.open("w", encoding="utf-8", newline="") as lines:
         table = csv.writer(lines, lineterminator="\n")
         table.writerow(COLUMNS)
-        for e in sorted([*kept, *entries], key=lambda each: each.engine):
+        for e in entries:
             what = (e.scene, e.dimension, json.dumps(e.cells), json.dumps(e.metrics))
             head = [e.engine, e.version, e.shipped, e.better, *what]
             for p in e.parts:

@@ -14,12 +14,12 @@ import platform
 import subprocess
 from collections.abc import Iterable
 from functools import cache
-from importlib.machinery import PathFinder
 from importlib.metadata import entry_points
-from importlib.util import find_spec
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import Any
 
+from adapters.engine_folder import located
 from adapters.registry import GROUP
 from validation.catalogue import CATALOGUE, module_of
 
@@ -29,17 +29,6 @@ def _hash_files(paths: list[Path]) -> str:
     for path in sorted(paths):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def located(module: str) -> Path | None:
-    """File of a module, found without importing the packages it is in: a plugin's import may do anything."""
-    first, *rest = module.split(".")
-    spec = find_spec(first)
-    for name in rest:
-        if spec is None or spec.submodule_search_locations is None:
-            return None
-        spec = PathFinder.find_spec(f"{spec.name}.{name}", spec.submodule_search_locations)
-    return Path(spec.origin) if spec and spec.origin and spec.has_location else None
 
 
 def _sources(package: str) -> list[Path]:
@@ -53,20 +42,19 @@ def _sources(package: str) -> list[Path]:
 def adapter_hash(engine: str) -> str:
     """Hash of everything of ours between a scene and this engine's trajectory.
 
-    The shared vocabulary and step loop, the engine's own adapter file, and for the reference engine its solver.
+    The shared vocabulary and step loop, the engine's adapter with what that imports of its own package, and for an
+    adapter of our solver the solver. Laws, experiments and findings judge a trajectory and are no part of it.
     """
     entry = {e.name: e for e in entry_points(group=GROUP)}[engine]
-    path = located(entry.module)
-    own = [path] if path else []
-    modules = {e.module.rsplit(".", 1)[-1] for e in entry_points(group=GROUP)}
-    mine = entry.module.rsplit(".", 1)[-1]
-    # An adapter and the law file beside it belong to one engine; what belongs to none is shared.
-    owner = {path: next((m for m in modules if path.stem in (m, f"{m}_law")), None) for path in _sources("adapters")}
-    shared = [path for path, name in owner.items() if name is None or name == mine]
-    solver = _sources("reference_solver") if entry.module == "adapters.reference" else []
+    own = _closure(entry.module, {entry.module.partition(".")[0]}, {SOLVER})
+    shared = [path for path in _sources("adapters") if path.parent.name == "adapters"]
+    inside = _sources(SOLVER)
+    solver = inside if set(inside) & set(own) else []
     return _hash_files(sorted({*shared, *own, *solver}))
 
 
+#: The solver of ours, which an adapter of it answers with.
+SOLVER = "reference_solver"
 #: What runs and measures a cell of any scene.
 RUNNING = ("validation.execution", "validation.certification")
 
@@ -78,7 +66,13 @@ def scene_code(scene: str) -> str:
     All scene files share one: their text is part of their name.
     """
     module = module_of(scene) if scene in CATALOGUE else "validation.scene_files"
-    own = {"validation", module.partition(".")[0]}
+    # Of the solver only what is imported itself: its geometry measures.
+    own = _closure(module, {"validation", module.partition(".")[0]}, {SOLVER})
+    return _hash_files([*own, *(path for path in map(located, RUNNING) if path)])
+
+
+def _closure(module: str, inner: set[str], rim: set[str]) -> list[Path]:
+    """Files of a module and of what it imports of the packages ``inner``; of those in ``rim`` only the first file."""
     found: dict[str, Path] = {}
     left = [module]
     while left:
@@ -86,19 +80,25 @@ def scene_code(scene: str) -> str:
         path = None if name in found else located(name)
         if path is not None and path.suffix == ".py":
             found[name] = path
-            if name.partition(".")[0] in own:  # of the solver only what is imported itself: its geometry measures
-                left += [each for each in _imported(path) if each.partition(".")[0] in own | {"reference_solver"}]
-    return _hash_files([*found.values(), *(path for path in map(located, RUNNING) if path)])
+            if name.partition(".")[0] in inner:
+                left += [each for each in _imported(name, path) if each.partition(".")[0] in inner | rim]
+    return list(found.values())
 
 
-def _imported(path: Path) -> list[str]:
+def _imported(module: str, path: Path) -> list[str]:
     """Modules that a source file may import, by name; what turns out to be none is not located."""
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     names = []
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.ImportFrom):
+            source = "." * node.level + (node.module or "")
+            try:
+                source = resolve_name(source, package)
+            except ImportError:  # beyond the top of its package
+                continue
+            names += [source, *(f"{source}.{alias.name}" for alias in node.names)]
     return names
 
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from adapters.engine import Engine, EngineError
+from adapters.engine import NOT_KNOWN, Engine, EngineError
 from adapters.needs import needs
-from adapters.registry import find
+from adapters.registry import facts, find
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size
@@ -79,8 +79,8 @@ def slots(request: Request) -> list[Slot]:
 def _engine_slots(
     request: Request, argument: str, canonical: CanonicalScene, dimension: int, name: str, engine: Engine | None
 ) -> Iterable[Slot]:
-    # An engine that is not installed still gets its rows, under the one profile name every engine has a rule for.
-    profiles = list(engine.profiles) if engine else ["default"]
+    # An engine that is not installed still gets its rows, under one profile.
+    profiles = list(engine.profiles) if engine else [_one_profile(name)]
     for profile in profiles:
         if request.profiles and profile not in request.profiles:
             continue
@@ -97,6 +97,12 @@ def _engine_slots(
                 for iterations in _iterations(request, variation, engine, base):
                     for ulp in (*request.ulps, *_moves(request, canonical, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)
+
+
+def _one_profile(name: str) -> str:
+    """Profile as shipped of an engine that is not here; the first that is known of one that ships none."""
+    told = facts(name)
+    return (told.profile("shipped") or next(iter(told.roles), NOT_KNOWN)) if told else NOT_KNOWN
 
 
 def in_quick_suite(slot: Slot) -> bool:
@@ -128,7 +134,7 @@ def _steps(request: Request, engine: Engine | None, profile: str) -> Iterable[fl
         return request.dts
     if request.suite == "quick":
         return (QUICK_DT,)
-    customary = (engine.facts.customary_dt,) if engine and profile == "default" else ()
+    customary = (engine.facts.customary_dt,) if engine and engine.facts.roles.get(profile) == "shipped" else ()
     return dict.fromkeys((*FULL_DT, *customary))
 
 

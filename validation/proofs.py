@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from adapters.experiment import Experiment
 from validation.cells import Observation, Slot
-from validation.experiments import Experiment
+from validation.plan import QUICK_DT
 from validation.posed import resolve
 from validation.studies import results_of, study_of
 from validation.switching import Reading, observe, reading, readings, switched
@@ -69,9 +70,15 @@ def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list
     return [_proof(engine, experiment, seen) for experiment in experiments]
 
 
+def slot_of(engine: str, experiment: Experiment) -> Slot:
+    """The cell of an experiment's row, as the profile has it."""
+    e = experiment
+    return Slot(e.scene, tuple(sorted(e.params.items())), e.dimension, engine, e.profile, QUICK_DT, e.iterations)
+
+
 def _versions(engine: str, experiment: Experiment) -> list[Slot]:
     """The row's slot as it is, with the mechanism off, and with each idle change."""
-    slot = experiment.slot(engine)
+    slot = slot_of(engine, experiment)
     return [slot, switched(slot, experiment.off), *(switched(slot, change) for change in experiment.idle)]
 
 

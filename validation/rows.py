@@ -10,12 +10,13 @@ from typing import Any
 
 import pandas as pd
 
+from adapters.engine import EngineError
+from adapters.engine_folder import covering
 from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.deviations import covering
-from validation.findings import Known, known_of
-from validation.findings.files import findings_of
+from validation.findings import Findings, FindingsError, Known, known_of
+from validation.findings.files import brought_by_ours, findings_of
 from validation.posed import is_file, resolve
 from validation.studies import StudyResult, results
 from validation.verdicts import (
@@ -145,11 +146,15 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
     """What was observed, judged; cells without an answer have no physics, and unsupported ones must be known ones."""
     slot, outcome = observation.slot, observation.outcome
     if outcome is Outcome.OK:
-        known = _known(observation, slot, check)
-        return judge(value, check, _predictions(observation, scene, check, value), known, why)
+        known, predictions = _known(observation, slot, check), []
+        try:
+            predictions = _predictions(observation, scene, check, value)
+        except EngineError as error:  # a law of another package, which says nothing then
+            known = replace(known, remark="; ".join(filter(None, (known.remark, str(error)))))
+        return judge(value, check, predictions, known, why)
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
-    findings = findings_of(slot.engine)
+    findings, _ = _findings(slot.engine)
     if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene):
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
@@ -157,7 +162,20 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
-    return known_of(slot, check.metric, observation.engine_version, findings_of(slot.engine))
+    findings, why_not = _findings(slot.engine)
+    if why_not:
+        return Known(None, False, why_not)
+    return known_of(slot, check.metric, observation.engine_version, findings)
+
+
+def _findings(engine: str) -> tuple[Findings | None, str]:
+    """What is known about an engine; where the files of another package are wrong, nothing and why."""
+    try:
+        return findings_of(engine), ""
+    except FindingsError as error:
+        if brought_by_ours(engine):
+            raise
+        return None, str(error)
 
 
 def _doubt(observation: Observation, check: Check) -> str:
@@ -189,7 +207,7 @@ def _predictions(observation: Observation, scene: Scene, check: Check, value: fl
     if judge_physics(value, check) is not Physics.FAIL or slot.iterations is not None:
         return []
     laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
-    return predicted(laws, scene, slot)
+    return predicted(laws, scene, slot, resolve(slot.scene).measure)
 
 
 def predictions_of(row: Row) -> list[Prediction]:
@@ -197,8 +215,13 @@ def predictions_of(row: Row) -> list[Prediction]:
     if row.physics != Physics.FAIL.value or row.iterations is not None or len(row.cells) > 1:
         return []
     slot = slot_from_dict(row.slot)
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return predicted(covering(row.engine, row.engine_version, row.profile, scene.name, row.metric), scene, slot)
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    laws = covering(row.engine, row.engine_version, row.profile, scene.name, row.metric)
+    try:
+        return predicted(laws, scene, slot, canonical.measure)
+    except EngineError:  # a law of another package; its row says what is wrong
+        return []
 
 
 def _assemble(

@@ -18,11 +18,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from adapters.engine_folder import candidates_of
 from adapters.needs import needs
-from adapters.registry import load
+from adapters.registry import load, profile_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Slot, settings_of
-from validation.experiments import candidates_of
 from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
 from validation.switching import Reading, observe, readings, switched
@@ -238,7 +238,10 @@ def _needless(engine: str, bench: _Bench, changes: Mapping[str, Any]) -> dict[st
     """Settings of the profile whose value as shipped does as well: same fails, nothing broken, not clearly worse."""
     slot = bench.slots[0]
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    shipped = {s.name: s.value for s in load(engine).settings("default", needs(scene), slot.dt)}
+    as_shipped = profile_of(engine, "shipped")
+    if as_shipped is None:
+        return {}
+    shipped = {s.name: s.value for s in load(engine).settings(as_shipped, needs(scene), slot.dt)}
     chosen = {name: changes.get(name, _own(slot, name)) for name in candidates_of(engine)}
     differing = [n for n, own in chosen.items() if n in shipped and own is not None and own != shipped[n]]
     bench.prepare([{**changes, name: shipped[name]} for name in differing])

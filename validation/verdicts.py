@@ -14,10 +14,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from adapters.law import Deviation, Measure
 from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Slot
-from validation.deviation import Deviation
 from validation.findings import Finding, Known
 
 #: A law, the value it predicts, and the band it allows.
@@ -64,9 +64,12 @@ def is_marginal(value: float, check: Check) -> bool:
     return 0.5 * check.bound <= abs(value - check.truth) <= 2.0 * check.bound
 
 
-def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot) -> list[Prediction]:
-    """Laws that say something about this scene and step, with value and band."""
-    said = ((law, law.law(scene, slot.dt)) for law in laws)
+def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot, measure: Measure) -> list[Prediction]:
+    """Laws that say something about this scene and step, with value and band.
+
+    ``measure`` is the scene's own: a law predicts a motion, and what a row shows is read from it.
+    """
+    said = ((law, law.law(scene, slot.dt, measure)) for law in laws)
     return [(law, *prediction) for law, prediction in said if prediction is not None]
 
 

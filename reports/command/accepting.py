@@ -42,7 +42,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
     every family that would change. Those named by --family are accepted; for the others a terminal is asked, and
     without one nothing is written for them. Rows that a deviation law covers and misses, rows whose receipts do not
-    hold and rows of reference/reference are refused; what did not run stays as it is listed.
+    hold and rows of a profile that promises a solution are refused; what did not run stays as it is listed.
 
     Exits with 1 if a row is refused or a family that changed is not accepted. Read the diff before you commit it: a
     finding is listed to be shown, not to be hidden.
@@ -56,7 +56,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     changed = [change for change in proposal.changes if change.asks]
     console.print(_table(engine, proposal.changes))
     chosen, written = _decide(changed, families, console)
-    folder = files.folder_of(engine) or files.OURS / engine
+    folder = files.findings_folder(engine)
+    if folder is None:
+        raise FindingsError(f"accept: {engine} is a plain module and has no folder to list findings in")
     add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
     write_members(folder, members)

@@ -184,19 +184,23 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
 @main.command("profile")
 @click.argument("scene")
 @click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
-@click.option("--profile", default="reference", show_default=True, help="Profile of the reference solver.")
+@click.option("--profile", help="Profile of the reference solver; by default the one that promises a solution.")
 @click.option("--dim", default=2, show_default=True, type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
 @click.option("--dt", default="1/240", show_default=True, metavar="S", help="Step.")
 @click.option("--steps", default=2000, show_default=True, type=click.IntRange(1), help="Timed steps.")
 @AS_JSON
-def profile_(scene: str, param: tuple[str, ...], profile: str, dim: int, dt: str, steps: int, as_json: bool) -> None:
+def profile_(
+    scene: str, param: tuple[str, ...], profile: str | None, dim: int, dt: str, steps: int, as_json: bool
+) -> None:
     """Say where the time of the reference solver's steps goes: the median time of each stage of a step.
 
     SCENE is a scene of the catalogue, or pyramid (--param rows=13).
     """
     from reference_solver.timeline import timeline
 
-    slot = Slot(scene, tuple(map(parameter, param)), dim, "reference", profile, parse_dt(dt))
+    ours = registry.solver()
+    chosen = profile or registry.profile_of(ours, "solution") or ""
+    slot = Slot(scene, tuple(map(parameter, param)), dim, ours, chosen, parse_dt(dt))
     engine, posed, settings, _ = prepared(slot)
     simulation: Any = engine.build(posed, slot.dt, settings)
     stages = timeline(simulation.solver, steps, warm_up=24)

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from adapters import registry
+from adapters.engine import EngineError
 from adapters.scene import SceneError
 from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
@@ -23,11 +24,11 @@ from validation.store import Store
 @main.command("list")
 @click.argument("what", type=click.Choice(["scenes", "engines", "checks", "runs"]))
 @click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
-@click.option("--engine", default="reference", show_default=True, metavar="E", help="Engine that gets the faults.")
-@click.option("--profile", default="reference", show_default=True, metavar="P", help="Its profile that passes.")
+@click.option("--engine", metavar="E", help="Engine that gets the faults; our solver by default.")
+@click.option("--profile", metavar="P", help="Its profile that passes; by default the one that promises a solution.")
 @AS_JSON
 @OUT
-def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool, out: Path) -> None:
+def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None, as_json: bool, out: Path) -> None:
     """List scenes, engines, checks, or the runs in OUT.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
@@ -38,6 +39,10 @@ def list_(what: str, sensitivity: bool, engine: str, profile: str, as_json: bool
     if sensitivity:
         if what != "checks":
             raise SceneError("sensitivity: checks have one, not " + what)
+        engine = engine or registry.solver()
+        profile = profile or registry.profile_of(engine, "solution")
+        if profile is None:
+            raise EngineError(f"profile: {engine} has none that promises a solution; name one with --profile")
         seen = detection(registry.load(engine), profile, 2)
         data = list(lines(seen))
     elif what == "runs":

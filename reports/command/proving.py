@@ -12,9 +12,10 @@ import click
 from rich.text import Text
 
 from adapters import registry
+from adapters.engine_folder import experiments_of
+from adapters.experiment import Experiment
 from reports.terminal import terminal
 from reports.wording import number, params_text, reproduce
-from validation.experiments import Experiment, experiments_of
 from validation.findings import FindingsError
 from validation.findings.files import findings_of
 from validation.proofs import Proof, prove
@@ -38,7 +39,9 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
         if wanted and (reason == "all" or (known and reason in known.families)):
             found[engine] = wanted
     if not found and reason in families:
-        raise FindingsError(f"prove: no experiment stands beside the reason {reason!r} (validation/experiments)")
+        raise FindingsError(
+            f"prove: nobody has written an experiment for the reason {reason!r} (its engine's experiments.py)"
+        )
     if not found:
         raise FindingsError(f"prove: there is no reason called {reason!r}; known: {', '.join(families)}")
     return found

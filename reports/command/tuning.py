@@ -11,11 +11,11 @@ from typing import Any
 import click
 
 from adapters.engine import EngineError
-from adapters.registry import load
+from adapters.engine_folder import DECISIVE, candidates_of, cured_of, folder_of
+from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
-from validation.decisive import FILE, measure_all, measured_of, write
-from validation.experiments import candidates_of, cured_of
+from validation.decisive import measure_all, measured_of, write
 from validation.tuning import Score, Search, groups, search
 
 
@@ -29,14 +29,20 @@ def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, .
 
 @main.command()
 @click.argument("engine")
-@click.option("--profile", default="tuned", show_default=True, help="Profile to start from.")
+@click.option("--profile", help="Profile to start from; the tuned one by default.")
 @click.option("--group", multiple=True, callback=known_groups, help="Scenes of one kind; all by default.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--decisive", "which", is_flag=True, help="Measure which settings of its cures matter, and keep it.")
 @AS_JSON
 def tune(
-    engine: str, profile: str, group: tuple[str, ...], dim: tuple[int, ...], jobs: int, which: bool, as_json: bool
+    engine: str,
+    profile: str | None,
+    group: tuple[str, ...],
+    dim: tuple[int, ...],
+    jobs: int,
+    which: bool,
+    as_json: bool,
 ) -> None:
     """Search stock settings of ENGINE that do better than a profile of it on all scenes of a kind.
 
@@ -44,14 +50,17 @@ def tune(
     found, so that a release of an engine that has better settings shows.
 
     With --decisive: each setting that a cure changes is switched alone and left out, and what came out is written to
-    validation/experiments/decisive.csv, which the report and `explain` read. Exits with 1 if other settings decide
+    decisive.csv in the engine's folder, which the report and `explain` read. Exits with 1 if other settings decide
     than were listed.
     """
     console = terminal(stderr=True)
     if which:
         sys.exit(0 if _decisive(engine, jobs, as_json) else 1)
     if not candidates_of(engine):
-        raise EngineError(f"tune: nobody has named stock settings of {engine} to try (validation/experiments)")
+        raise EngineError(f"tune: nobody has named stock settings of {engine} to try (experiments.py in its folder)")
+    profile = profile or profile_of(engine, "tuned")
+    if profile is None:
+        raise EngineError(f"profile: {engine} has no tuned one; name one with --profile")
     known = load(engine).facts.dimensions
     dimensions = dim or ((2,) if known == {2} else (2, 3))
     found = []
@@ -73,13 +82,15 @@ def tune(
 def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
     """Measure and keep which settings decide the cures of an engine; whether the same do as were listed."""
     if not cured_of(engine):
-        raise EngineError(f"tune: nobody has named cures of {engine} to measure (validation/experiments)")
+        raise EngineError(f"tune: nobody has named cures of {engine} to measure (experiments.py in its folder)")
     listed = {(e.scene, e.shipped, e.better): e.text for e in measured_of(engine)}
     try:
         found = measure_all(engine, jobs)
     except ValueError as error:
         raise EngineError(f"tune: {error}") from None
-    write(found, FILE)
+    folder = folder_of(engine)
+    assert folder is not None  # it has experiments, which stand there
+    write(found, folder / DECISIVE)
     console = terminal()
     if as_json:
         click.echo(json.dumps([asdict(entry) for entry in found], indent=1))

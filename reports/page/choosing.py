@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from adapters.registry import profile_of
 from reports.cures import ROLES, Change, changes, how_measured, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
@@ -189,12 +190,13 @@ class Cure:
     measured: str
 
 
-def cures(source: Source, shipped: str = "default", better: str = "tuned") -> list[Cure]:
-    """Engines that fail as shipped and whose other profile is nearer to the truth in the same worst check."""
+def cures(source: Source) -> list[Cure]:
+    """Engines that fail as shipped and whose tuned profile is nearer to the truth in the same worst check."""
     found = []
+    asked = {engine: (profile_of(engine, "shipped"), profile_of(engine, "tuned")) for engine in source.engines}
     for scene, dimension in source.lines:
-        for engine in source.engines:
-            cure = _cure(source, scene, dimension, engine, shipped, better)
+        for engine, (shipped, better) in asked.items():
+            cure = _cure(source, scene, dimension, engine, shipped, better) if shipped and better else None
             if cure is not None:
                 found.append(cure)
     return found

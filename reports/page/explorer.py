@@ -14,6 +14,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
+from adapters.registry import profile_of
 from reports.page.charts import dodged, named, styled, svg
 from reports.page.figures import Figure
 from reports.page.source import Plain, Source
@@ -189,7 +190,7 @@ def _answers(rebounds: Sequence[Plain]) -> list[str]:
     said = []
     for engine in dict.fromkeys(row["engine"] for row in own):
         values = {row["profile"]: row["got"] for row in own if row["engine"] == engine}
-        shipped, asked = values.get("default"), own[0]["asked"]
+        shipped, asked = values.get(profile_of(engine, "shipped") or ""), own[0]["asked"]
         if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
             continue
         better = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}

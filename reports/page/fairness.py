@@ -9,6 +9,7 @@ from typing import Any
 
 from adapters import registry
 from adapters.engine import EngineFacts
+from adapters.engine_folder import laws_of
 from adapters.planted_faults import CAUGHT_BY
 from reports.cures import setting_text
 from reports.page.choosing import Cure, cures
@@ -17,12 +18,8 @@ from reports.page.source import Source
 from reports.page.verdicts import slug
 from reports.wording import number
 from validation.cells import Observation, slot_from_dict
-from validation.deviations import deviations_of
 from validation.findings import Unsupported
 from validation.findings.files import findings_of
-
-#: The engine that is ours; its failures are shown first.
-OURS = "reference"
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,9 @@ class EngineSheet:
 
 @dataclass(frozen=True)
 class Fairness:
-    """The whole sheet."""
+    """The whole sheet; the failures of our own ``solver`` are shown first."""
 
+    solver: str
     ours: list[tuple[str, int, list[FindingFamily]]]
     cures: list[Cure]
     engines: list[EngineSheet]
@@ -108,9 +106,10 @@ class Fairness:
 
 def fairness(source: Source) -> Fairness:
     """Compute the sheet."""
+    solver = registry.solver()
     own = [(mark, sum(f.count for f in fs), fs) for mark, _, every in findings(source)
-           if (fs := [f for f in every if f.engine == OURS])]  # fmt: skip
-    return Fairness(own, _once(cures(source)), [_sheet(source, name) for name in source.engines], CAUGHT_BY)
+           if (fs := [f for f in every if f.engine == solver])]  # fmt: skip
+    return Fairness(solver, own, _once(cures(source)), [_sheet(source, name) for name in source.engines], CAUGHT_BY)
 
 
 def _once(every: Iterable[Cure]) -> list[Cure]:
@@ -195,7 +194,7 @@ def _receipts(observations: Sequence[Observation]) -> list[ReceiptLine]:
 def _laws(source: Source, engine: str) -> list[Law]:
     """Laws by mechanism: profiles, scenes and metrics they speak about, and rows of this run they explain."""
     groups: dict[tuple[str, str], dict[str, dict[str, None]]] = defaultdict(lambda: {"profiles": {}, "where": {}})
-    for law in deviations_of(engine):
+    for law in laws_of(engine):
         group = groups[law.because, law.source]
         group["profiles"] |= dict.fromkeys(law.profiles)
         group["where"][f"{law.scene}/{law.metric.replace('[[]', '[')}"] = None

@@ -3,18 +3,26 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 
+
 from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, needs, run
-from adapters.bullet import BulletEngine, _shares
-from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, fall
+from adapters.bullet import BulletEngine
+from adapters.bullet.contact_law import ContactLaw, fall
+from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 
 ENGINE = BulletEngine()
+#: Bullet's laws by path and settings, stated here once more: the profiles' own settings must give the same.
+DEFAULT = ContactLaw(True, float(np.float32(0.04)), 0.08, 1e-5, 0.2, math.inf, math.inf, 100.0, 0.02)
+REST = ContactLaw(False, 0.0, 0.08, 1e-5, 1e-4, 0.0, 0.04, math.inf, 0.1)
+IMPACT = replace(REST, erp=0.0, slop=1e-6, split_depth=0.0)
+ONE = replace(REST, erp=0.01)
 PROFILES = ("default", "tuned", "one")
 DT = 1.0 / 240.0
 EVERY_STEP = Sampling(1, 0.0)
@@ -296,7 +304,7 @@ def test_pair_of_zero_is_given_to_a_body_that_touches_nothing_rough():
     names = ("floor", "a", "b")
     pairs = (Pair("floor", "a", friction=0.5), Pair("floor", "b"), Pair("a", "b"))
     scene = scene_of(FLOOR, *(ball(5.0, name=n, x=k) for k, n in enumerate(names[1:])), pairs=pairs)
-    shares = _shares(scene, "friction")
+    shares = factors(scene, "friction")
     assert shares[0] * shares[1] == pytest.approx(0.5, rel=1e-15) and shares[2] == 0.0
 
 

@@ -11,7 +11,9 @@ import pytest
 
 pytest.importorskip("pymunk")
 
-from adapters.chipmunk import ChipmunkEngine, factors, overlap_displacement, touching_pairs
+from adapters.chipmunk import ChipmunkEngine
+from adapters.chipmunk.start import overlap_displacement, touching_pairs
+from adapters.chipmunk.translation import factors
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene

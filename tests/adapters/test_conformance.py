@@ -47,7 +47,7 @@ def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
     assert told["readback"] == "RuntimeError: no world today"
 
 
-@pytest.mark.parametrize("name", registry.SHOWN_FIRST)
+@pytest.mark.parametrize("name", registry.names())
 def test_our_adapters_conform(name):
     found = registry.find(name)
     if found.engine is None:

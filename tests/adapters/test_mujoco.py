@@ -15,7 +15,8 @@ import pytest
 pytest.importorskip("mujoco")
 
 from adapters.engine import EngineError
-from adapters.mujoco import MujocoEngine, contact_law
+from adapters.mujoco import MujocoEngine
+from adapters.mujoco.pairs import contact_law
 from adapters.needs import needs
 from adapters.receipts import receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere

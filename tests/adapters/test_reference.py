@@ -12,7 +12,8 @@ import pytest
 
 from adapters.engine import EngineError
 from adapters.needs import needs
-from adapters.reference import REASONS, ReferenceEngine
+from adapters.reference import ReferenceEngine
+from adapters.reference.profiles import REASONS
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory

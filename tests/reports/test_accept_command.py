@@ -30,7 +30,7 @@ def out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("accept")
     call(*CELL, "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(files, "OURS", folder)
+        patch.setattr(files, "findings_folder", lambda engine: folder / engine)
         result = call("accept", "--engine", "chipmunk", "--jobs", 1, "--out", folder)
     assert "4 cells with moved starts" in result.stderr, result.output
     return folder
@@ -39,7 +39,7 @@ def out(tmp_path_factory):
 @pytest.fixture
 def findings(tmp_path, monkeypatch):
     """A folder of findings to write to."""
-    monkeypatch.setattr(files, "OURS", tmp_path)
+    monkeypatch.setattr(files, "findings_folder", lambda engine: tmp_path / engine)
     files.findings_of.cache_clear()
     yield tmp_path / "chipmunk"
     files.findings_of.cache_clear()

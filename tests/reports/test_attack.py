@@ -60,7 +60,7 @@ def attacked(request, tmp_path, monkeypatch):
     folder = tmp_path / "findings"
     (folder / "attacked").mkdir(parents=True)
     (folder / "attacked" / files.FAMILIES).write_text(FAMILIES)
-    monkeypatch.setattr(files, "OURS", folder)
+    monkeypatch.setattr(files, "findings_folder", lambda engine: folder / engine)
     forget()
     yield tmp_path
     forget()

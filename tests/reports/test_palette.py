@@ -5,7 +5,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from reports.palette import ENGINES, OTHERS, PAPER, PROFILES, colours_of, dash_of, shape_of
+from adapters import registry
+from adapters.engine import ROLES
+from reports.palette import MARKS, OTHERS, PAPER, colours_of, dash_of, shape_of
+
+ENGINES = colours_of(registry.names())
 
 #: Machado, Oliveira and Fernandes, IEEE TVCG 15 (2009) 1291: full protanopia, deuteranopia, tritanopia, in linear RGB.
 VISION = {
@@ -35,7 +39,7 @@ def oklab(rgb):
                      [0.0259040371, 0.7827717662, -0.8086757660]]) @ lms  # fmt: skip
 
 
-@pytest.mark.parametrize("colour", [*ENGINES.values(), *OTHERS])
+@pytest.mark.parametrize("colour", sorted({*ENGINES.values(), *OTHERS}))
 @pytest.mark.parametrize("paper", PAPER.values())
 def test_every_colour_has_three_to_one_contrast_on_both_papers(colour, paper):
     """WCAG 2.2, 1.4.11: graphics need 3:1."""
@@ -57,6 +61,13 @@ def test_an_engine_keeps_its_colour_in_any_company():
 
 
 def test_profiles_of_one_engine_differ_in_shape_and_dash():
-    for profiles in (("default", "tuned", "one"), ("classical", "reference"), ("default", "tuned", "matched")):
+    for engine in ENGINES:
+        profiles = list(registry.adapter(engine).profiles)
         assert len({shape_of(p) for p in profiles}) == len({dash_of(p) for p in profiles}) == len(profiles)
-    assert shape_of("of somebody") not in {shape for shape, _ in PROFILES.values()}
+    assert shape_of("of somebody") not in {shape for shape, _ in MARKS.values()}
+
+
+def test_every_role_has_a_mark_and_every_engine_of_ours_a_colour_of_its_own():
+    assert set(MARKS) == set(ROLES)
+    ours = [name for name in ENGINES if registry.is_ours(registry.entry(name))]
+    assert not {ENGINES[name] for name in ours} & set(OTHERS) and len({ENGINES[name] for name in ours}) == len(ours)

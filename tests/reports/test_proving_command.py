@@ -5,9 +5,9 @@ import json
 import pytest
 from click.testing import CliRunner
 
+from adapters.engine_folder import experiments_of
 from reports.command import main
 from reports.command.proving import chosen
-from validation.experiments import experiments_of
 
 
 def run(*arguments):

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from adapters.law import Deviation
 from validation import acceptance
 from validation.acceptance import MOVES, accepted, band, propose, slots_to_move
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
-from validation.deviation import Deviation
 from validation.findings import Family, Finding, Findings, row_key
 from validation.rows import rows_of
 
@@ -128,7 +128,9 @@ def refusals(proposal):
 
 
 def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
-    law = Deviation("nameless", ("default",), "incline", "creep", lambda scene, dt: (0.4, 0.01), "by design", "manual")
+    law = Deviation(
+        "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
+    )
     monkeypatch.setattr("validation.rows.covering", lambda *where: iter([law]))
     (why,) = refusals(propose(rows(), "nameless", listed(FAMILY)))
     assert "a deviation law speaks about it and misses" in why
@@ -321,7 +323,9 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
     assert why == "its receipts or its certificate do not hold"
     ((_, why),) = propose(rows(version="2.0"), "nameless", listed(FAMILY)).refused
     assert why == "family creeps holds for >=1,<2, not for 2.0"
-    law = Deviation("nameless", ("default",), "incline", "creep", lambda scene, dt: (0.4, 0.01), "by design", "manual")
+    law = Deviation(
+        "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
+    )
     monkeypatch.setattr("validation.rows.covering", lambda *where: iter([law]))
     ((_, why),) = propose(rows(), "nameless", listed(FAMILY)).refused
     assert why == "a deviation law speaks about it and misses: the law or the engine has changed"

@@ -4,22 +4,23 @@ import math
 
 import pytest
 
+from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
+from adapters.experiment import Cured
 from adapters.registry import find
 from validation import decisive
 from validation.decisive import (
     ALONE,
     COMPLETES,
-    FILE,
     NEEDED,
     Decisive,
     Part,
     changes_of,
     measure,
     read,
+    slots_of,
     smallest,
     write,
 )
-from validation.experiments import Cured, belongs_of, cured_of
 
 ENGINES = ("chipmunk", "bullet", "mujoco")
 
@@ -65,25 +66,25 @@ def test_what_decides_is_said_in_words(roles, text):
     assert entry(*(Part(name, "1", 2.0, 2.0, role) for name, role in roles.items())).text == text
 
 
-def test_a_list_is_read_back_and_other_engines_stay(tmp_path):
+def test_a_list_is_read_back(tmp_path):
     path = tmp_path / "decisive.csv"
     mine = entry(Part("a", '"reflect"', 0.5, math.inf, ALONE), Part("b", "[0.9, 1.0]", 30.0, 0.1, ""))
     other = entry(Part("c", "null", 0.5, 2.0, ALONE), engine="another")
-    write([mine], path)
+    write([mine, other], path)
+    assert read(path) == [mine, other]
     write([other], path)
-    assert read(path) == [other, mine]
-    write([other], path)
-    assert read(path) == [other, mine]
+    assert read(path) == [other]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_cure_is_listed_with_the_settings_that_its_profile_changes_today(engine):
     if find(engine).engine is None:
         pytest.skip(f"{engine}: {find(engine).reason}")
-    listed, targets = [e for e in read(FILE) if e.engine == engine], cured_of(engine)
+    listed, targets = read(inside(engine, DECISIVE)), cured_of(engine)
+    assert {e.engine for e in listed} == {engine}
     assert [(e.scene, e.cells, e.metrics) for e in listed] == [(t.scene, t.cells, t.metrics) for t in targets] != []
     for own, target in zip(listed, targets, strict=True):
-        every = [changes_of(slot, target.better) for slot in target.slots(engine)]
+        every = [changes_of(slot, target.better) for slot in slots_of(engine, target)]
         expected = {name for changes in every for name in changes if belongs_of(engine).get(name) not in changes}
         said = {name: decisive.as_text([changes.get(name) for changes in every]) for name in expected}
         assert {part.setting: part.value for part in own.parts} == said, "crosscheck tune ENGINE --decisive"
@@ -98,7 +99,7 @@ def test_what_is_listed_comes_out_again(engine, scene):
     if find(engine).engine is None:
         pytest.skip(f"{engine}: {find(engine).reason}")
     (target,) = [target for target in cured_of(engine) if target.scene == scene]
-    (listed,) = [e for e in read(FILE) if (e.engine, e.scene) == (engine, scene)]
+    (listed,) = [e for e in read(inside(engine, DECISIVE)) if e.scene == scene]
     found = measure(engine, target)
     assert found.text == listed.text
     assert {part.setting: part.decides for part in found.parts} == {part.setting: part.decides for part in listed.parts}
@@ -107,4 +108,4 @@ def test_what_is_listed_comes_out_again(engine, scene):
 def test_what_passes_as_shipped_has_no_cure():
     pytest.importorskip("pymunk")
     with pytest.raises(ValueError, match="no cure"):
-        measure("chipmunk", Cured("incline", ({},)))
+        measure("chipmunk", Cured("default", "tuned", "incline", ({},)))

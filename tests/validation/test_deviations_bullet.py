@@ -1,5 +1,6 @@
 """Bullet's deviation laws, at points that were not used to write them, against the engine itself."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,16 +10,21 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 
 from adapters import needs, run
 from adapters.bullet import BulletEngine
-from adapters.bullet_law import DEFAULT, IMPACT, ONE, REST, fall
+from adapters.bullet.contact_law import ContactLaw, fall
+from adapters.bullet.laws import DEVIATIONS, sliding_with_drag
+from adapters.engine_folder import covering
+from adapters.law import Deviation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.deviation import Deviation
-from validation.deviations import covering
-from validation.deviations.bullet import DEVIATIONS, sliding_with_drag
 from validation.execution import execute
 
 ENGINE = BulletEngine()
 VERSION = "3.2.7"
+MEASURE = CATALOGUE["incline"].measure
+DEFAULT = ContactLaw(True, float(np.float32(0.04)), 0.08, 1e-5, 0.2, math.inf, math.inf, 100.0, 0.02)
+REST = ContactLaw(False, 0.0, 0.08, 1e-5, 1e-4, 0.0, 0.04, math.inf, 0.1)
+IMPACT = replace(REST, erp=0.0, slop=1e-6, split_depth=0.0)
+ONE = replace(REST, erp=0.01)
 
 
 def compare(name, params, profile, dt, dimension=2):
@@ -29,7 +35,9 @@ def compare(name, params, profile, dt, dimension=2):
     measured = canonical.measure(scene, run(ENGINE, scene, dt, settings, canonical.sampling(scene)))
     rows = {}
     for check in canonical.checks(scene, dt):
-        said = [law.law(scene, dt) for law in covering("bullet", VERSION, profile, name, check.metric)]
+        said = [
+            law.law(scene, dt, canonical.measure) for law in covering("bullet", VERSION, profile, name, check.metric)
+        ]
         said = [prediction for prediction in said if prediction is not None]
         assert len(said) <= 1
         rows[check.metric] = (measured[check.metric][0], said[0] if said else None, check)
@@ -123,14 +131,14 @@ def test_a_friction_that_is_half_a_percent_off_is_not_explained_by_drag():
     for ratio in (1.1, 1.6):
         scene = CATALOGUE["incline"].scene(3, {"ratio": ratio})
         weaker = replace(scene, pairs=(replace(scene.pairs[0], friction=0.995 * scene.pairs[0].friction),))
-        (centre, band), (other, _) = sliding_with_drag(scene, 1 / 240), sliding_with_drag(weaker, 1 / 240)
+        (centre, band), (other, _) = (sliding_with_drag(each, 1 / 240, MEASURE) for each in (scene, weaker))
         assert abs(other - centre) > 10.0 * band
 
 
 def test_the_law_of_drag_is_silent_where_a_step_is_longer_than_contact_points_may_drift():
     """1.7 cm a step for a box of 1 m: beyond it the friction is off by up to 0.1 %, which no band of drag may hold."""
     for ratio, dt, speaks in ((1.6, 1 / 240, True), (2.0, 1 / 240, False), (2.0, 1 / 480, True)):
-        law = sliding_with_drag(CATALOGUE["incline"].scene(3, {"ratio": ratio}), dt)
+        law = sliding_with_drag(CATALOGUE["incline"].scene(3, {"ratio": ratio}), dt, MEASURE)
         assert (law is not None) is speaks
         if law is not None:
             value, _ = execute(Slot("incline", (("ratio", ratio),), 3, "bullet", "default", dt)).metrics["acceleration"]
@@ -162,6 +170,8 @@ def test_multibody_restitutes_gravity_and_rigid_body_does_not():
 
 def test_laws_say_nothing_about_scenes_they_do_not_describe():
     stack = CATALOGUE["stack"].scene(2, {"n": 2})
-    assert all(law.law(stack, 1 / 240) is None for law in DEVIATIONS if law.scene != "incline")
+    assert all(
+        law.law(stack, 1 / 240, CATALOGUE["stack"].measure) is None for law in DEVIATIONS if law.scene != "incline"
+    )
     assert not any(law.covers("bullet", "3.3.0", "default", "impact", "impulse") for law in DEVIATIONS)
     assert all(isinstance(law, Deviation) and law.because and law.source for law in DEVIATIONS)

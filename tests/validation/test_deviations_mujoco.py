@@ -10,15 +10,16 @@ import pytest
 
 pytest.importorskip("mujoco")
 
+from adapters.engine_folder import covering
 from adapters.mujoco import MujocoEngine
-from adapters.mujoco_law import ContactLaw, Impedance, softness_of
+from adapters.mujoco.contact_law import ContactLaw, Impedance, softness_of
+from adapters.mujoco.laws import DEVIATIONS
+from adapters.mujoco.predictions import box_on_face
 from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.stepping import run
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
-from validation.deviations import covering
-from validation.deviations.mujoco import DEVIATIONS, box_on_face
 
 ENGINE = MujocoEngine()
 VERSION = "4.0.1"
@@ -39,7 +40,7 @@ def compare(profile: str, dt: float, name: str, dimension: int = 2, **params: fl
     rows: dict[str, Row] = {}
     for check in canonical.checks(scene, dt):
         laws = covering("mujoco", VERSION, profile, name, check.metric)
-        said = [found for found in (law.law(scene, dt) for law in laws) if found is not None]
+        said = [found for found in (law.law(scene, dt, canonical.measure) for law in laws) if found is not None]
         assert len(said) <= 1
         rows[check.metric] = (measured[check.metric][0], said[0] if said else None, check)
     return rows
@@ -217,4 +218,4 @@ def test_every_law_has_a_reason_a_source_and_a_version_and_is_silent_on_other_sc
             and law.covers("mujoco", VERSION, law.profiles[0], law.scene, law.metric.replace("[[]", "["))
         )
         other = others.get(law.scene, make("impact"))
-        assert law.law(other, DT) is None
+        assert law.law(other, DT, CATALOGUE[other.name].measure) is None

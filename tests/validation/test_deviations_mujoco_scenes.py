@@ -2,9 +2,9 @@
 
 import pytest
 
+from adapters.engine_folder import covering
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.deviations import covering
 from validation.execution import execute
 
 pytest.importorskip("mujoco")
@@ -42,7 +42,7 @@ def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, prof
     assert {m for m in off if abs(measured.metrics[m][0] - checks[m].truth) > checks[m].bound} == off
     for metric in off:
         (law,) = covering("mujoco", measured.engine_version, profile, name, metric)
-        value, band = law.law(scene, DT)
+        value, band = law.law(scene, DT, canonical.measure)
         found, truth = measured.metrics[metric][0], checks[metric].truth
         assert abs(found - value) <= band, metric
         assert band < 0.2 * abs(found - truth), "a band as wide as what it explains"
@@ -54,7 +54,7 @@ def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, prof
 )
 def test_a_pyramid_off_its_axis_is_not_predicted(name, params, profile, metric):
     (law,) = covering("mujoco", "4.0.1", profile, name, metric)
-    assert law.law(CATALOGUE[name].scene(3, params), DT) is None
+    assert law.law(CATALOGUE[name].scene(3, params), DT, CATALOGUE[name].measure) is None
 
 
 def test_a_bar_that_turns_under_a_soft_contact_is_not_predicted():

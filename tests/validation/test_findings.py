@@ -1,7 +1,6 @@
 """Findings: every member has a value, a band and a family with a reason; nothing wider is read from a file."""
 
 from dataclasses import replace
-from importlib.metadata import EntryPoint
 
 import pytest
 from packaging.specifiers import SpecifierSet
@@ -49,7 +48,7 @@ def findings(tmp_path, monkeypatch):
         files.findings_of.cache_clear()
         return folder
 
-    monkeypatch.setattr(files, "OURS", tmp_path)
+    monkeypatch.setattr(files, "findings_folder", lambda engine: tmp_path / engine)
     yield write
     files.findings_of.cache_clear()
 
@@ -369,64 +368,3 @@ def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
 )
 def test_what_an_unsupported_entry_speaks_about(entry, covered):
     assert entry.covers(SLOT) is covered
-
-
-# ---- findings that another package brings --------------------------------------------------------------------------
-
-
-@pytest.fixture
-def package(tmp_path, monkeypatch):
-    """A package that brings findings of `nameless`, and must not be imported for them."""
-    folder = tmp_path / "site" / "nameless_crosscheck"
-    (folder / "data" / "findings").mkdir(parents=True)
-    (folder / "__init__.py").write_text("raise RuntimeError('imported')\n")
-    (folder / "data" / "findings" / files.FAMILIES).write_text(FAMILY)
-    (folder / "data" / "findings" / files.MEMBERS).write_text(HEAD + MEMBER)
-    monkeypatch.syspath_prepend(str(folder.parent))
-
-    def named(value):
-        monkeypatch.setattr(files, "entry_points", lambda group: [EntryPoint("nameless", value, group)])
-        files.findings_of.cache_clear()
-
-    yield named
-    files.findings_of.cache_clear()
-
-
-def test_an_engine_s_package_brings_its_findings_without_being_imported(package):
-    package("nameless_crosscheck:data.findings")
-    assert judged(SLOT, creep=0.5) == ("fail", "known", False)
-
-
-def test_the_group_of_entry_points_is_the_one_that_is_documented(package, monkeypatch):
-    asked = []
-    monkeypatch.setattr(files, "entry_points", lambda group: asked.append(group) or [])
-    files.findings_of.cache_clear()
-    assert files.findings_of("nameless") is None
-    assert asked == ["contact_crosscheck.findings"]
-
-
-def test_only_the_entry_of_that_engine_is_looked_at(package):
-    package("not_there:findings")
-    assert files.findings_of("another") is None
-
-
-@pytest.mark.parametrize(
-    "value",
-    ["nameless_crosscheck:nothing", "nameless_crosscheck", "not_there:findings", "a b:c",
-     "nameless_crosscheck.data:findings"],  # of a dotted name the package would be imported
-)  # fmt: skip
-def test_an_entry_point_that_names_no_folder_is_refused_in_one_line(package, value):
-    package(value)
-    with pytest.raises(FindingsError) as caught:
-        files.findings_of("nameless")
-    assert str(caught.value) == (
-        f"entry point contact_crosscheck.findings.nameless: {value!r} is not a folder of an installed package "
-        "(mypackage:folder.inside.it)"
-    )
-
-
-def test_two_folders_for_one_engine_are_refused(package, findings):
-    findings()
-    package("nameless_crosscheck:data.findings")
-    with pytest.raises(FindingsError, match="one of them must go"):
-        files.findings_of("nameless")

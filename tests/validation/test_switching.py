@@ -5,9 +5,10 @@ import math
 
 import pytest
 
+from adapters.engine_folder import candidates_of, experiments_of
+from adapters.experiment import Experiment
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
-from validation.experiments import Experiment, candidates_of, experiments_of
 from validation.findings.files import findings_of
 from validation.plan import QUICK_DT, in_quick_suite
 from validation.proofs import Proof

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from adapters.law import Deviation
 from validation.canonical import Check
-from validation.deviation import Deviation
 from validation.findings import Family, Finding, Known
 from validation.verdicts import Physics, Standing, is_marginal, judge, judge_divergence, judge_physics, predicted
 
@@ -182,7 +182,7 @@ def test_the_reason_of_a_divergence_in_full(known, said):
 
 
 def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from_the_first():
-    other = Deviation("e", ("p",), "s", "m", lambda scene, dt: (2.0, 0.1), "another mechanism", "its manual")
+    other = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: (2.0, 0.1), "another mechanism", "its manual")
     both = [*LAWFUL, (other, 2.0, 0.1)]
     assert judge(2.05, CHECK, both, NEW).reason == "another mechanism (predicted 2 +- 0.1)"
     assert judge(3.0, CHECK, both, NEW).reason == "left the band of its law, 1.5 +- 0.01: it does so by design"
@@ -191,11 +191,11 @@ def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from
 def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_are_left_out():
     asked = []
 
-    def law(scene, dt):
-        asked.append((scene, dt))
+    def law(scene, dt, measure):
+        asked.append((scene, dt, measure))
         return (dt, 0.5)
 
     speaks = Deviation("e", ("p",), "s", "m", law, "because", "source")
-    silent = Deviation("e", ("p",), "s", "m", lambda scene, dt: None, "because", "source")
-    assert predicted([silent, speaks], "the scene", SimpleNamespace(dt=0.25)) == [(speaks, 0.25, 0.5)]
-    assert asked == [("the scene", 0.25)]
+    silent = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: None, "because", "source")
+    assert predicted([silent, speaks], "the scene", SimpleNamespace(dt=0.25), "its measure") == [(speaks, 0.25, 0.5)]
+    assert asked == [("the scene", 0.25, "its measure")]

@@ -7,25 +7,25 @@ A row is *known* while its value lies within the band of its member; outside it 
 whether it passes or fails. A member without a value says that the check has none on this row, and its family why.
 Rows outside the quick suite have no members: a family says what they are like, it gives them no standing.
 
-Ours stand in ``validation/findings/<engine>/``; the package of another engine brings its own (`validation.findings.
-files`). An engine without findings is *unlisted*: its FAILs have no standing and do not fail the command.
+They stand in the engine's folder (`validation.findings.files` reads them). An engine without findings is *unlisted*:
+its FAILs have no standing and do not fail the command.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from packaging.specifiers import SpecifierSet
 from packaging.version import InvalidVersion
 
+from adapters import registry
 from validation.cells import Slot, format_dt
 from validation.plan import in_quick_suite
 
 #: Identity of a row within its engine: profile, scene, dimension, params, dt, iterations, metric.
 Key = tuple[str, ...]
-#: Profiles that promise a solution: what fails there is a defect of ours, and no reason makes it known.
-NEVER_LISTED = frozenset({("reference", "reference")})
 
 
 class FindingsError(ValueError):
@@ -85,6 +85,13 @@ class Unsupported:
             and self.scene in ("*", slot.scene)
             and self.dimension in (0, slot.dimension)
         )
+
+
+@cache
+def solutions_of(engine: str) -> frozenset[str]:
+    """Profiles that promise a solution: what fails there is a defect, and no reason makes it known."""
+    facts = registry.facts(engine)
+    return frozenset(name for name, role in facts.roles.items() if role == "solution") if facts else frozenset()
 
 
 def _among(name: str, names: tuple[str, ...]) -> bool:

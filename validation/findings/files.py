@@ -1,10 +1,7 @@
 """Files of findings: ``families.toml`` (reasons) and ``members.csv`` (rows) in one folder per engine.
 
-Ours are the folders beside this file. The package of another engine names its folder by an entry point, whose value
-is ``package:folder.inside.it``; nothing of that package is imported for it::
-
-    [project.entry-points."contact_crosscheck.findings"]
-    myengine = "mypackage:findings"
+They stand in the engine's folder (`adapters.engine_folder`), ours and those of other packages alike; nothing of an
+engine is imported for them.
 """
 
 from __future__ import annotations
@@ -15,22 +12,19 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
-from validation.findings import NEVER_LISTED, Family, Finding, Findings, FindingsError, Key, Unsupported
+from adapters import registry
+from adapters.engine_folder import FINDINGS, folder_of
+from validation.findings import Family, Finding, Findings, FindingsError, Key, Unsupported, solutions_of
 
-GROUP = "contact_crosscheck.findings"
 FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
 #: What stands in the column ``value`` of a cell that ended in numbers that are none.
 DIVERGED = "diverged"
-#: Folders of the engines of this project.
-OURS = Path(__file__).resolve().parent
 
 
 @cache
@@ -40,33 +34,22 @@ def findings_of(engine: str) -> Findings | None:
     Raises
     ------
     FindingsError
-        If its files are wrong, or if there are two folders for one engine.
+        If its files are wrong.
     """
+    folder = findings_folder(engine)
+    return read(engine, folder) if folder is not None and folder.is_dir() else None
+
+
+def findings_folder(engine: str) -> Path | None:
+    """Folder with the findings of ``engine``, whether or not it exists; None if the engine has no folder."""
     folder = folder_of(engine)
-    return None if folder is None else read(engine, folder)
+    return None if folder is None else folder / FINDINGS
 
 
-def folder_of(engine: str) -> Path | None:
-    """Folder with the findings of ``engine``, ours or that of its entry point; None if there is none."""
-    found = [OURS / engine] if (OURS / engine).is_dir() else []
-    found += [_folder(entry) for entry in entry_points(group=GROUP) if entry.name == engine]
-    if len(found) > 1:
-        raise FindingsError(f"findings of {engine}: stand in {' and in '.join(map(str, found))}; one of them must go")
-    return found[0] if found else None
-
-
-def _folder(entry: EntryPoint) -> Path:
-    """Folder that an entry point names; its top-level package is located, not imported."""
-    package, _, inside = entry.value.partition(":")
-    spec = find_spec(package) if package.isidentifier() else None
-    places = [Path(place, *inside.split(".")) for place in (spec.submodule_search_locations or ())] if spec else []
-    folder = next((place for place in places if place.is_dir()), None)
-    if folder is None or not inside:
-        raise FindingsError(
-            f"entry point {GROUP}.{entry.name}: {entry.value!r} is not a folder of an installed package "
-            "(mypackage:folder.inside.it)"
-        )
-    return folder
+def brought_by_ours(engine: str) -> bool:
+    """Whether the findings of ``engine`` are this project's own."""
+    entry = registry.entry(engine)
+    return entry is not None and registry.is_ours(entry)
 
 
 def read(engine: str, folder: Path) -> Findings:
@@ -123,7 +106,7 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
     if "*" in family.scene:
         raise FindingsError(f"{label}: scene must be the name of one scene")
     for profile in family.profiles:
-        if (engine, profile) in NEVER_LISTED:
+        if profile in solutions_of(engine):
             raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
     try:
         SpecifierSet(family.releases)
@@ -167,7 +150,7 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
     key = (profile, family.scene, dimension, params, dt, iterations, metric)
     if not family.covers(key):
         raise FindingsError(f"{label}: family {name} does not speak about {profile} {metric}")
-    if (engine, profile) in NEVER_LISTED:
+    if profile in solutions_of(engine):
         raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
     if value in ("", DIVERGED):
         return key, Finding(family, None, diverged=value == DIVERGED)

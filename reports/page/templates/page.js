@@ -35,7 +35,7 @@ for (const button of $$("button.copy")) {
   });
 }
 
-/* What is shown stands behind a "?" in the address' fragment: #speed?hide=bullet%2Fone&t=34. A file has no other place. */
+/* What is shown stands behind a "?" in the address' fragment: #speed?hide=engine%2Fprofile&t=34. A file has no other place. */
 const view = new URLSearchParams(location.hash.split("?")[1] ?? "");
 function remember(name, value) {
   if (value === null || value === "") view.delete(name);

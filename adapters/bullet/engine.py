@@ -1,0 +1,186 @@
+"""Bullet behind the plugin line: facts, refusals, and what its profiles declare.
+
+Source references are to bulletphysics/bullet3 at 6c888f4, the commit that the 3.2.7 wheels were built from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import Any
+
+from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
+from adapters.bullet.profiles import BODY, PROFILES, WORLD, law_of
+from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE
+from adapters.bullet.simulation import BulletSimulation
+from adapters.bullet.translation import factors, moments
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme
+from adapters.needs import Needs
+from adapters.probes import (
+    GRAVITY,
+    REBOUND_LEAD,
+    REBOUND_RADIUS,
+    REBOUND_SPEED,
+    REBOUND_TIME,
+    SLIDE_TIME,
+    slide_speed,
+)
+from adapters.receipts import FRICTION_SHARE
+from adapters.scene import Scene
+
+_QUIRKS = (
+    Quirk(
+        "coefficients of two bodies multiply",
+        "values per body are solved from the pairs; a table that no product gives is refused",
+        "btManifoldResult.cpp:58,70",
+    ),
+    Quirk(
+        "a plane gives a box one contact point per step and spins it up",
+        "a half-space is a thick static box, in every profile",
+        "btConvexPlaneCollisionAlgorithm.cpp:92; bullet3 #1514",
+    ),
+    Quirk(
+        "a new inertia or orientation acts a step late, and an inertia without a mass wipes a rigid body's mass",
+        "bodies wait far away, already turned, for one step without gravity; mass and inertia are set together",
+        "measured: a touching disc rolls at 5/7 instead of 2/3, a turned body answers a torque by its unturned inertia",
+    ),
+    Quirk(
+        "contactBreakingThreshold is a C global that survives disconnect",
+        "every profile sets it",
+        "PhysicsServerCommandProcessor.cpp:11525",
+    ),
+    Quirk(
+        "negative and NaN values are ignored without a word",
+        "all numbers are validated before, and read back after, they are set",
+        "pybullet.c:1825",
+    ),
+    Quirk(
+        "contacts beyond contactProcessingThreshold keep reporting their last impulse",
+        "their impulse counts as zero",
+        "measured: an impulse sum six times too large after one rebound",
+    ),
+    Quirk(
+        "getDynamicsInfo does not fill in restitution and dampings of rigid bodies: they are left from older answers",
+        "not read back on that path; receipts measure them",
+        "measured: 0.7 asked, 0.0 or an older body's value reported",
+    ),
+    Quirk(
+        "contact distances are those before the step, forces those of the step",
+        "said in the contact record; states are read after the step",
+        "PhysicsServerCommandProcessor.cpp:8663",
+    ),
+    Quirk("external loads last for one step", "applied anew before every step", "PyBullet Quickstart Guide"),
+    Quirk(
+        "there is no kinematic body in Python and rigid static bodies ignore a velocity",
+        "a prescribed body is a free one of 1e9 times the heaviest mass, its velocity set anew before every step",
+        "measured: recoil 1e-9",
+    ),
+)
+
+
+class BulletEngine(Engine):
+    """Bullet 3 through PyBullet."""
+
+    facts = EngineFacts(
+        name="bullet",
+        title="Bullet 3 (PyBullet)",
+        package="pybullet",
+        dimensions=frozenset({3}),
+        scheme=Scheme("contacts at the old pose -> velocity (forces, then impulses) -> position", +1),
+        customary_dt=1.0 / 240.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned", "one": "one"}),
+        colour="#12a38d",
+        quirks=_QUIRKS,
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of the installed wheel; PyBullet itself does not know it."""
+        return version("pybullet")
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse sizes and moments that Bullet cannot hold, too much friction, and unfactorable materials."""
+        for body in scene.bodies:
+            if body.shape.smallest_size < SMALLEST_SIZE:
+                return f"{body.name}.shape: bullet needs sizes of at least {SMALLEST_SIZE:g} m"
+            if body.motion == "free" and min(body.mass, *moments(body, body.mass)) < SMALLEST_INERTIA:
+                return f"{body.name}: bullet needs masses and moments of at least {SMALLEST_INERTIA:g}"
+        if max((m.friction for _, _, m in scene.contact_pairs()), default=0.0) > LARGEST_FRICTION:
+            return f"friction: bullet clamps coefficients to {LARGEST_FRICTION:g}"
+        for coefficient in ("restitution", "friction"):
+            if factors(scene, coefficient) is None:
+                return f"{coefficient}: bullet multiplies values of bodies, no product gives this table of pairs"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> BulletSimulation:
+        """Make a world in a new DIRECT client.
+
+        Raises
+        ------
+        EngineError
+            For a setting or a step that Bullet would ignore, or a scene that `refuses` names.
+        """
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        if refusal := self.refuses(scene, ""):
+            raise EngineError(refusal)
+        return BulletSimulation(scene, dt, settings)
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: parameters of the world, of how bodies are made, and of each body."""
+        lines = [f"# p: pybullet; fixedTimeStep={dt:.9g}; body: each of your bodies"]
+        world = [f"numSolverIterations={settings[n]}" if n == "iterations" else f"{n}={settings[n]!r}"
+                 for n in names if n in WORLD | {"iterations"}]  # fmt: skip
+        if world:
+            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})")
+        if "useMaximalCoordinates" in names:
+            lines.append(f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})")
+        body = [f"{n}={settings[n]!r}" for n in names if n in BODY]
+        if body:
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})")
+        return "\n".join(lines)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
+        law = law_of(profile, needs, dt)
+        declared = _sliding(profile, law, needs.friction, dt) if needs.friction > 0.0 else {}
+        if profile == "one":
+            declared["restitution"] = _gain(law, needs.restitution, dt)
+        if profile != "default":
+            return declared
+        # 1e-12: round-off of up to a thousand steps.
+        loss = Declared(loss_in_one_second(law, dt), 1e-12, "drag of a multibody, 0.04 (1 + v) v, for spin as well")
+        time = (REBOUND_LEAD + 4) * dt + REBOUND_TIME
+        ball = (REBOUND_RADIUS, REBOUND_SPEED, needs.restitution, dt, REBOUND_LEAD, time)
+        least, greatest = rebound_range(law, *ball)
+        because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
+        rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
+        return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+
+
+def _sliding(profile: str, law: ContactLaw, friction: float, dt: float) -> dict[str, Declared]:
+    """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
+
+    A contact point under a fast box that comes or goes holds the friction of a step without its load; a slide has one
+    at each end at most. On the rigid-body path that adds friction and never takes any (measured at 1/60 .. 1/960 s).
+    """
+    share = dt / SLIDE_TIME
+    because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
+    if profile != "default":
+        more = Declared(friction * (1.0 + share), friction * (share + FRICTION_SHARE), because)
+        return {"friction": more, "friction_impulse": more}
+    slowed = drag_share(law, slide_speed(friction), friction * GRAVITY, dt, SLIDE_TIME)
+    drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
+    return {
+        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction, drag),
+        "friction_impulse": Declared(friction, 2.0 * share * friction, because),
+    }
+
+
+def _gain(law: ContactLaw, e: float, dt: float) -> Declared:
+    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and one met within the slop loses slop/dt."""
+    lost = law.slop / (REBOUND_SPEED * dt)
+    because = "found 0 .. v dt deep, of which contactERP per step becomes speed; within the slop, slop/dt is lost"
+    return Declared(e + 0.5 * (law.erp - lost), 0.5 * (law.erp + lost), because)

@@ -1,0 +1,232 @@
+"""Experiments on Bullet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Cured, Experiment
+
+#: Iterations are left alone: they cost time, and any count is better than a lower one.
+CANDIDATES: dict[str, tuple[Any, ...]] = {
+    "contactBreakingThreshold": (0.001, 0.005, 0.02, 0.1),
+    "contactERP": (0.0, 0.01, 0.08, 0.2),
+    "contactSlop": (0.0, 1e-6, 1e-5, 1e-4),
+    "warmStartingFactor": (0.1, 0.5, 0.85, 0.95),
+    "restitutionVelocityThreshold": (0.0, 1e-4),
+    "solverResidualThreshold": (0.0, 1e-7),
+}
+
+#: 20 boxes are more than its tuned profile holds.
+CURED: tuple[Cured, ...] = (
+    Cured("default", "tuned", "impact", ({}, {"e": 0.5, "v": 1.0}, {"e": 1.0, "v": 50.0})),
+    Cured("default", "tuned", "bounce", ({}, {"e": 0.5}, {"e": 1.0})),
+    Cured("default", "tuned", "stack", ({}, {"n": 10.0})),
+    Cured("default", "tuned", "incline", ({}, {"ratio": 0.999}, {"ratio": 1.1}, {"ratio": 2.0})),
+)
+
+_NO_DRAG = {"linearDamping": 0.0, "angularDamping": 0.0}
+
+#: A blow without anything that its law does not have.
+_BARE = _NO_DRAG | {
+    "contactProcessingThreshold": 0.0, "contactERP": 0.0, "contactSlop": 0.0, "restitutionVelocityThreshold": 1e-4,
+    "solverResidualThreshold": 0.0,
+}  # fmt: skip
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    *(
+        Experiment(
+            "incline-residual-creep",
+            "solved to the end (no residual stop, 1000 sweeps) the box sticks; sweeps alone change nothing, for the "
+            "residual stops them",
+            "default",
+            "incline",
+            "creep",
+            {"solverResidualThreshold": 0.0, "iterations": 1000},
+            {"ratio": ratio} if ratio != 0.9 else {},
+            dimension=dimension,
+            idle=({"iterations": 1000},),
+        )
+        for ratio in (0.9, 0.99, 0.999)
+        for dimension in (2, 3)
+    ),
+    *(
+        Experiment(
+            "incline-residual-creep",
+            "near the cone's edge the residual is not all of it: without its stop fifty sweeps are still too few",
+            "default",
+            "incline",
+            "creep",
+            {"solverResidualThreshold": 0.0, "iterations": 1000},
+            {"ratio": ratio},
+            dimension=3,
+            idle=({"solverResidualThreshold": 0.0},),
+        )
+        for ratio in (0.99, 0.999)
+    ),
+    *(
+        Experiment(
+            family,
+            "solved to the end (no residual stop, 1000 sweeps) the column stands",
+            profile,
+            "stack",
+            metric,
+            {"solverResidualThreshold": 0.0, "iterations": 1000},
+            {"n": 10.0},
+            dimension=3,
+            iterations=iterations,
+        )
+        for family, profile, metric, iterations in (
+            ("stack-sweeps-default", "default", "drift", None),
+            ("stack-sweeps-default", "default", "penetration", None),
+            ("stack-sweeps-default", "default", "settle_time", 10),
+            ("stack-sweeps-default", "default", "kinetic_energy", 10),
+            ("stack-sweeps-default", "default", "impulse_scatter", 10),
+            ("stack-sweeps-default", "default", "interface_impulse[5]", 1),
+            ("stack-sweeps", "one", "drift", None),
+            ("stack-sweeps", "one", "penetration", None),
+            ("stack-sweeps", "tuned", "drift", 10),
+            ("stack-sweeps", "tuned", "penetration", 10),
+            ("stack-sweeps", "tuned", "settle_time", 4),
+            ("stack-sweeps", "tuned", "kinetic_energy", 4),
+            ("stack-sweeps", "tuned", "impulse_scatter", 1),
+            ("stack-sweeps", "tuned", "interface_impulse[5]", 1),
+        )
+    ),
+    *(
+        Experiment(
+            "incline-contact-switching",
+            "without drag and with a wider margin the box slides right; without drag alone it does not, nor with the "
+            "wider margin alone, which leaves the drag's law",
+            "default",
+            "incline",
+            "acceleration",
+            _NO_DRAG | {"contactBreakingThreshold": margin},
+            {"ratio": 2.0},
+            dimension=dimension,
+            idle=(_NO_DRAG, {"contactBreakingThreshold": margin}, {**_NO_DRAG, "solverResidualThreshold": 0.0}),
+        )
+        for margin in (0.1, 0.001)
+        for dimension in (2, 3)
+    ),
+    Experiment(
+        "bounce-interval-blurred",
+        "without speculative contacts the intervals of the apexes are right; drag does not matter to them",
+        "default",
+        "bounce",
+        "apex_interval_ratio",
+        {"contactProcessingThreshold": 0.0},
+        dimension=3,
+        idle=(_NO_DRAG,),
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-shipped-contact",
+            "without speculation, push-out, slop, drag and thresholds the blow is exact; without drag alone it is not",
+            "default",
+            scene,
+            metric,
+            _BARE,
+            idle=(_NO_DRAG,),
+        )
+        for scene, metric in (
+            ("head_on", "rebound_ratio"),
+            ("off_centre", "spin"),
+            ("flat_box", "rebound_ratio"),
+            ("stacked_balls", "small_speed"),
+            ("cradle", "speed[4]"),
+            ("galperin", "large_speed"),
+        )
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-push-out",
+            "without push-out (and slop) the blow is exact",
+            "one",
+            scene,
+            metric,
+            {"contactERP": 0.0, "contactSlop": 0.0},
+            idle=({"iterations": 1000},),
+        )
+        for scene, metric in (
+            ("head_on", "rebound_ratio"),
+            ("off_centre", "spin"),
+            ("flat_box", "rebound_ratio"),
+            ("stacked_balls", "small_speed"),
+            ("cradle", "speed[4]"),
+            ("galperin", "large_speed"),
+        )
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-within-slop",
+            "without slop it is exact; more sweeps change nothing",
+            "tuned",
+            scene,
+            metric,
+            {"contactSlop": 0.0},
+            params,
+            idle=({"iterations": 1000},),
+        )
+        for scene, params, metric in (
+            ("stacked_balls", {"e": 0.5, "ratio": 1.0}, "small_speed"),
+            ("cradle", {}, "energy_defect"),
+        )
+    ),
+    *(
+        Experiment(
+            "heavy-on-light-sweeps",
+            "solved to the end (no residual stop, 10000 sweeps) the pair stands",
+            profile,
+            "heavy_on_light",
+            metric,
+            {"solverResidualThreshold": 0.0, "iterations": 10000},
+        )
+        for profile, metric in (
+            ("default", "drift"),
+            ("default", "penetration"),
+            ("tuned", "settle_time"),
+            ("tuned", "kinetic_energy"),
+            ("tuned", "impulse_scatter"),
+            ("tuned", "interface_impulse[1]"),
+            ("one", "drift"),
+            ("one", "penetration"),
+        )
+    ),
+    *(
+        Experiment(
+            "pinch-sweeps",
+            "solved to the end (no residual stop, 1000 sweeps) the grip holds",
+            profile,
+            "pinch",
+            metric,
+            {"solverResidualThreshold": 0.0, "iterations": 1000},
+            {"margin": margin},
+            idle=({"solverResidualThreshold": 0.0},),
+        )
+        for profile, margin, metric in (
+            ("default", 1.05, "creep"),
+            ("default", 100.0, "turned"),
+            ("default", 100.0, "grip"),
+            ("default", 100.0, "carried"),
+            ("tuned", 100.0, "creep"),
+            ("tuned", 100.0, "grip"),
+        )
+    ),
+    *(
+        Experiment(
+            "slide-drag-and-switching",
+            "without drag and with a wider margin the box stops where it should, level; without drag alone it tips",
+            "default",
+            "slide",
+            metric,
+            _NO_DRAG | {"contactBreakingThreshold": 0.1},
+            idle=idle,
+        )
+        for metric, idle in (
+            ("stopping_distance", ({"contactBreakingThreshold": 0.1},)),
+            ("braking", ({"contactBreakingThreshold": 0.1},)),
+            ("hop", (_NO_DRAG,)),
+            ("turned", (_NO_DRAG,)),
+        )
+    ),
+)

@@ -1,0 +1,155 @@
+"""Bullet's profiles: settings with their reasons.
+
+default   Featherstone multibody path, as shipped: what `createMultiBody` gives whoever changes nothing
+tuned     rigid-body path; settings for rebounds where the scene has impacts, else settings for rest
+one       rigid-body path, one compromise for every scene
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters.bullet.contact_law import ContactLaw
+from adapters.bullet.shipped import BREAKING_THRESHOLD, ITERATIONS, SLOP
+from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.needs import Needs
+
+WORLD = frozenset(
+    {
+        "contactBreakingThreshold",
+        "contactERP",
+        "contactSlop",
+        "deterministicOverlappingPairs",
+        "numSubSteps",
+        "restitutionVelocityThreshold",
+        "solverResidualThreshold",
+        "splitImpulsePenetrationThreshold",
+        "useSplitImpulse",
+        "warmStartingFactor",
+    }
+)
+BODY = frozenset(
+    {"angularDamping", "contactProcessingThreshold", "linearDamping", "rollingFriction", "spinningFriction"}
+)
+
+
+def _breaking_threshold() -> Setting:
+    because = "shipped value; set because it is a C global that every client of the process shares"
+    return Setting("contactBreakingThreshold", BREAKING_THRESHOLD, because, "PhysicsServerCommandProcessor.cpp:11525")
+
+
+def _wide_breaking_threshold() -> Setting:
+    because = (
+        "contact points that drift farther in a step than this share of the body are dropped: the shipped 0.02 loses "
+        "some of a box that slides 1.7 cm a step, and friction with them. Nothing is solved at a distance: "
+        "contactProcessingThreshold is 0"
+    )
+    return Setting("contactBreakingThreshold", 0.1, because, "crosscheck tune bullet --group slide; also --profile one")
+
+
+def default(needs: Needs, dt: float) -> list[Setting]:
+    """As shipped: multibody path, damping 0.04, contact ERP 0.08, speculative contacts."""
+    return [
+        Setting("useMaximalCoordinates", 0, "shipped: createMultiBody makes a Featherstone multibody"),
+        Setting("iterations", ITERATIONS, "shipped", "PhysicsServerCommandProcessor.cpp:2800"),
+        _breaking_threshold(),
+    ]
+
+
+def _rigid_body() -> list[Setting]:
+    """Settings that every tuned scene shares."""
+    solver = "btSequentialImpulseConstraintSolver.cpp"
+    return [
+        Setting(
+            "useMaximalCoordinates",
+            1,
+            "the multibody path cannot warm start or split impulses, and restitutes gravity's own g dt",
+            "btMultiBodyConstraintSolver.cpp:779,812",
+        ),
+        Setting("iterations", ITERATIONS, "shipped; ten boxes carry their weight to 1e-8"),
+        Setting("solverResidualThreshold", 0.0, "shipped 1e-7 stops at 3e-4 m/s per row"),
+        Setting("warmStartingFactor", 0.85, "shipped 0.1 hardly warm starts, 1.0 adds energy", f"{solver}:988"),
+        Setting("restitutionVelocityThreshold", 1e-4, "shipped 0.2 m/s swallows slow rebounds", f"{solver}:494"),
+        Setting("deterministicOverlappingPairs", 1, "order of pairs is part of a Gauss-Seidel answer"),
+        Setting("numSubSteps", 0, "with substeps contact forces are reported wrong", "bullet3 #2797"),
+        _wide_breaking_threshold(),
+        Setting("linearDamping", 0.0, "no drag in the scene"),
+        Setting("angularDamping", 0.0, "no drag in the scene"),
+        Setting("rollingFriction", 0.0, "no rolling resistance in the scene"),
+        Setting("spinningFriction", 0.0, "no torsional resistance in the scene"),
+        Setting(
+            "contactProcessingThreshold",
+            0.0,
+            "speculative contacts take gap/dt off a rebound",
+            f"{solver}:949-953; bullet3 #3094",
+        ),
+    ]
+
+
+def tuned(needs: Needs, dt: float) -> list[Setting]:
+    """Choose between settings for impacts and for rest: one knob, the split impulse, helps one and harms the other."""
+    if needs.regime == "rest":
+        return [
+            *_rigid_body(),
+            Setting("contactSlop", SLOP, "shipped; keeps resting contacts closed"),
+        ]
+    return [
+        *_rigid_body(),
+        Setting("useSplitImpulse", 1, "overlap is pushed out without adding to a rebound"),
+        Setting(
+            "splitImpulsePenetrationThreshold",
+            0.0,
+            "split every overlap, not only those beyond 4 cm, so that none adds to a rebound; not for rest",
+            "pybullet.c:1825",
+        ),
+        Setting(
+            "contactERP",
+            0.0,
+            "no push-out: it adds potential energy to every impact found late, so that e = 1 grows",
+            "crosscheck tune bullet --group impact",
+        ),
+        Setting("contactSlop", 1e-6, "a rebound met within the slop loses slop/dt; 0 makes resting boxes chatter"),
+    ]
+
+
+def one(needs: Needs, dt: float) -> list[Setting]:
+    """One setting for all scenes: rebounds within 1 %, stacks of ten stand."""
+    return [
+        *_rigid_body(),
+        Setting("contactSlop", SLOP, "shipped; keeps resting contacts closed"),
+        Setting("contactERP", 0.01, "a rebound gains at most this fraction of v; still pushes stacks apart"),
+    ]
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned, "one": one})
+
+
+def law_of(profile: str, needs: Needs, dt: float) -> ContactLaw:
+    """Contact law of a profile, from its own settings."""
+    return ContactLaw.of({setting.name: setting.value for setting in PROFILES[profile](needs, dt)})
+
+
+def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """World and body parameters of a profile, validated: PyBullet ignores a bad value without a word.
+
+    Raises
+    ------
+    EngineError
+        Naming an unknown setting, a negative or a not finite value, or an iteration count below 1.
+    """
+    for name, value in settings.items():
+        if name not in WORLD | BODY | {"useMaximalCoordinates", "iterations"}:
+            raise EngineError(f"{name}: bullet has no such setting")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise EngineError(f"{name}: {value!r} is not a number")
+        if not (math.isfinite(value) and value >= 0.0):
+            raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
+    iterations = settings.get("iterations", 50)
+    if iterations != int(iterations) or iterations < 1:
+        raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")
+    world = {name: value for name, value in settings.items() if name in WORLD}
+    body = {name: value for name, value in settings.items() if name in BODY}
+    return world | {"numSolverIterations": int(iterations)}, body

@@ -1,0 +1,250 @@
+"""One world of Bullet, stepped by `stepSimulation` in a DIRECT client of its own."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from adapters.bullet.profiles import checked
+from adapters.bullet.translation import factors, moments, placement
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.scene import Body, HalfSpace, Scene, Sphere
+
+#: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
+WAITING_ROOM = 1e5
+#: A prescribed body outweighs the heaviest free one by this factor; its recoil is then 1e-9 of a velocity change.
+HEAVY = 1e9
+
+
+@cache
+def _pybullet() -> ModuleType:
+    """Import the engine; the line that it prints on file descriptor 2 while loading is dropped."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        import pybullet
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+    return pybullet
+
+
+class BulletSimulation(Simulation):
+    """One world in a DIRECT client of its own."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        world, material = checked(settings)
+        self._p = _pybullet()
+        self._scene, self._dt = scene, dt
+        self._world, self._material = world, material
+        self._maximal = int(settings.get("useMaximalCoordinates", 0))
+        #: Contacts farther apart than this are not solved, yet keep reporting the impulse of their last solution.
+        self._solved_gap = float(material.get("contactProcessingThreshold", math.inf))
+        self._client = self._p.connect(self._p.DIRECT)
+        if self._client < 0:
+            raise EngineError("client: bullet has no free client, 1024 are the limit of a process")
+        try:
+            self._build()
+        except self._p.error as error:
+            self.close()
+            raise EngineError(f"build: {error}") from None
+        except BaseException:
+            self.close()
+            raise
+
+    # -- building --
+
+    def _build(self) -> None:
+        """Make the world; bodies wait far away for one step, so that the stated inertia is in force on contact.
+
+        A body that changes its inertia or its orientation keeps the old inverse inertia in world axes through its
+        next step, and a reset of its pose does not refresh it: bodies wait in their final orientation.
+        """
+        p, scene, client = self._p, self._scene, self._client
+        p.setPhysicsEngineParameter(fixedTimeStep=self._dt, **self._world, physicsClientId=client)
+        p.setGravity(0.0, 0.0, 0.0, physicsClientId=client)
+        heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
+        restitution, friction = factors(scene, "restitution"), factors(scene, "friction")
+        if restitution is None or friction is None:
+            raise EngineError("pairs: no product of two bodies' values gives this table of materials")
+        self._ids: list[int] = []
+        self._mass: list[float] = []
+        self._offset: list[tuple[float, ...]] = []
+        for i, body in enumerate(scene.bodies):
+            self._add(i, body, heaviest, restitution[i], friction[i])
+        self._index = {identifier: i for i, identifier in enumerate(self._ids)}
+        self._ignore_pairs_that_cannot_move()
+        p.stepSimulation(physicsClientId=client)
+        for i, body in enumerate(scene.bodies):
+            self._place(i, body)
+        p.setGravity(*scene.gravity, physicsClientId=client)
+        self._loads = self._constant_loads()
+        self._driven = [i for i, body in enumerate(scene.bodies) if body.motion == "prescribed"]
+        if self._driven:
+            names = ", ".join(scene.bodies[i].name for i in self._driven)
+            self.initial_change = (
+                f"prescribed motion of {names}: a body of {HEAVY:g} times the heaviest mass whose velocity is set anew"
+                " before every step",
+            )
+        self._check_readback(restitution, friction)
+
+    def _add(self, index: int, body: Body, heaviest: float, restitution: float, friction: float) -> None:
+        p, client = self._p, self._client
+        sizes, position, quaternion = placement(body, self._scene)
+        if isinstance(body.shape, Sphere):
+            shape = p.createCollisionShape(p.GEOM_SPHERE, radius=sizes[0], physicsClientId=client)
+        else:
+            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=sizes, physicsClientId=client)
+        mass = {"free": body.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[body.motion]
+        waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
+        identifier = p.createMultiBody(
+            mass, shape, -1, waiting, quaternion, useMaximalCoordinates=self._maximal, physicsClientId=client
+        )
+        self._ids.append(identifier)
+        self._mass.append(mass)
+        # A half-space is drawn as a box whose centre lies below the face: the scene's pose is its own.
+        shift = np.subtract(position, body.pose[:3]) if isinstance(body.shape, HalfSpace) else np.zeros(3)
+        self._offset.append(tuple(float(s) for s in shift))
+        p.changeDynamics(
+            identifier,
+            -1,
+            restitution=restitution,
+            lateralFriction=friction,
+            **self._material,
+            physicsClientId=client,
+        )
+        if body.motion != "fixed":
+            # The rigid-body path overwrites the mass with -1 unless it comes with the inertia.
+            inertia = moments(body, mass)
+            p.changeDynamics(identifier, -1, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
+        if body.motion == "prescribed":
+            p.changeDynamics(identifier, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+
+    def _ignore_pairs_that_cannot_move(self) -> None:
+        """Prescribed bodies pass through fixed and prescribed ones."""
+        driven = [i for i, body in enumerate(self._scene.bodies) if body.motion != "free"]
+        for i in driven:
+            for j in driven:
+                if i < j:
+                    pair = (self._ids[i], self._ids[j], -1, -1, 0)
+                    self._p.setCollisionFilterPair(*pair, physicsClientId=self._client)
+
+    def _place(self, index: int, body: Body) -> None:
+        _, position, quaternion = placement(body, self._scene)
+        identifier, client = self._ids[index], self._client
+        # Pose first: it zeroes the velocity.
+        self._p.resetBasePositionAndOrientation(identifier, position, quaternion, physicsClientId=client)
+        if body.motion != "fixed":
+            self._p.resetBaseVelocity(identifier, body.twist[:3], body.twist[3:], physicsClientId=client)
+
+    def _constant_loads(self) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
+        """External force and torque of every body that has any; a prescribed body is held against gravity."""
+        loads = []
+        for i, body in enumerate(self._scene.bodies):
+            force, torque = body.force, body.torque
+            if body.motion == "prescribed":
+                force, torque = tuple(-self._mass[i] * g for g in self._scene.gravity), (0.0, 0.0, 0.0)
+            if body.motion != "fixed" and any((*force, *torque)):
+                loads.append((i, force, torque))
+        return loads
+
+    def _check_readback(self, restitution: list[float], friction: list[float]) -> None:
+        """Raise `EngineError` unless Bullet holds what it was given: it drops what it dislikes in silence."""
+        for i, body in enumerate(self._scene.bodies):
+            info = self._dynamics(i)
+            asked: dict[str, Any] = {"friction": friction[i], "mass": self._mass[i]}
+            if "restitution" in info:
+                asked["restitution"] = restitution[i]
+            if body.motion != "fixed":
+                asked["inertia"] = moments(body, self._mass[i])
+            for name, value in asked.items():
+                # 1e-12: the rigid-body path keeps reciprocals.
+                if not np.allclose(info[name], value, rtol=1e-12, atol=0.0):
+                    raise EngineError(f"{body.name}.{name}: bullet holds {info[name]!r}, asked for {value!r}")
+
+    # -- running --
+
+    def advance(self, steps: int) -> None:
+        """Step; external loads last for one step in Bullet and are applied anew before each."""
+        step, client = self._p.stepSimulation, self._client
+        if not (self._loads or self._driven):
+            for _ in range(steps):
+                step(physicsClientId=client)
+            return
+        for _ in range(steps):
+            self._apply_loads()
+            step(physicsClientId=client)
+
+    def _apply_loads(self) -> None:
+        p, client = self._p, self._client
+        for i in self._driven:
+            twist = self._scene.bodies[i].twist
+            p.resetBaseVelocity(self._ids[i], twist[:3], twist[3:], physicsClientId=client)
+        for i, force, torque in self._loads:
+            centre, _ = p.getBasePositionAndOrientation(self._ids[i], physicsClientId=client)
+            p.applyExternalForce(self._ids[i], -1, force, centre, p.WORLD_FRAME, physicsClientId=client)
+            p.applyExternalTorque(self._ids[i], -1, torque, p.WORLD_FRAME, physicsClientId=client)
+
+    # -- reading --
+
+    def pose(self) -> Array:
+        """Poses (n, 7); that of a half-space without the shift to the box that stands for it."""
+        pose = np.empty((len(self._ids), 7))
+        for i, identifier in enumerate(self._ids):
+            position, (x, y, z, w) = self._p.getBasePositionAndOrientation(identifier, physicsClientId=self._client)
+            pose[i, :3] = np.subtract(position, self._offset[i])
+            half_space = isinstance(self._scene.bodies[i].shape, HalfSpace)
+            pose[i, 3:] = self._scene.bodies[i].pose[3:] if half_space else (w, x, y, z)
+        return pose
+
+    def twist(self) -> Array:
+        """Twists (n, 6) of the centres of mass in world axes."""
+        twist = np.empty((len(self._ids), 6))
+        for i, identifier in enumerate(self._ids):
+            linear, angular = self._p.getBaseVelocity(identifier, physicsClientId=self._client)
+            twist[i, :3], twist[i, 3:] = linear, angular
+        return twist
+
+    def contacts(self) -> Contacts:
+        """Contact points with normal and friction impulses; gaps are those at the start of the last step."""
+        rows = []
+        for point in self._p.getContactPoints(physicsClientId=self._client):
+            a, b = point[1], point[2]
+            on_a, on_b, normal_on_b, gap = point[5:9]
+            impulse = np.zeros(3)
+            if gap <= self._solved_gap:
+                forces = ((point[9], normal_on_b), (point[10], point[11]), (point[12], point[13]))
+                # Bullet's impulses act on A, along the normal that points from B to A.
+                impulse = -self._dt * sum(f * np.asarray(direction) for f, direction in forces)
+            middle = 0.5 * np.add(on_a, on_b)
+            rows.append((self._index[a], self._index[b], middle, np.negative(normal_on_b), impulse, gap))
+        return Contacts.from_rows(rows, 3)
+
+    def _dynamics(self, index: int) -> dict[str, Any]:
+        info = self._p.getDynamicsInfo(self._ids[index], -1, physicsClientId=self._client)
+        names = {"mass": 0, "friction": 1, "inertia": 2, "rolling_friction": 6, "spinning_friction": 7, "margin": 11}
+        if not self._maximal:  # not filled in for rigid bodies: it would be what an older answer left there
+            names["restitution"] = 5
+        return {name: info[column] for name, column in names.items()}
+
+    def readback(self) -> dict[str, Any]:
+        """All that Bullet tells; most solver parameters are write-only and stand in the settings alone."""
+        parameters = self._p.getPhysicsEngineParameters(physicsClientId=self._client)
+        names = [body.name for body in self._scene.bodies]
+        return {
+            **parameters,
+            "bodies": {name: self._dynamics(i) for i, name in enumerate(names)},
+        }
+
+    def close(self) -> None:
+        """Disconnect the client; it frees its world."""
+        if self._client >= 0:
+            self._p.disconnect(self._client)
+            self._client = -1

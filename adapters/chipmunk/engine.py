@@ -1,0 +1,121 @@
+"""Chipmunk (Munk2D) through pymunk, behind the plugin line: planar, impulse-based, fixed sweeps.
+
+    step:  x += (v + v_bias) dt  ->  detect  ->  bounce = e v.n (before forces)  ->  v += (g + f/m) dt
+           ->  warm start  ->  N sweeps over the contacts (accumulated clamping, friction with the current total)
+
+Position is advanced first, with the old velocity. Line numbers below are those of Munk2D's ``src/``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters.chipmunk.profiles import PROFILES, checked
+from adapters.chipmunk.simulation import ChipmunkSimulation
+from adapters.chipmunk.translation import factors, leaves_ground, moment
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.scene import Scene
+
+
+class ChipmunkEngine(Engine):
+    """Planar engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="chipmunk",
+        title="Chipmunk 2D (Munk2D) through pymunk",
+        package="pymunk",
+        dimensions=frozenset({2}),
+        scheme=Scheme("position, detect, sample restitution, forces, solve", -1),
+        customary_dt=1.0 / 60.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        colour="#a8600c",
+        quirks=(
+            Quirk("external forces are cleared by every step", "they are set again before each", "cpBody.c:502"),
+            Quirk(
+                "restitution and friction of a pair are products of the two shapes' numbers",
+                "factors are chosen whose products are the pairs' values; a table without such factors is refused",
+                "cpArbiter.c:334-335",
+            ),
+            Quirk(
+                "one arbiter holds up to two points, but only their summed impulse is public",
+                "the impulse of each point is read from the arbiter's structure; their sum is the public total",
+                "cpArbiter.h:30",
+            ),
+            Quirk("Body.kinetic_energy is twice the energy", "energies are computed from twists", "cpBody.c:588"),
+            Quirk(
+                "mass, moment, elasticity, friction or iterations out of range abort the process",
+                "every number is checked before it is handed over",
+                "cpBody.c:258, cpShape.c:141, cpSpace.c:208",
+            ),
+            Quirk(
+                "collision_persistence = 0 drops every contact before the solver",
+                "refused as a setting",
+                "cpSpaceStep.c:344",
+            ),
+            Quirk(
+                "with the shipped persistence of 3, a contact that re-forms within three steps keeps its old "
+                "accumulated impulse although it is not applied: totals over-report and contacts can pull",
+                "left alone in `default`, persistence 1 in `tuned`",
+                "cpArbiter.c:324 and :390",
+            ),
+            Quirk("the threaded solver gives a different answer each run", "it is not used", "cpHastySpace.c:594"),
+            Quirk(
+                "a shape query between a circle and a polygon flips the sign of the depth",
+                "only its magnitude is used, where the resting overlap looks for touching pairs",
+                "measured on pymunk 7.3.1",
+            ),
+            Quirk("nothing is swept: a fast body passes a thin one", "the ground is 1 km thick", "cpSpaceStep.c:400"),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of pymunk; the string of the bundled C library is stale and says nothing."""
+        import pymunk
+
+        return str(pymunk.version)
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Pair tables that no product of two numbers can represent, and masses whose inverse overflows."""
+        for body in scene.bodies:
+            if body.motion == "free" and not math.isfinite(1.0 / body.mass + 1.0 / moment(body)):
+                return f"{body.name}.mass: the inverse of mass or inertia overflows, the engine's state would be NaN"
+        for quantity in ("restitution", "friction"):
+            if factors(scene, quantity) is None:
+                return f"pairs: {quantity} of a pair is a product of two factors here, this table has none"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world; see `Engine.build`.
+
+        Raises
+        ------
+        EngineError
+            For a spatial scene, a scene that `refuses` names, a bad step or setting, or a scene that could leave
+            the ground's polygon.
+        """
+        if scene.dimension != 2:
+            raise EngineError("dimension: chipmunk is planar and cannot run a spatial scene")
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        chosen = checked(settings)
+        reason = self.refuses(scene, "") or leaves_ground(scene, dt)
+        if reason:
+            raise EngineError(reason)
+        return ChipmunkSimulation(scene, dt, chosen)
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: attributes of the space."""
+        lines = [f"# space: your pymunk.Space, stepped with space.step({dt:.9g})"]
+        lines += [f"space.{name} = {settings[name]!r}" for name in names if name != "start_overlap"]
+        if "start_overlap" in names and settings["start_overlap"]:
+            lines.append(f"# and let touching bodies start {settings['start_overlap']:.4g} m deep in each other")
+        return "\n".join(lines)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Nothing: single contacts and constant forces are exact here, in both profiles."""
+        return {}

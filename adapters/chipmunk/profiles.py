@@ -1,0 +1,107 @@
+"""Chipmunk's profiles: settings with their reasons.
+
+default   as shipped
+tuned     best stock settings for what a scene needs
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters.chipmunk.shipped import COLLISION_BIAS, COLLISION_PERSISTENCE, COLLISION_SLOP, ITERATIONS
+from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.needs import Needs
+
+SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
+
+
+def default_profile(needs: Needs, dt: float) -> list[Setting]:
+    """As shipped: what ``pymunk.Space()`` holds."""
+    shipped, source = "as shipped", "cpSpace.c, cpSpaceInit"
+    return [
+        Setting("iterations", ITERATIONS, shipped, source),
+        Setting("collision_slop", COLLISION_SLOP, shipped, source),
+        Setting("collision_bias", COLLISION_BIAS, f"{shipped}: 0.9 to the 60th per second", source),
+        Setting("collision_persistence", COLLISION_PERSISTENCE, shipped, source),
+        Setting("start_overlap", 0.0, "the scene starts as posed", ""),
+    ]
+
+
+def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Best stock settings for what the scene needs."""
+    slop, resting = 1e-3 * needs.smallest_size, needs.regime == "rest"
+    heavy = needs.mass_ratio >= 100.0
+    return [
+        Setting(
+            "iterations",
+            100 if heavy else 30,
+            "sweeps grow with the mass ratio: 30 lets a column carrying 100 times its mass fall at 1/60 s, 100 holds"
+            if heavy
+            else "brings a flat landing to 1e-8 and a column of ten to rest; error shrinks with every sweep",
+            "measured: flat box against sweeps, columns",
+        ),
+        Setting(
+            "collision_slop",
+            slop,
+            "a thousandth of the smallest body: the shipped 0.1 m is a tenth of it, 0 makes contacts flicker",
+            "cpArbiter.c, cpArbiterPreStep",
+        ),
+        Setting(
+            "collision_bias",
+            COLLISION_BIAS if resting else 1.0,
+            "as shipped: resting bodies need the push-out"
+            if resting
+            else "1 switches the push-out off, which would add potential energy to every impact found late",
+            "cpSpaceStep.c; measured: a ball with e = 1 then keeps its energy to 2e-15 over 100 s",
+        ),
+        Setting(
+            "collision_persistence",
+            1,
+            "the shipped 3 revives old impulses when a contact re-forms, so that contacts can pull",
+            "cpArbiter.c, cpArbiterUpdate and cpArbiterApplyCachedImpulse",
+        ),
+        Setting(
+            "start_overlap",
+            _start_overlap(needs, slop, dt) if resting else 0.0,
+            "touching pairs start 0.3 g dt^2 deep, inside the slop that is never corrected: an exactly touching start "
+            "flickers by g dt^2 and costs a transient"
+            if resting
+            else "bodies that hit must not start inside each other: a shock would pass an overlapping chain at once",
+            "crosscheck tune chipmunk --group stand: half the slop was deeper than needed and no steadier",
+        ),
+    ]
+
+
+def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
+    """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
+    fall = needs.gravity * dt * dt
+    return min(0.5 * slop, 0.3 * fall) if fall > 0.0 else 0.5 * slop
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
+
+
+def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; a bad number would abort the process."""
+    for name in settings:
+        if name not in SETTING_NAMES:
+            raise EngineError(f"{name}: chipmunk has no such setting, it has {', '.join(SETTING_NAMES)}")
+    for name in SETTING_NAMES:
+        if name not in settings:
+            raise EngineError(f"{name}: this setting is missing")
+    for name in ("iterations", "collision_persistence"):
+        value = settings[name]
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value < 2**31:
+            raise EngineError(f"{name}: {value!r} must be a whole number from 1 to 2147483647")
+    for name, high in (("collision_slop", math.inf), ("collision_bias", 1.0), ("start_overlap", math.inf)):
+        value = settings[name]
+        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or not 0.0 <= value <= high:
+            limit = " and at most 1" if high == 1.0 else ""
+            raise EngineError(f"{name}: {value!r} must be a finite number, at least 0{limit}")
+    if settings["start_overlap"] > settings["collision_slop"]:
+        raise EngineError("start_overlap: must not exceed collision_slop, it would be pushed out again")
+    return dict(settings)

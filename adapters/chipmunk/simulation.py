@@ -1,0 +1,162 @@
+"""One ``pymunk.Space`` and what is read from it.
+
+Position is advanced first, with the old velocity, so pose, contacts and impulses read after a step belong to the
+same instant, and free fall lags the parabola by g t dt / 2. Line numbers are those of Munk2D's ``src/``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.chipmunk.start import overlap_displacement, touching_pairs
+from adapters.chipmunk.translation import factors, made_body, made_shape
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.scene import Scene
+
+
+class ChipmunkSimulation(Simulation):
+    """One ``pymunk.Space``; bodies in the scene's order."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import pymunk
+
+        self.scene, self.dt = scene, dt
+        self.space = pymunk.Space(threaded=False)
+        gx, gy = scene.gravity
+        self.space.gravity = (gx, gy)
+        self.space.iterations = settings["iterations"]
+        self.space.collision_slop = settings["collision_slop"]
+        self.space.collision_bias = settings["collision_bias"]
+        self.space.collision_persistence = settings["collision_persistence"]
+        self.bodies = [made_body(body) for body in scene.bodies]
+        self.shapes = [made_shape(a.shape, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
+        self._set_materials()
+        if settings["start_overlap"] > 0.0:
+            self._overlap_start(settings["start_overlap"])
+        for body, shape in zip(self.bodies, self.shapes, strict=True):
+            self.space.add(body, shape)
+        self.index = {id(shape): i for i, shape in enumerate(self.shapes)}
+        self.loaded = [
+            (self.bodies[i], body.force, body.torque[0])
+            for i, body in enumerate(scene.bodies)
+            if body.motion == "free" and (any(body.force) or any(body.torque))
+        ]
+
+    def _set_materials(self) -> None:
+        for quantity, attribute in (("restitution", "elasticity"), ("friction", "friction")):
+            chosen = factors(self.scene, quantity)
+            if chosen is None:
+                raise EngineError(f"pairs: no product of two factors represents the {quantity} of this scene")
+            for shape, value in zip(self.shapes, chosen, strict=True):
+                setattr(shape, attribute, value)
+
+    def _overlap_start(self, overlap: float) -> None:
+        """Move free bodies so that every touching pair overlaps by ``overlap``, where that is possible."""
+        touching = touching_pairs(self.scene)
+        shift = overlap_displacement(self.scene, touching, overlap)
+        if shift is None:
+            self.initial_change = (
+                "none: no displacement lets all touching pairs overlap by "
+                f"{overlap:.3g} m, so the scene starts touching as posed",
+            )
+            return
+        if not touching:
+            return
+        for body, moved in zip(self.bodies, shift, strict=True):
+            if moved.any():
+                body.position = (body.position.x + moved[0], body.position.y + moved[1])
+        self.initial_change = (
+            f"{len(touching)} touching pairs start {overlap:.3g} m deep instead of touching; "
+            f"the largest displacement is {np.linalg.norm(shift, axis=1).max():.3g} m",
+        )
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`."""
+        step, dt = self.space.step, self.dt
+        for _ in range(steps):
+            for body, force, torque in self.loaded:
+                body.force, body.torque = force, torque
+            step(dt)
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`."""
+        return np.array([(*body.position, body.angle) for body in self.bodies], float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        return np.array([(*body.velocity, body.angular_velocity) for body in self.bodies], float)
+
+    def contacts(self) -> Contacts:
+        """Up to two points per pair, sorted by pair; impulses per point."""
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        failures: list[Exception] = []
+        for i, body in enumerate(self.bodies):
+            if self.scene.bodies[i].motion != "free":
+                continue
+
+            def collect(arbiter: Any, i: int = i) -> None:
+                try:  # pymunk prints and swallows what a callback raises
+                    j = self.index[id(arbiter.shapes[1])]
+                    if i < j or self.scene.bodies[j].motion != "free":
+                        rows.extend(_contact_rows(arbiter, i, j))
+                except Exception as error:
+                    failures.append(error)
+
+            body.each_arbiter(collect)
+        if failures:
+            raise EngineError(f"contacts: {type(failures[0]).__name__}: {failures[0]}")
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 2)
+
+    def readback(self) -> dict[str, Any]:
+        """What the space, its bodies and shapes hold."""
+        space = self.space
+        return {
+            "dt": self.dt,
+            "gravity": list(space.gravity),
+            "iterations": space.iterations,
+            "collision_slop": space.collision_slop,
+            "collision_bias": space.collision_bias,
+            "collision_persistence": space.collision_persistence,
+            "damping": space.damping,
+            "sleep_time_threshold": str(space.sleep_time_threshold),
+            "last_step": space.current_time_step,
+            "bodies": {
+                asked.name: {"mass": body.mass, "inertia": body.moment, "size": _size(shape)}
+                for asked, body, shape in zip(self.scene.bodies, self.bodies, self.shapes, strict=True)
+                if asked.motion == "free"
+            },
+            "pairs": {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": self.shapes[i].elasticity * self.shapes[j].elasticity,
+                    "friction": self.shapes[i].friction * self.shapes[j].friction,
+                }
+                for i, j, _ in self.scene.contact_pairs()
+            },
+        }
+
+
+def _size(shape: Any) -> list[float]:
+    """Radius, or half extents, as the engine holds them [m]."""
+    if hasattr(shape, "get_vertices"):
+        return [float(x) for x in np.max(np.abs(shape.get_vertices()), axis=0)]
+    return [float(shape.radius)]
+
+
+def _contact_rows(arbiter: Any, i: int, j: int) -> list[tuple[int, int, Any, Any, Any, float]]:
+    """Rows of one arbiter seen from body ``i``.
+
+    Impulse on the second body: ``J = n jn + t jt`` with t the normal turned by +90 degrees (cpArbiter.c,
+    cpArbiterTotalImpulse), for each point; the accumulated values are not public, pymunk's own pickling reads them
+    the same way.
+    """
+    points = arbiter.contact_point_set
+    (nx, ny), rows = points.normal, []
+    for point, accumulated in zip(points.points, arbiter._arbiter.contacts[0 : len(points.points)], strict=True):
+        jn, jt = accumulated.jnAcc, accumulated.jtAcc
+        middle = (0.5 * (point.point_a.x + point.point_b.x), 0.5 * (point.point_a.y + point.point_b.y))
+        rows.append((i, j, middle, (nx, ny), (nx * jn - ny * jt, ny * jn + nx * jt), point.distance))
+    return rows

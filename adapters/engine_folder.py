@@ -1,0 +1,203 @@
+"""What an engine brings: all that is about one engine stands in one folder, and its one entry point names it.
+
+    [project.entry-points."contact_crosscheck.engines"]
+    myengine = "mypackage.myengine:MyEngine"
+
+    mypackage/myengine/
+        __init__.py       MyEngine: the adapter, which imports the engine inside functions
+        laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
+        experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
+        findings/         families.toml and members.csv (`validation.findings`)
+        decisive.csv      which settings of its cures matter, as measured (`validation.decisive`)
+
+All but the first may be missing; an entry point that names a plain module brings an adapter only. Ours stand in
+``adapters/<engine>/`` and are found in the same way.
+
+Laws and experiments judge, so they are loaded wherever rows are. Those of another package are first imported in a
+process of their own; what is wrong with them costs that engine its laws and experiments, and is said by
+``crosscheck doctor`` (`problems`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from adapters import registry
+from adapters.engine import EngineError
+from adapters.experiment import Cured, Experiment
+from adapters.foreign import importable, said_by
+from adapters.law import Deviation, Law, Measure, Prediction
+from adapters.plain import one_line
+from adapters.scene import Scene
+
+LAWS, EXPERIMENTS, FINDINGS, DECISIVE = "laws", "experiments", "findings", "decisive.csv"
+
+
+def located(module: str) -> Path | None:
+    """File of a module, found without importing the packages it is in: a plugin's import may do anything."""
+    first, *rest = module.split(".")
+    spec = find_spec(first)
+    for name in rest:
+        if spec is None or spec.submodule_search_locations is None:
+            return None
+        spec = PathFinder.find_spec(f"{spec.name}.{name}", spec.submodule_search_locations)
+    return Path(spec.origin) if spec and spec.origin and spec.has_location else None
+
+
+def folder_of(engine: str) -> Path | None:
+    """Folder of ``engine``; None if nobody registered it, or only as a plain module. Nothing is imported."""
+    entry = registry.entry(engine)
+    path = located(entry.module) if entry is not None else None
+    return path.parent if path is not None and path.name == "__init__.py" else None
+
+
+def inside(engine: str, name: str) -> Path | None:
+    """File or folder called ``name`` in the folder of ``engine``; None if it is not there."""
+    folder = folder_of(engine)
+    path = folder / name if folder is not None else None
+    return path if path is not None and path.exists() else None
+
+
+@cache
+def laws_of(engine: str) -> tuple[Deviation, ...]:
+    """All laws of ``engine``; none if its folder has none, or if they cannot be had (`problems`)."""
+    return _laws(engine)[0]
+
+
+def covering(engine: str, version: str, profile: str, scene: str, metric: str) -> Iterator[Deviation]:
+    """Laws that speak about a row."""
+    return (law for law in laws_of(engine) if law.covers(engine, version, profile, scene, metric))
+
+
+@cache
+def experiments_of(engine: str) -> tuple[Experiment, ...]:
+    """All experiments on ``engine``."""
+    return tuple(_listed(engine, "EXPERIMENTS", Experiment))
+
+
+@cache
+def cured_of(engine: str) -> tuple[Cured, ...]:
+    """Cures whose settings are measured one by one."""
+    return tuple(_listed(engine, "CURED", Cured))
+
+
+@cache
+def candidates_of(engine: str) -> Mapping[str, tuple[Any, ...]]:
+    """Stock settings that tuning may change, and the values it tries."""
+    return {name: tuple(values) for name, values in _mapped(engine, "CANDIDATES").items()}
+
+
+@cache
+def belongs_of(engine: str) -> Mapping[str, str]:
+    """Settings that mean nothing without another one, and which; they are switched with it."""
+    return {name: str(other) for name, other in _mapped(engine, "BELONGS").items()}
+
+
+def problems() -> list[str]:
+    """One line for each engine whose laws or experiments cannot be had."""
+    found = []
+    for engine in registry.names():
+        for part, said in ((LAWS, _laws(engine)[1]), (EXPERIMENTS, _experiments(engine)[1])):
+            if said:
+                found.append(f"{engine}: its {part} cannot be had: {said}")
+    return found
+
+
+def forget() -> None:
+    """Look again at what is installed."""
+    registry.find.cache_clear()
+    for each in (laws_of, experiments_of, cured_of, candidates_of, belongs_of, _laws, _experiments, _module):
+        each.cache_clear()
+
+
+# ---- loading ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _module(engine: str, part: str) -> tuple[ModuleType | None, str]:
+    """Module ``part`` of the folder, or None and why it cannot be had; None and nothing where there is none."""
+    entry = registry.entry(engine)
+    if entry is None or inside(engine, f"{part}.py") is None:
+        return None, ""
+    name = f"{entry.module}.{part}"
+    if registry.is_ours(entry):
+        return import_module(name), ""
+    why = importable(name)
+    if why:
+        return None, why
+    try:
+        return import_module(name), ""
+    except BaseException as error:  # it could be imported a moment ago, in another process
+        return None, said_by(error)
+
+
+@cache
+def _laws(engine: str) -> tuple[tuple[Deviation, ...], str]:
+    module, why = _module(engine, LAWS)
+    if module is None:
+        return (), why
+    entry, found = registry.entry(engine), getattr(module, "DEVIATIONS", ())
+    if entry is not None and registry.is_ours(entry):
+        return tuple(found), ""
+    try:
+        return tuple(_guarded(engine, law) for law in found), ""
+    except Exception as error:  # whatever else a package of others holds under that name
+        return (), said_by(error)
+
+
+def _guarded(engine: str, law: Any) -> Deviation:
+    """A law of another package: its texts made plain, and its answers checked."""
+    if not isinstance(law, Deviation) or law.engine != engine:
+        raise TypeError(f"DEVIATIONS has what is no Deviation of {engine}")
+    checked = _checked(f"law: {engine} {one_line(law.scene)}/{one_line(law.metric)}", law.law)
+    return replace(law, law=checked, because=one_line(law.because), source=one_line(law.source))
+
+
+def _checked(label: str, law: Callable[..., Any]) -> Law:
+    def guarded(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        try:
+            said = law(scene, dt, measure)
+            if said is None:
+                return None
+            value, band = (float(number) for number in said)
+        except Exception as error:
+            raise EngineError(f"{label}: {said_by(error)}") from None
+        if not (math.isfinite(value) and math.isfinite(band) and band >= 0.0):
+            raise EngineError(f"{label}: predicts {value:g} +- {band:g}")
+        return value, band
+
+    return guarded
+
+
+@cache
+def _experiments(engine: str) -> tuple[ModuleType | None, str]:
+    """Module with the experiments, if what it holds is of the right kind."""
+    module, why = _module(engine, EXPERIMENTS)
+    if module is None:
+        return None, why
+    for name, kind in (("EXPERIMENTS", Experiment), ("CURED", Cured)):
+        if not all(isinstance(each, kind) for each in getattr(module, name, ())):
+            return None, f"{name} has what is no {kind.__name__}"
+    for name in ("CANDIDATES", "BELONGS"):
+        if not isinstance(getattr(module, name, {}), Mapping):
+            return None, f"{name} is no mapping"
+    return module, ""
+
+
+def _listed(engine: str, name: str, kind: type) -> list[Any]:
+    module, _ = _experiments(engine)
+    return [each for each in getattr(module, name, ()) if isinstance(each, kind)]
+
+
+def _mapped(engine: str, name: str) -> Mapping[str, Any]:
+    module, _ = _experiments(engine)
+    return dict(getattr(module, name, {}))

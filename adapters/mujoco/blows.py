@@ -1,0 +1,102 @@
+"""MuJoCo's contact law for a blow between bodies without a load: one recurrence of the closing speed.
+
+Whatever two bodies meet at a fixed point along a fixed normal, their closing speed u follows the scalar law of one
+contact: with A the inverse mass at the point, ``du = dt A f``, ``f = (aref - a)/R``, ``R = (1 - d)/d s D/n``. D is
+what the engine takes for A, the sum of the bodies' translational inverse masses; n contacts side by side share the
+force. Central blows have D = A; beside the centre the engine is softer by D/A than it should be, and a box that lands
+on four corners stiffer by 4. How far the law is from restitution is thus of order 1 - d.
+
+    head_on      D = A, n = 1         off_centre   D < A, n = 1         flat_box     D = A, n = 4
+
+Source: MuJoCo documentation, "Computation: constraint model", regulariser R and its estimate of the inverse inertia.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from adapters.mujoco.contact_law import ContactLaw
+from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import step_count
+
+
+@dataclass(frozen=True)
+class Blow:
+    """What a blow is, read off a scene.
+
+    Parameters
+    ----------
+    gap, closing
+        Gap [m] at the start and speed [m/s] with which it closes.
+    inverse_mass, estimate
+        A and D of the module's text [1/kg].
+    contacts
+        How many contacts share it.
+    """
+
+    gap: float
+    closing: float
+    inverse_mass: float
+    estimate: float
+    contacts: int
+
+    def after(self, law: ContactLaw, steps: int, moved: float = 0.0) -> float:
+        """Speed with which the bodies part [m/s], for a gap that is ``moved`` [m] larger."""
+        soft = replace(law, softness=law.softness * self.estimate / self.inverse_mass / self.contacts)
+        gap, speed = self.gap + moved, -self.closing
+        for _ in range(steps):
+            gap, speed, _ = soft.advance(gap, speed, 0.0)
+        return speed
+
+
+def blow_of(scene: Scene) -> Blow | None:
+    """The blow of a scene with two bodies that meet once without a load; None if it is not of that kind."""
+    if len(scene.bodies) != 2 or any(scene.gravity):
+        return None
+    d, (first, second) = scene.dimension, scene.bodies
+    if isinstance(first.shape, HalfSpace) and isinstance(second.shape, Box):
+        height, half = second.pose[d - 1], second.shape.half_extents[-1]
+        return Blow(height - half - first.shape.offset, -second.twist[d - 1], 1.0 / second.mass, 1.0 / second.mass, 4)
+    both = 1.0 / first.mass + 1.0 / second.mass
+    if isinstance(second.shape, Disc | Sphere) and isinstance(first.shape, Disc | Sphere):
+        gap = second.pose[0] - first.pose[0] - first.shape.radius - second.shape.radius
+        return Blow(gap, first.twist[0] - second.twist[0], both, both, 1)
+    if isinstance(second.shape, Disc | Sphere) and isinstance(first.shape, Box):
+        gap = second.pose[d - 1] - first.pose[d - 1] - first.shape.half_extents[-1] - second.shape.radius
+        arm = second.pose[0] - first.pose[0]
+        moment = first.inertia[1] if isinstance(first.inertia, tuple) else first.inertia
+        return Blow(gap, first.twist[d - 1] - second.twist[d - 1], both + arm * arm / moment, both, 1)
+    return None
+
+
+def steps_of(scene: Scene, dt: float) -> int:
+    """Steps of the whole scene."""
+    return step_count(scene.duration, dt)
+
+
+def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
+    """Metrics of a scene whose bodies part with ``after`` [m/s]: the blow fixes the impulse, and that everything."""
+    p, impulse = scene.params, (blow.closing + after) / blow.inverse_mass
+    made: dict[str, Callable[[], dict[str, float]]] = {
+        "head_on": lambda: {
+            "rebound_ratio": after / blow.closing,
+            "first_speed": p["v1"] - impulse / p["mass"],
+            "second_speed": p["v2"] + impulse / (p["ratio"] * p["mass"]),
+            "impulse": impulse,
+        },
+        "flat_box": lambda: {"rebound_ratio": after / blow.closing, "impulse": impulse},
+        "off_centre": lambda: {
+            "ball_speed": impulse / p["mass"] - p["v"],
+            "bar_speed": p["rise"] - impulse / (p["ratio"] * p["mass"]),
+            "spin": impulse * p["offset"] / _moment(scene),
+            "impulse": impulse,
+            "energy_lost": 1.0 - (after / blow.closing) ** 2,
+        },
+    }
+    return made[scene.name]() if scene.name in made else {}
+
+
+def _moment(scene: Scene) -> float:
+    moments = scene.bodies[0].inertia
+    return moments[1] if isinstance(moments, tuple) else moments

@@ -1,0 +1,190 @@
+"""MuJoCo's contact law for one box on a level face, in the plane: what a box on an incline does, step by step.
+
+      z ^   +-------+         state  x, z, theta (counter-clockwise), vx, vz, omega
+        |   |   o   |         per unit of mass, inertia i = I/m
+        |   +-------+         each lower corner of the figure stands for two of the box
+        +--------------> x
+
+One step minimises over accelerations a
+
+    1/2 (a - a0)' M (a - a0) + sum over contacts s(J a - aref)
+
+with s(jar) = 1/2 D jar^2 over the rows that push. Four edges ``n +- mu t``, ``n +- mu s`` make a pyramid; an elliptic
+contact has a normal and a friction row and, outside its cone, acts along the cone's edge only. The minimum is found by
+Newton's method on three unknowns: the cost is convex and made of quadratic pieces.
+[MuJoCo documentation, "Computation: constraint model", friction cones and primal problem]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from adapters.mujoco.contact_law import ContactLaw
+
+#: A row of the cost: Jacobian (3), reference acceleration, stiffness D.
+Row = tuple[tuple[float, float, float], float, float]
+Triple = tuple[float, float, float]
+#: Newton steps and halvings of a step: three unknowns and at most sixteen rows settle in a handful.
+NEWTON_STEPS, HALVINGS = 60, 40
+#: A gradient this small against the forces in it is round-off.
+SOLVED = 1e-13
+#: A step that lowers the cost by less than this share cannot be judged by the cost: it is the last one.
+UNSEEN = 1e-15
+
+
+@dataclass(frozen=True)
+class BoxOnFace:
+    """Constants of the problem.
+
+    Parameters
+    ----------
+    law
+        Normal law of a contact; its ``softness`` is that of the cone.
+    cone
+        ``pyramidal`` or ``elliptic``.
+    mu, friction_damping, impratio
+        Friction coefficient, damping b of friction rows [1/s], ratio of normal to friction regularisers.
+    half_length, half_height, inertia
+        [m], [m], [m^2] (over the mass).
+    load
+        Acceleration without contact, along and up [m/s^2].
+    """
+
+    law: ContactLaw
+    cone: str
+    mu: float
+    friction_damping: float
+    impratio: float
+    half_length: float
+    half_height: float
+    inertia: float
+    load: tuple[float, float]
+
+    def slide(self, steps: int, velocity: float = 0.0) -> list[tuple[float, float]]:
+        """Position and velocity along the face from a touching start, at samples 0 ... ``steps``."""
+        return [(pose[0], twist[0]) for pose, twist in self.motion(steps, velocity)]
+
+    def motion(self, steps: int, velocity: float = 0.0) -> list[tuple[Triple, Triple]]:
+        """Poses and twists (along, up, turn) from a touching start, at samples 0 ... ``steps``."""
+        pose, twist = (0.0, self.half_height, 0.0), (velocity, 0.0, 0.0)
+        path, acceleration = [(pose, twist)], (*self.load, 0.0)
+        dt = self.law.dt
+        for _ in range(steps):
+            acceleration = self._solve(pose, twist, acceleration)
+            twist = _along(twist, acceleration, dt)
+            pose = _along(pose, twist, dt)
+            path.append((pose, twist))
+        return path
+
+    def _contacts(self, pose: Triple) -> list[tuple[float, float, float]]:
+        """Lever arm (along, up) and overlap of corners that touch; a contact lies halfway into the overlap."""
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        touching = []
+        for along in (-self.half_length, self.half_length):
+            for up in (-self.half_height, self.half_height):
+                gap = pose[1] + s * along + c * up
+                if gap < self.law.margin:
+                    touching.append((c * along - s * up, 0.5 * gap - pose[1], gap - self.law.margin))
+        return touching
+
+    def _solve(self, pose: Triple, twist: Triple, guess: Triple) -> Triple:
+        free = (*self.load, 0.0)
+        contacts = self._contacts(pose)
+        if not contacts:
+            return free
+        parts = [self._pyramid(twist, *c) if self.cone == "pyramidal" else self._ellipse(twist, *c) for c in contacts]
+        a, (cost, gradient, hessian) = guess, self._model(parts, free, guess)
+        scale = sum(abs(x) for x in free)
+        for _ in range(NEWTON_STEPS):
+            if max(abs(g) for g in gradient) <= SOLVED * scale:
+                break
+            step = _solve3(hessian, gradient)
+            if _dot(step, gradient) <= UNSEEN * cost:
+                return _along(a, step, -1.0)
+            for halving in range(HALVINGS):
+                trial = _along(a, step, -(0.5**halving))
+                new = self._model(parts, free, trial)
+                if new[0] < cost:
+                    break
+            else:
+                break  # no descent left but round-off
+            a, (cost, gradient, hessian) = trial, new
+        return a
+
+    def _pyramid(self, twist: Triple, along: float, up: float, overlap: float) -> list[Row]:
+        """Rows of one corner of the figure: both corners' edges along x, and their edges across."""
+        d = self.law.impedance(overlap)
+        stiff = d / (4.0 * self.law.softness * (1.0 - d))
+        rows: list[Row] = []
+        for mu, weight in ((self.mu, 2.0), (-self.mu, 2.0), (0.0, 4.0)):
+            j = (mu, 1.0, along - mu * up)
+            rows.append((j, -self.law.damping * _dot(j, twist) - self.law.stiffness * d * overlap, weight * stiff))
+        return rows
+
+    def _ellipse(self, twist: Triple, along: float, up: float, overlap: float) -> list[Row]:
+        """Normal and friction row of one corner of the figure."""
+        d = self.law.impedance(overlap)
+        normal, slip = (0.0, 1.0, along), (1.0, 0.0, -up)
+        stiff = 2.0 * d / (self.law.softness * (1.0 - d))
+        reference = -self.law.damping * _dot(normal, twist) - self.law.stiffness * d * overlap
+        return [
+            (normal, reference, stiff),
+            (slip, -self.friction_damping * _dot(slip, twist), stiff * self.impratio),
+        ]
+
+    def _pushing(self, rows: list[Row], a: Triple) -> list[Row]:
+        """Rows that act at acceleration ``a``."""
+        if self.cone == "pyramidal":
+            return [row for row in rows if _dot(row[0], a) < row[1]]
+        (normal, rn, dn), (slip, rt, dt) = rows
+        lack, drift = rn - _dot(normal, a), _dot(slip, a) - rt  # missing lift-off, excess slip
+        # Forces of both rows alone: dn lack, -dt drift; within the cone if dt |drift| <= mu dn lack.
+        if dt * abs(drift) <= self.mu * dn * lack:
+            return rows
+        if lack <= -self.mu * abs(drift):
+            return []
+        # On the edge the force is f (1, -mu sign(drift)) with f D = lack + mu |drift|, D = 1/dn + mu^2/dt.
+        edge = math.copysign(self.mu, drift)
+        j = (normal[0] - edge * slip[0], normal[1] - edge * slip[1], normal[2] - edge * slip[2])
+        return [(j, rn - edge * rt, 1.0 / (1.0 / dn + self.mu**2 / dt))]
+
+    def _model(self, parts: list[list[Row]], free: Triple, a: Triple) -> tuple[float, Triple, list[list[float]]]:
+        """Cost, gradient and Hessian at ``a``."""
+        mass = (1.0, 1.0, self.inertia)
+        off = [a[k] - free[k] for k in range(3)]
+        cost = 0.5 * sum(mass[k] * off[k] ** 2 for k in range(3))
+        gradient = [mass[k] * off[k] for k in range(3)]
+        hessian = [[mass[k] if k == m else 0.0 for m in range(3)] for k in range(3)]
+        for rows in parts:
+            for j, reference, stiff in self._pushing(rows, a):
+                jar = _dot(j, a) - reference
+                cost += 0.5 * stiff * jar * jar
+                for k in range(3):
+                    gradient[k] += stiff * jar * j[k]
+                    for m in range(3):
+                        hessian[k][m] += stiff * j[k] * j[m]
+        return cost, (gradient[0], gradient[1], gradient[2]), hessian
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _along(a: Triple, b: Triple, h: float) -> Triple:
+    return (a[0] + h * b[0], a[1] + h * b[1], a[2] + h * b[2])
+
+
+def _solve3(m: list[list[float]], b: Triple) -> Triple:
+    """Solution of a symmetric positive definite 3 x 3 system, by Cholesky."""
+    l00 = math.sqrt(m[0][0])
+    l10, l20 = m[1][0] / l00, m[2][0] / l00
+    l11 = math.sqrt(m[1][1] - l10 * l10)
+    l21 = (m[2][1] - l20 * l10) / l11
+    l22 = math.sqrt(m[2][2] - l20 * l20 - l21 * l21)
+    y0 = b[0] / l00
+    y1 = (b[1] - l10 * y0) / l11
+    y2 = (b[2] - l20 * y0 - l21 * y1) / l22
+    x2 = y2 / l22
+    x1 = (y1 - l21 * x2) / l11
+    return (y0 - l10 * x1 - l20 * x2) / l00, x1, x2

@@ -1,0 +1,196 @@
+"""MuJoCo behind the plugin line: soft, convex contact; velocity first, then position.
+
+A contact pushes with the force f >= 0 that makes its acceleration ``a = d aref + (1 - d) a0``, where a0 is the
+acceleration without the contact, ``aref = -b v - k r`` a spring and damper (``solref``) and 0 < d < 1 the
+impedance (``solimp``). This model has no coefficient of restitution and no static friction; what the profiles make
+of that stands in `adapters.mujoco.profiles`. [MuJoCo documentation: computation, modeling/solver parameters]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
+from adapters.mujoco.profiles import PROFILES, check_settings
+from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
+from adapters.mujoco.simulation import MujocoSimulation
+from adapters.mujoco.spec import moments
+from adapters.needs import Needs
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, STEPS
+from adapters.receipts import IMPULSE_SHARE
+from adapters.scene import Scene
+
+#: Phases of a step over which a rebound is declared.
+PHASES = 128
+
+
+@final
+class MujocoEngine(Engine):
+    """MuJoCo behind the plugin line."""
+
+    facts = EngineFacts(
+        name="mujoco",
+        title="MuJoCo",
+        package="mujoco-core",
+        dimensions=frozenset({3}),
+        scheme=Scheme("contacts at the old pose; forces, contacts and friction in one solve; velocity; position", 1),
+        customary_dt=1.0 / 500.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        colour="#d255f8",
+        quirks=(
+            Quirk(
+                "a state that is not finite is reset to the start, time included, and stepping goes on",
+                "autoreset is disabled, the state stays not finite and the run counts as diverged",
+                f"{DOC}, option/flag/autoreset",
+            ),
+            Quirk(
+                "warnings go to the console and to MUJOCO_LOG.TXT in the working directory",
+                "both are switched off; the counters of d.warning stand in the certificate",
+                f"{DOC}, mjLogConfig",
+            ),
+            Quirk(
+                "geoms combine friction by the larger of the two, and solref by rules of their own",
+                "one material for all: set on every geom; else every pair is stated as <contact><pair>",
+                f"{DOC}, modeling: contact parameters",
+            ),
+            Quirk(
+                "mass = nan, timestep = 0 and a negative friction compile without an error",
+                "every number is checked before MuJoCo sees it",
+                "measured with 4.0.1",
+            ),
+            Quirk(
+                "MjSpec places the centre of mass at the body's own pos in the body's frame if ipos is not given",
+                "ipos and iquat are given",
+                "measured with 4.0.1",
+            ),
+            Quirk(
+                "after a step, contacts and their forces belong to the step's start",
+                "force times dt is the impulse of the step just made; gaps lag the pose by one step",
+                f"{DOC}, programming/simulation",
+            ),
+            Quirk(
+                "a mocap body has no velocity in contacts",
+                "a prescribed body is a free one, 1e12 times heavier than the rest, without gravity or load",
+                f"{DOC}, modeling: mocap bodies",
+            ),
+        ),
+        known_bad_versions=KNOWN_BAD,
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of `mujoco-core` or `mujoco`, whichever is installed."""
+        import mujoco
+
+        return str(mujoco.__version__)
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse inertias that no mass distribution has: MuJoCo does not compile them."""
+        for body in scene.bodies:
+            if body.motion == "free":
+                a, b, c = sorted(moments(body))
+                if a + b < c * (1.0 - 1e-9):
+                    return f"{body.name}.inertia: {a:g} + {b:g} < {c:g}, no mass distribution has these moments"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a scene or a setting that MuJoCo cannot honour.
+        """
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        refusal = self.refuses(scene, "")
+        if refusal:
+            raise EngineError(refusal)
+        check_settings(settings)
+        return MujocoSimulation(scene, dt, settings)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Rebound of the spring and damper as shipped, over all phases of a step; sums of forces; RK4's fall."""
+        settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
+        declared = {"impulse": _impulses(settings, dt)}
+        if settings["integrator"] == "RK4":
+            declared |= _second_order_fall()
+        if settings["solref"] != "reflect" and needs.regime == "impact":
+            law = contact_law(settings, needs.restitution, needs.friction, dt)
+            ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
+            middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
+            because = "spring and damper with force >= 0: the phase of the step decides, e has no say"
+            # Between two of the phases the rebound changes by no more than between them and their neighbours.
+            steepest = max(abs(x - y) for x, y in pairwise(ratios))
+            declared["restitution"] = Declared(middle, half + steepest + 1e-12, because)
+        return declared
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """MJCF: ``<option>``, and the contact parameters on every geom (on a pair where only a pair has them)."""
+        material = next(material for _, _, material in scene.contact_pairs())
+        option = {name: settings[name] for name in _OPTIONS if name in names}
+        contact: dict[str, Any] = {}
+        if {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
+            contact["solref"] = pair_solref(settings, material.restitution, dt)
+        if "solimp" in names:
+            contact["solimp"] = settings["solimp"]
+        if "smooth_condim" in names and material.friction == 0.0:
+            contact["condim"] = settings["smooth_condim"]
+        paired = "solreffriction" in names
+        if "margin" in names:
+            contact["margin"] = settings["margin"] * (1.0 if paired else 0.5)  # a pair's is the sum of its geoms'
+        if paired:
+            contact["solreffriction"] = pair_solreffriction(settings, dt)
+        lines = [_element("option", {"timestep": dt, **option})]
+        if contact and paired:
+            lines.append(f"<contact>{_element('pair', {'geom1': 'A', 'geom2': 'B', **contact})}</contact>")
+        elif contact:
+            lines.append(f"<default>{_element('geom', contact)}</default>")
+        return "\n".join(lines)
+
+
+#: Settings that are attributes of MJCF's ``<option>``, by the same name.
+_OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
+
+
+def _element(name: str, attributes: Mapping[str, Any]) -> str:
+    """One empty MJCF element; numbers keep all digits that matter to a step."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, tuple | list):
+            return " ".join(text(item) for item in value)
+        return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+    return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, value in attributes.items()) + "/>"
+
+
+def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
+    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance.
+
+    Newton stops when a step gains less than ``tolerance`` of its cost, which counts in units of the mean inertia times
+    the unknowns, 6 for each of the four bodies. Short of its minimum by that, the gradient (what forces and momentum
+    differ by) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance /
+    (1 - d)) m/s^2 in each step of the probe.
+    """
+    deep = min(float(settings["solimp"][1]), IMPEDANCE_RANGE[1])
+    gradient = math.sqrt(2.0 * 24.0 * float(settings["tolerance"]) / (1.0 - deep))
+    steps = math.ceil(2.0 * LANDING_LEAD + 1.0)
+    because = "forces are solved to a tolerance: so much may they and the momentum differ in each step of the landing"
+    return Declared(1.0, IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED, because)
+
+
+def _second_order_fall() -> dict[str, Declared]:
+    """What the free-fall probe sees of a scheme whose positions follow ``g t^2/2`` without an offset.
+
+    It compares with velocity-first stepping: positions are half a step early, velocities are not; and the path of
+    step n, ``(v_n + v_(n-1))/2 dt``, falls short of ``v_n dt``.
+    """
+    steps = range(STEPS // 2 + 1, STEPS + 1)
+    because = "RK4 falls by g t^2/2, half a step of gravity short of velocity-first stepping"
+    path = sum(n - 0.5 for n in steps) / sum(steps)
+    return {"step": Declared(path, 1e-12, because), "sampling": Declared(0.25, 0.25 + 1e-12, because)}

@@ -1,0 +1,156 @@
+"""Experiments on MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Cured, Experiment
+
+#: Iterations are left alone: Newton's count is a limit that is not reached.
+CANDIDATES: dict[str, tuple[Any, ...]] = {
+    "impratio": (1.0, 10.0, 100.0, 1000.0),
+    "solreffriction": (None, (0.01, 1.0), (0.02, 1.0), (0.05, 1.0), (0.1, 1.0), (0.2, 1.0)),
+    "noslip_iterations": (0, 10),
+    "kappa_plastic": (0.01, 0.1, 0.5),
+    "cone": ("elliptic", "pyramidal"),
+    "integrator": ("Euler", "implicitfast"),
+}
+
+#: The stiffness that "reflect" makes solref from: neither of the two means anything without the other.
+BELONGS: dict[str, str] = {"kappa_elastic": "solref", "kappa_plastic": "solref"}
+#: Its tuned profile sticks where it should, and slides too slowly.
+CURED: tuple[Cured, ...] = (
+    Cured("default", "tuned", "impact", ({}, {"e": 0.0, "v": 1.0}, {"e": 1.0, "v": 50.0})),
+    Cured("default", "tuned", "bounce", ({}, {"e": 0.5}, {"e": 1.0})),
+    Cured("default", "tuned", "stack", ({}, {"n": 2.0}, {"n": 20.0})),
+    Cured("default", "tuned", "incline", ({}, {"ratio": 0.999}), ("creep",)),
+    Cured("default", "tuned", "head_on", ({}, {"e": 1.0, "ratio": 1.0})),
+    Cured("default", "tuned", "pinch", ({}, {"margin": 1.05}, {"margin": 100.0})),
+)
+
+#: Restitution in the step after contact, as the tuned profile has it for blows.
+_REFLECT = {
+    "cone": "elliptic", "tolerance": 0.0, "smooth_condim": 1, "solref": "reflect",
+    "solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0), "kappa_elastic": 0.0, "kappa_plastic": 0.0,
+}  # fmt: skip
+#: What holds and carries, as the tuned profile has it for rest.
+_HOLD = _REFLECT | {"impratio": 100.0, "kappa_plastic": 0.1, "margin": 1.703125e-07}
+_SLIDE = _HOLD | {"solreffriction": (0.05, 1.0)}
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    tuple(
+        Experiment(
+            "stack-touching-start",
+            "with a margin of 1 mm touching faces are in contact from the start, and nothing falls; stiffer contacts "
+            "from a touching start fall all the same",
+            "default",
+            "stack",
+            "penetration",
+            {"margin": 1e-3},
+            {"n": n},
+            dimension=dimension,
+            idle=({"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)},),
+        )
+        for n in (2.0, 10.0)
+        for dimension in (2, 3)
+    )
+    + tuple(
+        Experiment(
+            "incline-pyramid-threshold",
+            "with an elliptic cone the box slides as soon as it should; solving further or a noslip pass changes "
+            "nothing: it is the pyramid, whose edges share their softness between friction and the normal",
+            "default",
+            "incline",
+            "threshold",
+            {"cone": "elliptic"},
+            dimension=dimension,
+            idle=({"tolerance": 0.0}, {"noslip_iterations": 10}),
+        )
+        for dimension in (2, 3)
+    )
+    + (
+        Experiment(
+            "head-on-solver-tolerance",
+            "solved to round-off, or without the friction rows of smooth pairs, they cancel",
+            "default",
+            "head_on",
+            "momentum_defect",
+            {"tolerance": 0.0},
+            {"e": 0.5, "ratio": 1e6},
+        ),
+        Experiment(
+            "off-centre-soft-contact",
+            "a contact of one step does not turn the bar under the ball; solving further does nothing",
+            "default",
+            "off_centre",
+            "momentum_defect",
+            _REFLECT,
+            idle=({"tolerance": 0.0},),
+        ),
+        *(
+            Experiment(
+                family,
+                "with the velocity reflected in the step after contact it is exact; solving further does nothing",
+                "default",
+                scene,
+                metric,
+                _REFLECT,
+                params,
+                idle=({"tolerance": 0.0},),
+            )
+            for family, scene, metric, params in (
+                ("stacked-balls-soft-contact", "stacked_balls", "small_speed", {}),
+                ("stacked-balls-soft-contact", "stacked_balls", "energy_lost", {}),
+                ("cradle-soft-contact", "cradle", "speed[4]", {}),
+                ("cradle-soft-contact", "cradle", "energy_defect", {"apart": 0.0, "n": 3.0}),
+                ("galperin-soft-contact", "galperin", "large_speed", {}),
+            )
+        ),
+        *(
+            Experiment(
+                "heavy-on-light-soft-contact",
+                "with rigid contacts the pair carries; solving further does nothing",
+                "default",
+                "heavy_on_light",
+                metric,
+                _HOLD,
+                {"ratio": 1e4},
+                idle=({"tolerance": 0.0},),
+            )
+            for metric in ("kinetic_energy", "interface_impulse[1]")
+        ),
+        *(
+            Experiment(
+                "pinch-viscous-friction",
+                "stiff friction (impratio 100) on an elliptic cone holds; solving further does not",
+                "default",
+                "pinch",
+                metric,
+                {"impratio": 100.0, "cone": "elliptic"},
+                {"margin": margin},
+                idle=({"tolerance": 0.0},),
+            )
+            for margin, metric in ((1.05, "creep"), (100.0, "creep"), (1.05, "grip"), (1.05, "carried"))
+        ),
+        *(
+            Experiment(
+                "slide-pyramid",
+                "an elliptic cone does not know the heading; solving the pyramid further does nothing",
+                "default",
+                "slide",
+                metric,
+                off,
+                {"heading": heading},
+                3,
+                idle=({"tolerance": 0.0},),
+            )
+            for metric, heading, off in (
+                ("stopping_distance", 22.5, {"cone": "elliptic"}),
+                ("stopping_distance", 45.0, {"cone": "elliptic"}),
+                ("end_speed", 45.0, {"cone": "elliptic"}),
+                ("astray", 22.5, _SLIDE),
+                ("turned", 22.5, _SLIDE),
+            )
+        ),
+    )
+)

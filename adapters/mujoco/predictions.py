@@ -1,0 +1,282 @@
+"""What MuJoCo's laws predict: its documented contact law on balls, columns and inclines, without running it.
+
+    ball on a floor      one scalar recurrence (`adapters.mujoco.contact_law`)
+    column of boxes      the same law at every face, coupled: each step solves  (A + R) f = aref - a0,  f >= 0
+    box that slides      the same law with friction and rotation, in the plane (`box_on_face`)
+    blow without load    the scalar law with what the engine takes for the inverse mass (`blows`)
+
+A recurrence is put into a trajectory and measured by the scene's own metrics, so that a prediction and a measurement
+differ by physics only. Every prediction is made twice or more, with a start moved by what the engine's solver or
+round-off may be off; what the predictions differ by, times a factor, is the band, and where it is large the law is
+silent.
+
+Sources: MuJoCo documentation, "Computation: constraint model" (a convex problem; friction cones without
+complementarity; impedance relative to an estimate of the inverse inertia), "Modeling: solver parameters" (solref,
+solimp, friction) and "slow slippage".
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.law import Law, Measure, Prediction
+from adapters.mujoco.blows import blow_of, metrics_of, steps_of
+from adapters.mujoco.box_on_face import BoxOnFace
+from adapters.mujoco.contact_law import ContactLaw
+from adapters.mujoco.motions import CORNERS, along_a_heading, as_trajectory, column, fall, is_vertical
+from adapters.mujoco.pairs import contact_law, pair_solreffriction
+from adapters.mujoco.profiles import PROFILES
+from adapters.needs import needs
+from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import step_count
+from adapters.trajectory import Measured
+
+Array = NDArray[np.float64]
+
+EPS = float(np.finfo(float).eps)
+#: Round-off of a gap [m] (heights of some metres, added up over a thousand steps), and the multiples of it by which
+#: starts are moved: two of each sign, since a contact found a step later is a jump.
+GAP_ROUND_OFF = 1e-14
+PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
+#: Runs that are moved on purpose may miss the engine's own error by this factor.
+SPREAD_FACTOR = 10.0
+#: A metric that moves by more than this share of its scale is not predicted.
+BLURRED = 1e-4
+#: Two paths of a box are still told apart from anything else if they differ by less than this share of the scale.
+EITHER = 1e-2
+#: Round-off of up to a thousand additions, relative to the scale of a metric.
+SUM_ROUND_OFF = 1e-12
+
+
+def _settings(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
+    return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+
+
+def _law(profile: str, scene: Scene, dt: float) -> ContactLaw:
+    """Law of the lowest pair; the scenes here have one material."""
+    material = scene.material(scene.bodies[0].name, scene.bodies[1].name)
+    return contact_law(_settings(profile, scene, dt), material.restitution, material.friction, dt)
+
+
+def _solver_error(profile: str, scene: Scene, dt: float) -> float:
+    """Velocity [m/s] by which one step of a box may be off: Newton stops when a step gains less than the tolerance.
+
+    The cost counts in units of the mean inertia, (3 m + 3 I)/6 < m here, times 6 unknowns; short of its minimum by
+    that, an acceleration is off by ``sqrt(2 * 6 * tolerance)`` m/s^2 at most.
+    """
+    return math.sqrt(12.0 * float(_settings(profile, scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
+
+
+# ---- a ball on a floor -------------------------------------------------------------------------------------------
+
+
+def _ball_metrics(scene: Scene, measure: Measure, law: ContactLaw, moved: float) -> dict[str, Measured]:
+    """All metrics of the scene for a start ``moved`` [m] higher."""
+    body, up = scene.bodies[1], scene.dimension - 1
+    assert isinstance(body.shape, Disc | Sphere)
+    steps = step_count(scene.duration, law.dt)
+    rows = fall(law, body.pose[up] + moved, body.twist[up], body.shape.radius, scene.gravity[up], steps)
+    rows = rows * np.array([1.0, 1.0, body.mass])
+    return measure(scene, as_trajectory(scene, law.dt, rows[:, :, None]))
+
+
+def _force_round_off(law: ContactLaw) -> float:
+    """Relative round-off of forces as reported: ``f = (aref - a)/R`` is a small difference of large numbers.
+
+    Two roundings of a number of size aref, over R, against aref m: 2 eps/(R m) for each of four edges, which have
+    R m = 4 s (1 - d)/d. A pair without friction keeps mu = 1e-5, and with it s = 5e-11.
+    """
+    d = law.impedance.deep
+    return 2.0 * CORNERS * EPS * d / (4.0 * law.softness * (1.0 - d))
+
+
+def _scale(scene: Scene, metric: str) -> float:
+    """Size of a metric's values: speeds and impulses by the approach, heights by the drop, times in seconds."""
+    if metric.startswith("apex["):
+        return scene.params["height"]
+    speed = scene.params.get("v", 1.0)
+    return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
+
+
+def ball_law(profile: str, metric: str) -> Law:
+    """A ball on a floor, followed from some starts that differ by the round-off of its gap."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        if not (is_vertical(scene) and len(scene.bodies) == 2 and isinstance(scene.bodies[1].shape, Disc | Sphere)):
+            return None
+        contact = _law(profile, scene, dt)
+        value, *others = (
+            _ball_metrics(scene, measure, contact, k * GAP_ROUND_OFF)[metric][0] for k in (0.0, *PERTURBATIONS)
+        )
+        if value is None or None in others:
+            return None
+        scale = _scale(scene, metric)
+        spread = max(abs(other - value) for other in others if other is not None)
+        band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale
+        if metric in ("impulse", "momentum_defect"):
+            band += _force_round_off(contact) * scale
+        return (value, band) if spread <= BLURRED * scale else None
+
+    return law
+
+
+# ---- a column of boxes -------------------------------------------------------------------------------------------
+
+
+def column_law(profile: str, metric: str) -> Law:
+    """A column of boxes that fall together and land, with faces that touch by round-off or do not."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        boxes, up = scene.bodies[1:], scene.dimension - 1
+        shapes = [body.shape for body in boxes if isinstance(body.shape, Box)]
+        if not is_vertical(scene) or len(shapes) != len(boxes):
+            return None
+        contact = _law(profile, scene, dt)
+        heights = tuple(body.pose[up] for body in boxes)
+        sizes = tuple(2.0 * shape.half_extents[up] for shape in shapes)
+        masses = tuple(body.mass for body in boxes)
+        steps, load = step_count(scene.duration, dt), scene.gravity[up]
+        # Faces between boxes that fall together: all touch by round-off, or none. The engine finds a mixture, which
+        # may go a little further than either; twice their difference.
+        paths = [column(contact, heights, sizes, masses, load, steps, edge) for edge in (0.0, GAP_ROUND_OFF)]
+        value, other = (measure(scene, as_trajectory(scene, dt, path))[metric][0] for path in paths)
+        if value is None or other is None:
+            return None
+        # A speed that falls below its threshold may do so one step away.
+        unit = dt if metric == "settle_time" else _solver_error(profile, scene, dt) * dt + GAP_ROUND_OFF
+        spread = abs(other - value)
+        return (value, 2.0 * spread + unit) if spread <= 0.5 * value else None
+
+    return law
+
+
+# ---- a box on an incline -----------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=256)
+def _slide(box: BoxOnFace, steps: int, velocity: float) -> Array:
+    return np.array(box.slide(steps, velocity))
+
+
+def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
+    """The planar problem of one box on a level face that is pulled along x, or None if the scene is not that."""
+    if len(scene.bodies) != 2 or any(scene.gravity[1:-1]):
+        return None
+    face, body = scene.bodies
+    if not (isinstance(face.shape, HalfSpace) and face.shape.normal[-1] == 1.0 and isinstance(body.shape, Box)):
+        return None
+    if any(body.twist[scene.dimension - 1 :]) or any(body.force) or any(body.torque):
+        return None
+    settings, law = _settings(profile, scene, dt), _law(profile, scene, dt)
+    own = pair_solreffriction(settings, dt)
+    damping = ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else law.damping
+    half, moments = body.shape.half_extents, body.inertia
+    return BoxOnFace(
+        law,
+        settings["cone"],
+        scene.material(face.name, body.name).friction,
+        damping,
+        settings["impratio"],
+        half[0],
+        half[-1],
+        (moments[1] if isinstance(moments, tuple) else moments) / body.mass,
+        (scene.gravity[0], scene.gravity[-1]),
+    )
+
+
+def incline_law(profile: str, metric: str) -> Law:
+    """A box at rest on an incline: its planar motion, started with what the solver may be off."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        box = box_on_face(profile, scene, dt)
+        if box is None or any(scene.bodies[1].twist):
+            return None
+        steps, error = step_count(scene.duration, dt), _solver_error(profile, scene, dt)
+        middle = (steps + 1) // 2
+        column, window = {"creep": 0, "acceleration": 1}[metric], (steps - middle) * dt
+        paths = [_slide(box, steps, k * error) for k in (0.0, 1.0, -1.0)]
+        value, *others = (float(path[-1, column] - path[middle, column]) / window for path in paths)
+        spread = max(abs(other - value) for other in others)
+        scale = math.hypot(*box.load) * (scene.duration if metric == "creep" else 1.0)
+        # A force is a difference over R, (1 - d)/d of an inertia: its round-off is d/(1 - d) of a number's own.
+        d = box.law.impedance.deep
+        round_off = EPS * d / (1.0 - d) * scale
+        floor = round_off + (error if metric == "creep" else 2.0 * error / window)
+        if spread > BLURRED * scale:
+            # On the edge between two paths (one hop more or less): the engine takes either.
+            return (value, 2.0 * spread + floor) if spread <= EITHER * scale else None
+        return value, SPREAD_FACTOR * spread + floor
+
+    return law
+
+
+@lru_cache(maxsize=64)
+def _motion(box: BoxOnFace, steps: int, velocity: float) -> Array:
+    return np.array(box.motion(steps, velocity))
+
+
+def stopping_law(profile: str, metric: str) -> Law:
+    """A box that slides to a stop: its planar motion along the heading, measured like the engine's own.
+
+    An elliptic cone does not know the heading, but the box does: seen along it, it is as long as its side or, at most,
+    as its projection. Both are followed, and the band spans them. A pyramid brakes each heading otherwise, and turns
+    it: the law is silent there.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        box, d = box_on_face(profile, scene, dt), scene.dimension
+        if box is None:
+            return None
+        level = np.array(scene.bodies[1].twist[: d - 1])
+        speed = float(np.linalg.norm(level))
+        heading = level / speed
+        if np.abs(heading).max() < 1.0 and box.cone != "elliptic":
+            return None
+        steps, error = step_count(scene.duration, dt), _solver_error(profile, scene, dt)
+        longer = replace(box, half_length=box.half_length * float(np.abs(heading).sum()))
+        starts = [(box, speed), (box, speed + error), (box, speed - error), (longer, speed)]
+        found = [
+            measure(scene, along_a_heading(scene, dt, heading, _motion(each, steps, start))) for each, start in starts
+        ]
+        value, *others = (each[metric][0] for each in found)
+        if value is None or None in others:
+            return None
+        *moved, other = (abs(each - value) for each in others if each is not None)
+        # One step of the solver is off by `error` in speed: that over the whole run in place, and at both ends of the
+        # mean over a third of the run.
+        floor = error * (6.0 / scene.duration if metric == "braking" else scene.duration)
+        # On the edge between two paths (one hop more or less) the engine takes either.
+        factor = SPREAD_FACTOR if max(moved) <= BLURRED * abs(value) else 2.0
+        return value, factor * max(moved) + 2.0 * other + floor
+
+    return law
+
+
+# ---- a blow without a load ---------------------------------------------------------------------------------------
+
+
+def blow_law(profile: str, metric: str) -> Law:
+    """A blow between two bodies: how fast they part fixes the impulse, and that everything."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        blow = blow_of(scene)
+        if blow is None:
+            return None
+        contact, steps = _law(profile, scene, dt), steps_of(scene, dt)
+        runs = [metrics_of(scene, blow, blow.after(contact, steps, k * GAP_ROUND_OFF)) for k in (0.0, *PERTURBATIONS)]
+        value, *others = (run[metric] for run in runs)
+        scale = 1.0 / blow.inverse_mass * blow.closing if metric == "impulse" else max(1.0, blow.closing)
+        band = SPREAD_FACTOR * max(abs(other - value) for other in others) + SUM_ROUND_OFF * scale
+        # The solver stops short in every step of a contact; a ratio of speeds and energies alike.
+        band += _solver_error(profile, scene, dt) * (scale if metric == "impulse" else 1.0)
+        if metric == "impulse":
+            band += _force_round_off(contact) * scale
+        return value, band
+
+    return law

@@ -1,0 +1,160 @@
+"""MuJoCo's profiles: settings with their reasons.
+
+default   as shipped
+tuned     best stock settings for what a scene needs
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
+from adapters.needs import Needs
+
+MANUAL = f"{DOC}, modeling: solver parameters"
+FRICTION = f"{DOC}, modeling: friction, slow slippage"
+REFLECT = f"{DOC}, computation/speculative: elastic restitution"
+
+MEASURED = "measured with 4.0.1"
+CARRIES = "a load needs a spring of stiffness kappa/dt^2 to rest on"
+
+#: Impedance as close to 1 as MuJoCo lets it be, the same at every depth.
+RIGID = (IMPEDANCE_RANGE[1], IMPEDANCE_RANGE[1], 0.001, 0.5, 1.0)
+#: Stiffness of a resting contact in units of 1/dt^2: with damping 1/dt a depth shrinks by 1 - kappa a step. 0.1 settles
+#: in ten steps and stays clear of the limit of 1. 0.5 rests less deep still, but a column of ten at one Newton step
+#: explodes with it (`crosscheck tune mujoco --group stand`).
+KAPPA = 0.1
+
+
+def default(needs: Needs, dt: float) -> list[Setting]:
+    """As shipped, whatever the scene needs; friction is given to both geoms of a pair."""
+    shipped = "as shipped"
+    return [
+        Setting("integrator", "Euler", shipped, DOC),
+        Setting("cone", "pyramidal", shipped, DOC),
+        Setting("impratio", 1.0, shipped, DOC),
+        Setting("iterations", ITERATIONS, f"{shipped}: at most so many Newton steps", DOC),
+        Setting("tolerance", TOLERANCE, shipped, DOC),
+        Setting("noslip_iterations", 0, shipped, DOC),
+        Setting("smooth_condim", 3, f"{shipped}: a pair with mu = 0 keeps friction rows, of mu = 1e-5", DOC),
+        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; e has no say", MANUAL),
+        Setting("solimp", SOLIMP, shipped, MANUAL),
+        Setting("solreffriction", None, f"{shipped}: friction is damped like the normal", FRICTION),
+        Setting("margin", 0.0, f"{shipped} [m]: contact starts when bodies overlap", DOC),
+    ]
+
+
+def tuned(needs: Needs, dt: float) -> list[Setting]:
+    """Best stock settings for the scene's needs."""
+    if needs.regime == "free":
+        return _replaced(default(needs, dt), Setting("integrator", "RK4", "nothing can touch: fourth order", DOC))
+    settings = _replaced(
+        default(needs, dt),
+        Setting("cone", "elliptic", "the pyramid is an L1 cone: mu/sqrt(2) at 45 degrees", f"{DOC}, computation"),
+        Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
+        Setting("solref", "reflect", "asks for velocity -e v one step after contact: damping (1 + e)/dt", REFLECT),
+        Setting("solimp", RIGID, "d = 0.9999: only the 1e-4 that is left of the load gets through", MANUAL),
+        Setting("tolerance", 0.0, "Newton goes on to round-off: forces add up too, at no cost", MEASURED),
+        Setting("kappa_elastic", 0.0, "a stiffness kappa/dt^2 would add kappa times the phase to e", MEASURED),
+        Setting("kappa_plastic", 0.0, "without a load there is nothing to carry", MANUAL),
+    )
+    if needs.regime == "rest":
+        settings = _replaced(settings, *_resting(needs, dt))
+    elif needs.gravity > 0.0 and needs.restitution > 0.0:
+        settings = _replaced(settings, Setting("kappa_plastic", KAPPA, CARRIES, MANUAL))
+    if needs.friction > 0.0 and needs.restitution > 0.0:
+        reverses = "the normal's damping (1 + e)/dt would reverse the slip: 1/dt stops it"
+        settings = _replaced(settings, Setting("solreffriction", "stick", reverses, FRICTION))
+    return settings
+
+
+def _resting(needs: Needs, dt: float) -> list[Setting]:
+    """What changes for bodies that only rest, stick and slide (e = 0 everywhere)."""
+    settings = [Setting("kappa_plastic", KAPPA, CARRIES, MANUAL)]
+    depth = (1.0 - RIGID[0]) / KAPPA * needs.gravity * dt**2
+    touches = "the depth (1-d)/kappa g dt^2 at which a body rests: touching bodies then start and stay in contact"
+    settings.append(Setting("margin", depth, touches, f"{MANUAL}; {DOC}, margin"))
+    if needs.friction > 0.0:
+        creeps = "stick is viscous, creep (1-d)/(d b n impratio) g sin(theta): 100 puts it far below g dt^2/s"
+        settings.append(Setting("impratio", 100.0, creeps, FRICTION))
+    if needs.slide:
+        # Stiff friction damping throws a sliding body up, soft damping stops it late. Over 25 inclines with
+        # tan(theta)/mu in 1.001 ... 2 at dt = 1/240 s, median error of the acceleration: 0.01 s 17 %, 0.02 s 9 %,
+        # 0.05 s 5 %, 0.1 s 3 %, 0.2 s 8 %; error of the stopping distance from 1 m/s: 0.05 s -0.8 %, 0.1 s +4 %.
+        # Creep is below 1e-7 m/s for all of them. noslip changes creep only; pyramids creep at 4e-4 m/s near the
+        # edge of the cone; softer normals (d = 0.9, 0.5) slide no better, and d = 0.1 rattles.
+        best = "least error over tan(theta)/mu = 0.5 ... 2 and in stopping distance: 0.01 s hops, 0.1 s stops late"
+        settings.append(Setting("solreffriction", (0.05, 1.0), best, MEASURED))
+    return settings
+
+
+def _replaced(settings: list[Setting], *changes: Setting) -> list[Setting]:
+    """Settings with those of the same name replaced, others appended."""
+    new = {setting.name: setting for setting in (*settings, *changes)}
+    return list(new.values())
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned})
+
+
+#: Settings whose value is one of these words.
+WORDS = {
+    "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
+    "cone": ("pyramidal", "elliptic"),
+    "smooth_condim": (1, 3),
+}
+#: Settings that are one number: smallest value, and whether it must be whole.
+NUMBERS = {
+    "impratio": (1e-6, False),
+    "iterations": (1, True),
+    "tolerance": (0.0, False),
+    "margin": (0.0, False),
+    "noslip_iterations": (0, True),
+    "kappa_elastic": (0.0, False),
+    "kappa_plastic": (0.0, False),
+}
+NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
+ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
+
+
+def check_settings(settings: Mapping[str, Any]) -> None:
+    """Refuse settings that are unknown, missing or out of range; MuJoCo itself accepts most of them in silence.
+
+    Raises
+    ------
+    EngineError
+        Naming the setting.
+    """
+    wanted = NAMES if settings.get("solref") == "reflect" else NAMES - ONLY_REFLECT
+    for name in sorted(set(settings) ^ wanted):
+        raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
+    for name, words in WORDS.items():
+        if settings[name] not in words:
+            raise EngineError(f"{name}: {settings[name]!r} must be one of {', '.join(map(str, words))}")
+    for name, (low, whole) in NUMBERS.items():
+        if name in settings:
+            _check_number(name, settings[name], low, whole)
+    _check_row("solimp", settings["solimp"], 5)
+    if settings["solref"] != "reflect":
+        _check_row("solref", settings["solref"], 2)
+    if settings["solreffriction"] not in (None, "stick"):
+        _check_row("solreffriction", settings["solreffriction"], 2)
+        if settings["cone"] != "elliptic":
+            raise EngineError("solreffriction: acts on elliptic cones only")
+
+
+def _check_number(name: str, value: Any, low: float, whole: bool) -> None:
+    number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+    if not (number and math.isfinite(value) and value >= low):
+        raise EngineError(f"{name}: {value!r} must be a {'whole ' if whole else ''}number of at least {low:g}")
+
+
+def _check_row(name: str, values: Any, length: int) -> None:
+    if not (isinstance(values, tuple | list) and len(values) == length):
+        raise EngineError(f"{name}: {values!r} must have {length} numbers")
+    for value in values:
+        _check_number(name, value, 0.0, False)

@@ -1,0 +1,22 @@
+"""Numbers of MuJoCo itself: what it ships with, what it clamps to, and the releases looked at."""
+
+from __future__ import annotations
+
+#: Prefixes of the releases that laws and findings were checked on.
+RELEASES = ("4.0.",)
+#: Releases that give wrong answers, and why.
+KNOWN_BAD = {"4.0.0": "wrong sparse Newton factor: wrong accelerations, divergence (fixed in 4.0.1)"}
+
+#: Where its documented behaviour is read.
+DOC = "MuJoCo documentation"
+
+#: Time constant [s] and damping ratio of a contact.
+SOLREF = (0.02, 1.0)
+#: Impedance at the surface and deep, width [m], midpoint and power of the curve between them.
+SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
+#: Most Newton steps in a step, and the gain at which they end.
+ITERATIONS, TOLERANCE = 100, 1e-8
+
+#: Impedances are clamped to this range (mjMINIMP, mjMAXIMP), friction coefficients from below (mjMINMU).
+IMPEDANCE_RANGE = (0.0001, 0.9999)
+SMALLEST_FRICTION = 1e-5

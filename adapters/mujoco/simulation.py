@@ -1,0 +1,148 @@
+"""One MuJoCo model and its data.
+
+After a step MuJoCo holds positions and velocities of the step's end, but contacts, gaps and contact forces of its
+start. ``force * dt`` is therefore the impulse of the step just made, and `Contacts.gap` is the gap that step began
+with: it lags the pose by one step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, final
+
+import numpy as np
+
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.mujoco.spec import Spec, rotation
+from adapters.scene import Scene
+
+
+@final
+class MujocoSimulation(Simulation):
+    """One MuJoCo model and its data."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import mujoco
+
+        log = mujoco.MjLogConfig.get()
+        log.logto_file = log.logto_console = False
+        log.set()
+        self._mujoco, self._scene, self._dt = mujoco, scene, dt
+        self._settings = dict(settings)
+        self._model = Spec(scene, dt, settings).compile()
+        self._data = mujoco.MjData(self._model)
+        self._moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+        self._poses = np.array([body.pose for body in scene.bodies], dtype=float)
+        self._twists = np.zeros((len(scene.bodies), 6))
+        names = [self._model.geom(g).name for g in range(self._model.ngeom)]
+        self._body_of_geom = [int(name.removeprefix("geom")) for name in names]
+        self._set_start()
+
+    def _set_start(self) -> None:
+        """Start state and loads; MuJoCo keeps angular velocity in body axes."""
+        for slot, index in enumerate(self._moving):
+            body = self._scene.bodies[index]
+            turn = rotation(np.array([body.pose[3:]]))[0]
+            self._data.qpos[7 * slot : 7 * slot + 7] = body.pose
+            self._data.qvel[6 * slot : 6 * slot + 6] = (*body.twist[:3], *(turn.T @ np.array(body.twist[3:])))
+            if body.motion == "free":
+                row = self._model.body(f"body{index}").id
+                self._data.xfrc_applied[row] = (*body.force, *body.torque)
+
+    def advance(self, steps: int) -> None:
+        """Make ``steps`` steps.
+
+        Raises
+        ------
+        EngineError
+            If MuJoCo dropped contacts for want of memory.
+        """
+        self._mujoco.mj_step(self._model, self._data, nstep=steps)
+        kinds = self._mujoco.mjtWarning
+        for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
+            if self._data.warning[kind].number:
+                raise EngineError("memory: MuJoCo's arena is too small, it dropped contacts")
+
+    def pose(self) -> Array:
+        """Poses at the end of the last step."""
+        if self._moving:
+            self._poses[self._moving] = self._data.qpos.reshape(-1, 7)
+        return self._poses.copy()
+
+    def twist(self) -> Array:
+        """Twists at the end of the last step."""
+        if self._moving:
+            velocity = self._data.qvel.reshape(-1, 6)
+            turns = rotation(self._data.qpos.reshape(-1, 7)[:, 3:])
+            self._twists[self._moving, :3] = velocity[:, :3]
+            self._twists[self._moving, 3:] = np.einsum("nij,nj->ni", turns, velocity[:, 3:])
+        return self._twists.copy()
+
+    def contacts(self) -> Contacts:
+        """Contacts and gaps at the start of the last step, impulses of that step.
+
+        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN).
+        """
+        one_solve = self._settings["integrator"] != "RK4"
+        force, rows = np.zeros(6), []
+        for k in range(self._data.ncon):
+            contact = self._data.contact[k]
+            frame = contact.frame.reshape(3, 3)
+            self._mujoco.mj_contactForce(self._model, self._data, k, force)
+            impulse = self._dt * (force[:3] @ frame) if one_solve else np.full(3, np.nan)
+            a, b = (self._body_of_geom[g] for g in contact.geom)
+            rows.append((a, b, contact.pos.copy(), frame[0].copy(), impulse, float(contact.dist)))
+        return Contacts.from_rows(rows, 3)
+
+    def readback(self) -> dict[str, Any]:
+        """What the compiled model holds."""
+        model, mj = self._model, self._mujoco
+        option = model.opt
+        values: dict[str, Any] = {
+            "dt": float(option.timestep),
+            "gravity": option.gravity.tolist(),
+            "integrator": mj.mjtIntegrator(option.integrator).name,
+            "cone": mj.mjtCone(option.cone).name,
+            "solver": mj.mjtSolver(option.solver).name,
+            "iterations": int(option.iterations),
+            "tolerance": float(option.tolerance),
+            "noslip_iterations": int(option.noslip_iterations),
+            "impratio": float(option.impratio),
+            "disableflags": int(option.disableflags),
+            "enableflags": int(option.enableflags),
+            "materials": self._materials(),
+        }
+        for index in self._moving:
+            row, name = model.body(f"body{index}"), self._scene.bodies[index].name
+            values[f"{name}.mass"] = float(row.mass[0])
+            values[f"{name}.inertia"] = row.inertia.tolist()
+            values[f"{name}.size"] = model.geom(f"geom{index}").size.tolist()
+        return values
+
+    def _materials(self) -> dict[str, Any]:
+        model = self._model
+        if model.npair == 0:
+            row = model.geom(0)
+            fields = {"friction": row.friction, "solref": row.solref, "solimp": row.solimp, "condim": row.condim}
+            return {"all geoms": {name: np.ravel(value).tolist() for name, value in fields.items()}}
+        return {
+            model.pair(k).name: {
+                "friction": float(model.pair_friction[k][0]),
+                "condim": int(model.pair_dim[k]),
+                "solref": model.pair_solref[k].tolist(),
+                "solreffriction": model.pair_solreffriction[k].tolist(),
+                "solimp": model.pair_solimp[k].tolist(),
+            }
+            for k in range(model.npair)
+        }
+
+    def certificate(self) -> dict[str, Any]:
+        """Largest residual of M a = loads + contacts in the last solve [N, N m], Newton steps, warnings."""
+        mj, model, data = self._mujoco, self._model, self._data
+        if model.nv == 0:
+            return {}
+        inertial = np.zeros(model.nv)
+        mj.mj_mulM(model, data, inertial, data.qacc)
+        residual = np.abs(inertial - data.qfrc_smooth - data.qfrc_constraint).max()
+        warnings = {mj.mju_warningText(k, 0): int(w.number) for k, w in enumerate(data.warning) if w.number}
+        return {"residual": float(residual), "newton_steps": data.solver_niter.tolist(), "warnings": warnings}

@@ -1,0 +1,146 @@
+"""A scene as MuJoCo's own model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, EngineError
+from adapters.mujoco.pairs import pair_solref, pair_solreffriction
+from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+
+#: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-12 of the free body's,
+#: the round-off that every check allows.
+PRESCRIBED_MASS = 1e12
+
+
+def moments(body: Body) -> tuple[float, float, float]:
+    """Principal moments of a body [kg m^2]."""
+    assert isinstance(body.inertia, tuple), "MuJoCo is spatial: planar scenes arrive lifted"
+    return body.inertia
+
+
+def rotation(quaternion: Array) -> Array:
+    """Matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _turn_z_to(normal: tuple[float, ...]) -> list[float]:
+    """Unit quaternion of the shortest turn from +z to ``normal``."""
+    x, y, z = normal
+    if z < -1.0 + 1e-12:
+        return [0.0, 1.0, 0.0, 0.0]
+    w = math.sqrt(0.5 * (1.0 + z))
+    return [w, -0.5 * y / w, 0.5 * x / w, 0.0]
+
+
+class Spec:
+    """Writes a scene as an `MjSpec`: bodies, then either one material on all geoms or one entry per pair."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import mujoco
+
+        self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
+        self.spec = mujoco.MjSpec()
+        pairs = list(scene.contact_pairs())
+        materials = {(material.restitution, material.friction) for _, _, material in pairs}
+        self.shared = materials.pop() if len(materials) == 1 and settings["solreffriction"] is None else None
+        self._options()
+        free = [body for body in scene.bodies if body.motion == "free"]
+        self.heavy = PRESCRIBED_MASS * max((b.mass for b in free), default=1.0)
+        self.heavy_moment = PRESCRIBED_MASS * max((max(moments(b)) for b in free), default=1.0)
+        for index, body in enumerate(scene.bodies):
+            self._body(index, body)
+        if self.shared is None:
+            for a, b, material in pairs:
+                self._pair(a, b, material.restitution, material.friction)
+
+    def _options(self) -> None:
+        mj, option, settings = self.mujoco, self.spec.option, self.settings
+        option.timestep = self.dt
+        option.gravity = self.scene.gravity
+        option.integrator = getattr(mj.mjtIntegrator, f"mjINT_{settings['integrator'].upper()}")
+        option.cone = getattr(mj.mjtCone, f"mjCONE_{settings['cone'].upper()}")
+        for name in ("impratio", "iterations", "tolerance", "noslip_iterations"):
+            setattr(option, name, settings[name])
+        option.disableflags = mj.mjtDisableBit.mjDSBL_AUTORESET
+
+    def _body(self, index: int, body: Body) -> None:
+        world = self.spec.worldbody
+        half_space = isinstance(body.shape, HalfSpace)
+        made = world if half_space else world.add_body(name=f"body{index}", pos=body.pose[:3], quat=body.pose[3:])
+        if body.motion != "fixed":
+            made.add_freejoint()
+            made.explicitinertial = True
+            made.ipos, made.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)  # undefined ones become pos and quat
+            free = body.motion == "free"
+            made.mass = body.mass if free else self.heavy
+            made.inertia = moments(body) if free else (self.heavy_moment,) * 3
+            made.gravcomp = 0.0 if free else 1.0
+        # Two geoms meet if one's contype has a bit of the other's conaffinity: only free bodies have one.
+        filtered = {"contype": 0, "conaffinity": 0}
+        if self.shared is not None:
+            filtered = {"contype": 1, "conaffinity": int(body.motion == "free")} | self._geom_material()
+        made.add_geom(name=f"geom{index}", **self._shape(body), **filtered)
+
+    def _shape(self, body: Body) -> dict[str, Any]:
+        kinds, shape = self.mujoco.mjtGeom, body.shape
+        if isinstance(shape, Sphere):
+            return {"type": kinds.mjGEOM_SPHERE, "size": [shape.radius, 0.0, 0.0]}
+        if isinstance(shape, Box):
+            return {"type": kinds.mjGEOM_BOX, "size": list(shape.half_extents)}
+        assert isinstance(shape, HalfSpace)
+        foot = [shape.offset * n for n in shape.normal]
+        plane = {"type": kinds.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}  # 0: without end, and exact
+        return plane | {"pos": foot, "quat": _turn_z_to(shape.normal)}
+
+    def _condim(self, friction: float) -> int:
+        return 3 if friction > 0.0 else int(self.settings["smooth_condim"])
+
+    def _geom_material(self) -> dict[str, Any]:
+        assert self.shared is not None
+        restitution, friction = self.shared
+        return {
+            "friction": [friction, 0.0, 0.0],
+            "condim": self._condim(friction),
+            "solref": pair_solref(self.settings, restitution, self.dt),
+            "solimp": self.settings["solimp"],
+            "margin": 0.5 * self.settings["margin"],  # a pair's margin is the sum of its geoms'
+        }
+
+    def _pair(self, a: int, b: int, restitution: float, friction: float) -> None:
+        if all(isinstance(self.scene.bodies[i].shape, HalfSpace) for i in (a, b)):
+            return
+        self.spec.add_pair(
+            name=f"pair{a}-{b}",
+            geomname1=f"geom{a}",
+            geomname2=f"geom{b}",
+            condim=self._condim(friction),
+            friction=[friction, friction, 0.0, 0.0, 0.0],
+            solref=pair_solref(self.settings, restitution, self.dt),
+            solreffriction=pair_solreffriction(self.settings, self.dt),
+            solimp=self.settings["solimp"],
+            margin=self.settings["margin"],
+        )
+
+    def compile(self) -> Any:
+        """Model; MuJoCo's complaint becomes one line."""
+        try:
+            model = self.spec.compile()
+        except ValueError as error:
+            raise EngineError(f"scene: MuJoCo does not compile it: {' '.join(str(error).split())}") from None
+        if any(body.motion == "prescribed" for body in self.scene.bodies):
+            # The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
+            free = [b for b in self.scene.bodies if b.motion == "free"]
+            inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
+            model.stat.meaninertia = sum(inertias) / max(1, len(inertias)) or 1.0
+        return model

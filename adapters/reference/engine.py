@@ -1,0 +1,148 @@
+"""Our own sequential-impulse solver (`reference_solver`) behind the plugin line.
+
+    step:  detect at x  ->  sample u- = J v (before forces)  ->  v* = v + h M^-1 f  ->  sweep the contact rows
+           (target -e u-, accumulated clamping, Coulomb with the current total)  ->  x += h v  ->  split impulses
+
+The two profiles stand in `adapters.reference.profiles`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.reference.profiles import PROFILES, SOURCE
+from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
+from adapters.scene import Scene
+
+#: Steps cut at events, with constant accelerations between them.
+LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
+
+
+class ReferenceEngine(Engine):
+    """Planar and spatial; discs, spheres, boxes, half-spaces."""
+
+    facts = EngineFacts(
+        name="reference",
+        title="Reference sequential-impulse solver",
+        package="contact-crosscheck",
+        dimensions=frozenset({2, 3}),
+        scheme=Scheme("detect, sample restitution, forces, solve, position", 1),
+        customary_dt=1.0 / 60.0,
+        roles=MappingProxyType({"classical": "textbook", "reference": "solution"}),
+        colour="#3568ad",
+        profile_schemes=MappingProxyType({"reference": LOCATED}),
+        quirks=(
+            Quirk(
+                "classical advances velocity before position: free fall from rest is ahead by g t dt / 2",
+                "nothing: it is the scheme, and tolerances allow for a step; reference falls exactly",
+                SOURCE,
+            ),
+            Quirk(
+                "classical finds contact at the start of a step, so a bounce is found late by up to v dt",
+                "nothing: it is the scheme, and tolerances allow for a step; reference cuts its steps at events",
+                SOURCE,
+            ),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Package version and eight hex digits over the solver's sources.
+
+        Raises
+        ------
+        ImportError
+            If the package `reference_solver` is not there.
+        """
+        spec = find_spec("reference_solver")
+        if spec is None or not spec.submodule_search_locations:
+            raise ImportError("No module named 'reference_solver'")
+        root = Path(next(iter(spec.submodule_search_locations)))
+        digest = hashlib.sha256()
+        for path in sorted(root.rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+        return f"{_package_version()}+{digest.hexdigest()[:8]}"
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Whatever the solver's own validation says about the model."""
+        try:
+            solver_model(scene)
+        except ValueError as error:
+            return str(error).splitlines()[0]
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world; see `Engine.build`.
+
+        Raises
+        ------
+        EngineError
+            For a model or a setting that the solver refuses, or a setting it does not have.
+        """
+        from reference_solver import Settings
+
+        known = [field.name for field in fields(Settings) if field.name != "dt"]
+        for name in settings:
+            if name not in known:
+                raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
+        try:
+            return ReferenceSimulation(scene, solver_model(scene), Settings(dt=dt, **settings))
+        except (ValueError, TypeError) as error:
+            raise EngineError(str(error).splitlines()[0]) from error
+
+    def certify(
+        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+    ) -> dict[str, Any] | None:
+        """Full certificate (`reference_solver.certification.truth`) of a profile that promises a solution."""
+        from reference_solver import Settings
+        from reference_solver.certification.truth import certify
+
+        chosen = Settings(dt=dt, **settings)
+        if chosen.residual is None:
+            return None
+        found = certify(solver_model(scene), chosen, steps)
+        reasons = list(found.reasons)
+        same = np.array_equal(found.pose[-1], final_pose)
+        if not same:
+            reasons.append("the run that was certified does not end where the run that is judged does")
+        return {
+            "holds": found.holds and same,
+            "reasons": reasons,
+            "error": json_ready(found.error[-1]),
+            "growth": json_ready(found.growth[-1]),
+            "horizon": json_ready(found.horizon),
+            "findings": {finding.name: json_ready(finding.value) for finding in found.findings},
+        }
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Nothing: single contacts and constant forces are exact in both profiles."""
+        return {}
+
+    def kernels(self) -> Path | None:
+        """Folder of the solver's kernels; None where nothing is compiled, or where no folder can keep it."""
+        from reference_solver import compilation
+
+        return None if compilation.config.DISABLE_JIT else compilation.cache_folder()
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: the solver's settings."""
+        changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
+        return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
+
+
+def _package_version() -> str:
+    try:
+        return version("contact-crosscheck")
+    except PackageNotFoundError:  # run from a checkout that was never installed
+        return "0"

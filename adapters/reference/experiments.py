@@ -1,0 +1,56 @@
+"""Experiments on the textbook profile of our own solver."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Experiment
+
+#: Profile `classical` is the textbook's and `reference` solves to the end: neither is tuned.
+CANDIDATES: dict[str, tuple[Any, ...]] = {}
+
+EXPERIMENTS: tuple[Experiment, ...] = tuple(
+    Experiment(
+        "stack-starved",
+        "with 1000 sweeps the column stands",
+        "classical",
+        "stack",
+        metric,
+        {"iterations": 1000},
+        {"n": 10.0},
+        iterations=iterations,
+    )
+    for metric, iterations in (
+        ("settle_time", None),
+        ("kinetic_energy", None),
+        ("drift", 4),
+        ("penetration", 1),
+        ("interface_impulse[5]", 1),
+        ("impulse_scatter", 1),
+    )
+) + tuple(
+    Experiment(
+        family,
+        "with more sweeps nothing is left to be seen",
+        "classical",
+        scene,
+        metric,
+        {"iterations": sweeps},
+        params,
+        dimension,
+    )
+    for family, scene, params, dimension, sweeps, metrics in (
+        ("flat-box-starved", "flat_box", {}, 3, 100, ("rebound_ratio", "edge_speed", "sideways", "impulse")),
+        ("cradle-starved", "cradle", {"apart": 0.0, "n": 3.0}, 2, 100, ("energy_defect",)),
+        (
+            "heavy-on-light-starved",
+            "heavy_on_light",
+            {},
+            2,
+            1000,
+            ("settle_time", "drift", "penetration", "kinetic_energy", "interface_impulse[1]"),
+        ),
+        ("pinch-starved", "pinch", {"margin": 100.0}, 3, 1000, ("creep", "turned", "grip", "carried")),
+    )
+    for metric in metrics
+)

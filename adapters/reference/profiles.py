@@ -1,0 +1,61 @@
+"""Profiles of our own solver: its settings with their reasons.
+
+classical   a fixed number of sweeps, as textbooks do
+reference   the same contact equations solved to a residual and certified, in steps that are cut where bodies meet
+and where slides end
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from types import MappingProxyType
+from typing import Any
+
+from adapters.engine import ProfileRule, Setting
+from adapters.needs import Needs
+
+SOURCE = "reference_solver/README.md"
+#: Why each of the solver's settings has its value; the values themselves are the solver's own.
+REASONS = {
+    "iterations": "what textbooks and engines use: an answer at a fixed cost, whatever is left unsolved",
+    "residual": "sweep until every contact equation holds to this share of its own speed; null: fixed sweeps",
+    "max_sweeps": "bound of the residual stop for broken problems; reaching it is reported as not converged",
+    "relaxation": "1 is plain projected Gauss-Seidel; null estimates the best factor from the residuals",
+    "position_correction": "split: overlap is corrected through pseudo-velocities that carry no energy",
+    "beta": "share of an overlap that is corrected per step",
+    "slop": "overlap that is left alone [m]",
+    "warm_starting": "each contact starts from its impulse of the step before, matched by feature",
+    "solver": "scalar: row after row, the textbook; block: the rows of a manifold together, which does not stall",
+    "direct": "where sweeps turn out to be slow (mass ratios, tall columns) Newton's method ends a step; it needs a "
+    "residual stop, fixed sweeps never hand over",
+    "scheme": "fixed: impacts are found at the start of the step after, as engines do; located: steps are cut where "
+    "bodies meet and where a slide ends",
+    "margin": "pairs with e = 0 are contacts within this share of the smallest half width, closed by at most the gap; "
+    "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
+}
+
+
+def classical_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Fixed sweeps."""
+    from reference_solver import Settings
+
+    return _as_settings(Settings.classical(dt))
+
+
+def reference_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Residual stop; there is no iteration count to replace."""
+    from reference_solver import Settings
+
+    return [s for s in _as_settings(Settings.reference(dt)) if s.name != "iterations"]
+
+
+def _as_settings(chosen: Any) -> list[Setting]:
+    return [
+        Setting(field.name, getattr(chosen, field.name), REASONS[field.name], SOURCE)
+        for field in fields(chosen)
+        if field.name != "dt"
+    ]
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"classical": classical_profile, "reference": reference_profile})

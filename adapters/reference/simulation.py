@@ -1,0 +1,123 @@
+"""A scene as the solver's model, and one simulation of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, Contacts, Simulation
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Shape, Sphere
+
+
+def _shape(shape: Shape) -> Any:
+    from reference_solver import model
+
+    if isinstance(shape, Disc):
+        return model.Disc(shape.radius)
+    if isinstance(shape, Sphere):
+        return model.Sphere(shape.radius)
+    if isinstance(shape, Box):
+        return model.Box(shape.half_extents)
+    assert isinstance(shape, HalfSpace)
+    return model.HalfSpace(shape.normal, shape.offset)
+
+
+def _body(body: Body, dimension: int) -> Any:
+    from reference_solver import model
+
+    return model.Body(
+        shape=_shape(body.shape),
+        mass=body.mass,
+        inertia=body.inertia,
+        pose=body.pose,
+        twist=body.twist,
+        motion=body.motion,
+        force=body.force,
+        torque=body.torque[0] if dimension == 2 else body.torque,
+    )
+
+
+def solver_model(scene: Scene) -> Any:
+    """The scene as a `reference_solver.model.Model`."""
+    from reference_solver import model
+
+    n = len(scene.bodies)
+    restitution, friction = np.zeros((n, n)), np.zeros((n, n))
+    for i, j, material in scene.contact_pairs():
+        restitution[i, j] = restitution[j, i] = material.restitution
+        friction[i, j] = friction[j, i] = material.friction
+    return model.Model(
+        dimension=scene.dimension,
+        bodies=tuple(_body(body, scene.dimension) for body in scene.bodies),
+        gravity=scene.gravity,
+        restitution=restitution,
+        friction=friction,
+    )
+
+
+class ReferenceSimulation(Simulation):
+    """One `reference_solver.Simulation`."""
+
+    def __init__(self, scene: Scene, model: Any, settings: Any) -> None:
+        from reference_solver import Simulation as Solver
+
+        self.scene, self.model, self.settings = scene, model, settings
+        self.solver = Solver(model, settings)
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`."""
+        self.solver.advance(steps)
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`."""
+        return np.asarray(self.solver.pose, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        return np.asarray(self.solver.twist, float)
+
+    def contacts(self) -> Contacts:
+        """See `Simulation.contacts`."""
+        found = self.solver.contacts()
+        a, b = (np.asarray(x, np.int64) for x in (found.body_a, found.body_b))
+        return Contacts(a, b, found.point, found.normal, found.impulse, found.gap)
+
+    def readback(self) -> dict[str, Any]:
+        """Settings and model that the solver holds, and what it left out because the scene has no use for it."""
+        names = [body.name for body in self.scene.bodies]
+        return {
+            **asdict(self.settings),
+            "gravity": [float(x) for x in self.model.gravity],
+            "bodies": {
+                name: {"mass": float(body.mass), "inertia": np.asarray(body.inertia, float).tolist()}
+                for name, body in zip(names, self.model.bodies, strict=True)
+                if body.motion == "free"
+            },
+            "pairs": {
+                f"{names[i]}-{names[j]}": {
+                    "restitution": float(self.model.restitution[i, j]),
+                    "friction": float(self.model.friction[i, j]),
+                }
+                for i, j, _ in self.scene.contact_pairs()
+            },
+            "left_out": list(self.solver.left_out),
+        }
+
+    def certificate(self) -> dict[str, Any]:
+        """What `reference_solver.Simulation.certificate` says; ``certified`` with a residual stop, which promises it.
+
+        A fixed number of sweeps promises nothing: what it leaves unsolved is what it is here to show.
+        """
+        found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
+        return found if self.settings.residual is None else {**found, "certified": found["holds"]}
+
+
+def json_ready(value: Any) -> Any:
+    """What JSON has a word for: lists for tuples, plain numbers for NumPy scalars, null for what is not finite."""
+    if isinstance(value, tuple):
+        return list(value)
+    plain = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
