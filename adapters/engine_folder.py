@@ -74,7 +74,15 @@ def laws_of(engine: str) -> tuple[Deviation, ...]:
 
 
 def covering(engine: str, version: str, profile: str, scene: str, metric: str) -> Iterator[Deviation]:
-    """Laws that speak about a row."""
+    """Laws that speak about a row.
+
+    Raises
+    ------
+    EngineError
+        If the engine has laws that cannot be had.
+    """
+    if _laws(engine)[1]:
+        raise EngineError(f"{engine}: its laws cannot be had: {_laws(engine)[1]}")
     return (law for law in laws_of(engine) if law.covers(engine, version, profile, scene, metric))
 
 

@@ -14,13 +14,12 @@ import platform
 import subprocess
 from collections.abc import Iterable
 from functools import cache
-from importlib.metadata import entry_points
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import Any
 
+from adapters import registry
 from adapters.engine_folder import located
-from adapters.registry import GROUP
 from validation.catalogue import CATALOGUE, module_of
 
 
@@ -45,7 +44,9 @@ def adapter_hash(engine: str) -> str:
     The shared vocabulary and step loop, the engine's adapter with what that imports of its own package, and for an
     adapter of our solver the solver. Laws, experiments and findings judge a trajectory and are no part of it.
     """
-    entry = {e.name: e for e in entry_points(group=GROUP)}[engine]
+    entry = registry.entry(engine)
+    if entry is None:
+        raise KeyError(engine)
     own = _closure(entry.module, {entry.module.partition(".")[0]}, {SOLVER})
     shared = [path for path in _sources("adapters") if path.parent.name == "adapters"]
     inside = _sources(SOLVER)
@@ -105,7 +106,7 @@ def _imported(module: str, path: Path) -> list[str]:
 def code_hash(asked: Iterable[tuple[str, str]]) -> str:
     """Hash of all our code that decides what is measured where these scenes run on these engines (scene, engine)."""
     asked = list(asked)
-    registered = {entry.name for entry in entry_points(group=GROUP)}
+    registered = set(registry.names())
     scenes = sorted((scene, scene_code(scene)) for scene in {scene for scene, _ in asked})
     engines = sorted((name, adapter_hash(name)) for name in {engine for _, engine in asked} & registered)
     return hashlib.sha256(repr((scenes, engines)).encode()).hexdigest()[:16]

@@ -149,7 +149,7 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
         known, predictions = _known(observation, slot, check), []
         try:
             predictions = _predictions(observation, scene, check, value)
-        except EngineError as error:  # a law of another package, which says nothing then
+        except EngineError as error:  # laws of another package, which say nothing then
             known = replace(known, remark="; ".join(filter(None, (known.remark, str(error)))))
         return judge(value, check, predictions, known, why)
     if outcome is Outcome.DIVERGED:
@@ -217,10 +217,10 @@ def predictions_of(row: Row) -> list[Prediction]:
     slot = slot_from_dict(row.slot)
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
-    laws = covering(row.engine, row.engine_version, row.profile, scene.name, row.metric)
     try:
+        laws = covering(row.engine, row.engine_version, row.profile, scene.name, row.metric)
         return predicted(laws, scene, slot, canonical.measure)
-    except EngineError:  # a law of another package; its row says what is wrong
+    except EngineError:  # laws of another package; their row says what is wrong
         return []
 
 

@@ -1,0 +1,264 @@
+"""An engine of another package: one entry point brings its folder as it brings ours; what is broken costs it alone."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from adapters import engine_folder, registry
+from adapters.engine_folder import DECISIVE, belongs_of, candidates_of, cured_of, experiments_of, laws_of
+from reports import palette
+from reports.command import main
+from reports.listing import doctor
+from validation import decisive, identity
+from validation.findings import files, solutions_of
+
+pytest.importorskip("pymunk")
+
+ROOT = Path(__file__).parents[2]
+ADAPTER = """
+from dataclasses import replace
+
+from adapters.chipmunk.engine import ChipmunkEngine
+from .numbers import COLOUR
+
+
+class Engine(ChipmunkEngine):
+    facts = replace(ChipmunkEngine.facts, name="toy", title="Toy", package="toy-package", colour=COLOUR,
+                    roles={"default": "shipped", "tuned": "tuned"})
+"""
+LAWS = """
+from dataclasses import replace
+
+from adapters.chipmunk.laws import DEVIATIONS as LIKE_IT
+
+DEVIATIONS = tuple(replace(law, engine="toy", because="a toy's way:\\x1b[31m it is late") for law in LIKE_IT)
+"""
+EXPERIMENTS = """
+from adapters.experiment import Cured, Experiment
+
+CANDIDATES = {"collision_slop": (1e-3, 0.1)}
+BELONGS = {"start_overlap": "collision_slop"}
+CURED = (Cured("default", "tuned", "stack", ({},)),)
+EXPERIMENTS = (Experiment("soft", "stands", "default", "stack", "penetration", {"collision_slop": 1e-3}, {"n": 10.0}),)
+"""
+FAMILIES = """
+[[family]]
+id = "soft"
+profiles = ["default"]
+scene = "stack"
+metrics = ["*"]
+reason = "a toy's boxes sink"
+source = "its manual"
+releases = ">=7"
+"""
+MEMBERS = ",".join(files.COLUMNS) + "\n"
+
+
+def forget():
+    engine_folder.forget()
+    for cached in (files.findings_of, solutions_of, identity.adapter_hash, decisive.measured_of,
+                   palette._own_colour, palette._mark_of):  # fmt: skip
+        cached.cache_clear()
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toy_package"]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """Install the toy's package; returns the folder of the engine, and lets itself be looked at again."""
+    folder = tmp_path / "site" / "toy_package" / "toy"
+    (folder / "findings").mkdir(parents=True)
+    (folder.parent / "__init__.py").write_text("")
+    texts = {"__init__.py": ADAPTER, "numbers.py": 'COLOUR = "#102030"\n', "laws.py": LAWS,
+             "experiments.py": EXPERIMENTS, "findings/families.toml": FAMILIES, "findings/members.csv": MEMBERS,
+             DECISIVE: "engine,version\n"}  # fmt: skip
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    info = tmp_path / "site" / "toy_package-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toy_package\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\ntoy = toy_package.toy:Engine\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    forget()
+    yield folder
+    forget()
+
+
+def run(tmp_path, *args):
+    few = ["--engine", "toy", "--profile", "default", "--dim", "2", "--jobs", "1", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(main, ["run", *args, *few])
+    rows = (tmp_path / "out" / "rows.csv").read_text() if (tmp_path / "out" / "rows.csv").exists() else ""
+    return done, rows
+
+
+def test_one_entry_point_brings_all_parts_of_its_folder(site):
+    assert engine_folder.folder_of("toy") == site and engine_folder.problems() == []
+    assert registry.names()[-1] == "toy" and registry.facts("toy").profile("shipped") == "default"
+    assert {law.engine for law in laws_of("toy")} == {"toy"} and len(laws_of("toy")) == len(laws_of("chipmunk"))
+    assert "\x1b" not in laws_of("toy")[0].because
+    assert [each.family for each in experiments_of("toy")] == ["soft"] == list(files.findings_of("toy").families)
+    assert candidates_of("toy") == {"collision_slop": (1e-3, 0.1)} and len(cured_of("toy")) == 1
+    assert belongs_of("toy") == {"start_overlap": "collision_slop"}
+    assert palette.colours_of(["toy"]) == {"toy": "#102030"}
+    assert palette.shape_of("default") == palette.MARKS["shipped"][0]
+
+
+def test_what_was_measured_of_its_cures_is_read_from_its_folder(site):
+    lines = (ROOT / "adapters" / "chipmunk" / DECISIVE).read_text()
+    (site / DECISIVE).write_text(lines.replace("chipmunk,", "toy,"))
+    forget()
+    assert [entry.scene for entry in decisive.measured_of("toy")] == ["stack"]
+    assert decisive.measured_of("toy")[0].text == decisive.measured_of("chipmunk")[0].text
+
+
+def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_path):
+    done, rows = run(tmp_path, "stack", "--param", "n=1")
+    assert done.exit_code == 0, done.output
+    assert "explained" in rows and "it is late" in rows
+    done, rows = run(tmp_path, "stack", "--param", "n=10")
+    assert done.exit_code == 1 and ",new," in rows
+    accept = ["accept", "--engine", "toy", "--jobs", "1", "--family", "soft", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(main, accept)
+    assert done.exit_code == 0, done.output
+    assert (site / "findings" / files.MEMBERS).read_text().startswith(MEMBERS + "soft,default,2,n=10,")
+    done, rows = run(tmp_path, "stack", "--param", "n=10")
+    assert done.exit_code == 0 and ",known," in rows
+
+
+BROKEN_LAWS = [
+    ("raise RuntimeError('torn')", "RuntimeError: torn"),
+    ("raise SystemExit(3)", "SystemExit: 3"),
+    ("import os; os.abort()", "SIGABRT"),
+    ("def (", "SyntaxError"),
+    ("DEVIATIONS = 7", "not iterable"),
+    ("DEVIATIONS = ('a law',)", "no Deviation of toy"),
+    (LAWS.replace('engine="toy"', 'engine="bullet"'), "no Deviation of toy"),
+]
+
+
+@pytest.mark.parametrize(("code", "said"), BROKEN_LAWS)
+def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_without_them(site, tmp_path, code, said):
+    (site / "laws.py").write_text(code)
+    forget()
+    before = len(laws_of("chipmunk"))
+    assert laws_of("toy") == () and len(laws_of("chipmunk")) == before > 0
+    assert len(experiments_of("toy")) == 1
+    assert any("toy: its laws cannot be had" in line and said in line for line in doctor()["problems"])
+    done, rows = run(tmp_path, "stack", "--param", "n=1")
+    (row,) = [line for line in rows.splitlines() if ",penetration," in line]
+    assert ",fail,new," in row and "its laws cannot be had" in row and said in row, done.output
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [("1 / 0", "ZeroDivisionError"), ("(float('nan'), 1.0)", "predicts nan"), ("(1.0, -1.0)", "predicts 1 +- -1"),
+     ("'much'", "ValueError"), ("(1.0,)", "ValueError")],
+)  # fmt: skip
+def test_a_law_that_fails_when_it_is_asked_is_said_on_its_row(site, tmp_path, answer, said):
+    (site / "laws.py").write_text(f"""
+from adapters.law import Deviation
+
+DEVIATIONS = (Deviation("toy", ("default",), "stack", "penetration", lambda *asked: {answer}, "because", "source"),)
+""")
+    forget()
+    done, rows = run(tmp_path, "stack", "--param", "n=1")
+    assert "Traceback" not in done.output
+    (row,) = [line for line in rows.splitlines() if ",penetration," in line]
+    assert "law: toy stack/penetration: " in row and said in row and ",new," in row
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [("raise RuntimeError('torn')", "torn"), ("EXPERIMENTS = ('one',)", "no Experiment"),
+     ("CURED = (1,)", "no Cured"), ("CANDIDATES = [1]", "no mapping")],
+)  # fmt: skip
+def test_experiments_that_cannot_be_had_are_named_and_there_are_none(site, code, said):
+    (site / "experiments.py").write_text(code)
+    forget()
+    assert experiments_of("toy") == () == cured_of("toy") and candidates_of("toy") == {} == belongs_of("toy")
+    assert any("toy: its experiments cannot be had" in line and said in line for line in doctor()["problems"])
+    assert len(laws_of("toy")) > 0
+
+
+def test_findings_that_cannot_be_read_leave_its_rows_unlisted_and_say_why(site, tmp_path):
+    (site / "findings" / files.FAMILIES).write_text("[[family")
+    forget()
+    done, rows = run(tmp_path, "stack", "--param", "n=10")
+    assert done.exit_code == 0 and ",fail," in rows and "families.toml" in rows, done.output
+
+
+def test_a_plain_module_brings_an_adapter_only(site, tmp_path):
+    (site.parent / "plain.py").write_text(ADAPTER.replace(".numbers", ".toy.numbers"))
+    entries = tmp_path / "site" / "toy_package-1.dist-info" / "entry_points.txt"
+    entries.write_text(f"[{registry.GROUP}]\ntoy = toy_package.plain:Engine\n")
+    shutil.copy(site / "laws.py", site.parent / "laws.py")
+    forget()
+    assert engine_folder.folder_of("toy") is None and laws_of("toy") == () and files.findings_of("toy") is None
+    assert registry.facts("toy") is not None
+    done = CliRunner().invoke(main, ["accept", "--engine", "toy", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+
+
+def test_a_colour_or_a_role_that_is_none_is_a_fault_of_that_engine(site):
+    for text, said in (('COLOUR = "red"\n', "colour is 'red'"), ("COLOUR = 7\n", "colour is '7'")):
+        (site / "numbers.py").write_text(text)
+        forget()
+        found = registry.find("toy")
+        assert found.engine is None and said in found.reason
+    (site / "numbers.py").write_text('COLOUR = ""\n')
+    (site / "__init__.py").write_text(ADAPTER.replace('"tuned": "tuned"', '"tuned": "best"'))
+    forget()
+    assert "role is 'best'" in registry.find("toy").reason
+
+
+# ---- identity ----------------------------------------------------------------------------------------------------
+
+
+def hashes():
+    identity.adapter_hash.cache_clear()
+    return {name: identity.adapter_hash(name) for name in registry.names()}
+
+
+@pytest.mark.parametrize("engine", ["reference", "chipmunk", "bullet", "mujoco"])
+def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engine, monkeypatch):
+    """`toy` is made of Chipmunk's adapter and does not change with it: others' imports are their own matter."""
+    before = hashes()
+    read = Path.read_bytes
+    edited = ROOT / "adapters" / engine / "simulation.py"
+    monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n# edited\n" * (self == edited))
+    after = hashes()
+    assert {name for name in before if before[name] != after[name]} == {engine}
+
+
+@pytest.mark.parametrize("name", ["laws.py", "experiments.py", "findings/families.toml"])
+def test_what_judges_is_no_part_of_a_cell_s_identity(site, name):
+    before = hashes()
+    (site / name).write_text("# nothing")
+    assert hashes() == before
+
+
+@pytest.mark.parametrize("name", ["__init__.py", "numbers.py"])
+def test_all_that_an_adapter_imports_of_its_own_package_is_in_its_identity(site, name):
+    before = hashes()
+    with (site / name).open("a") as file:
+        file.write("# another line\n")
+    after = hashes()
+    assert {name for name in before if before[name] != after[name]} == {"toy"}
+
+
+def test_the_shared_vocabulary_is_in_every_identity(site, monkeypatch):
+    before, read = hashes(), Path.read_bytes
+    edited = ROOT / "adapters" / "stepping.py"
+    monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n" * (self == edited))
+    assert not set(before.items()) & set(hashes().items())
+
+
+def test_a_solver_of_ours_is_in_the_identity_of_its_adapter_only(site, monkeypatch):
+    before, read = hashes(), Path.read_bytes
+    edited = next((ROOT / "reference_solver").rglob("*.py"))
+    monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n" * (self == edited))
+    after = hashes()
+    assert {name for name in before if before[name] != after[name]} == {registry.solver()}
