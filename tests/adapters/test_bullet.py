@@ -14,6 +14,7 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, needs, run
 from adapters.bullet import BulletEngine
 from adapters.bullet.contact_law import ContactLaw, fall
+from adapters.bullet.profiles import law_of
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 
@@ -67,6 +68,30 @@ def test_importing_the_adapter_imports_no_engine_and_building_prints_nothing():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+# ---- the law is made of the profiles' own settings ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("profile", "e", "gravity", "law"),
+    [
+        ("default", 0.5, 9.81, DEFAULT),
+        ("one", 0.5, 9.81, ONE),
+        ("tuned", 0.5, 9.81, IMPACT),
+        ("tuned", 0.0, 9.81, REST),
+    ],
+)
+def test_a_profile_s_law_has_the_numbers_of_its_settings(profile, e, gravity, law):
+    scene = scene_of(FLOOR, ball(2.0), e=e, gravity=(0.0, 0.0, -gravity))
+    assert law_of(profile, needs(scene), DT) == law
+
+
+def test_what_settings_do_not_name_is_as_shipped_and_each_reaches_the_law():
+    assert ContactLaw.of({}) == DEFAULT and ContactLaw.of({"useMaximalCoordinates": 1}).split_depth == 0.04
+    named = {"linearDamping": 0.5, "contactERP": 0.3, "contactSlop": 0.002, "restitutionVelocityThreshold": 0.7,
+             "contactProcessingThreshold": 0.9, "contactBreakingThreshold": 0.11}  # fmt: skip
+    assert ContactLaw.of(named) == ContactLaw(True, 0.5, 0.3, 0.002, 0.7, 0.9, math.inf, 100.0, 0.11)
 
 
 # ---- rebounds ----------------------------------------------------------------------------------------------------
