@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Setting, Simulation
+from adapters.engine import ROLES, Contacts, Engine, EngineError, EngineFacts, Setting, Simulation
 from adapters.lift import lift
 from adapters.needs import Needs, needs
 from adapters.receipts import QUANTITIES, receipts
@@ -125,6 +125,11 @@ def facts(engine: Engine) -> str:
     for scheme in (stated.scheme, *map(engine.scheme, engine.profiles)):
         if scheme.position_offset not in (-1, 0, 1):
             return f"scheme.position_offset: {scheme.position_offset!r} must be -1, 0 or 1"
+    for profile, role in stated.roles.items():
+        if profile not in engine.profiles or role not in ROLES:
+            return (
+                f"facts.roles: {profile!r} cannot be {role!r}: no such profile, or none of the roles {', '.join(ROLES)}"
+            )
     if not (math.isfinite(stated.customary_dt) and stated.customary_dt > 0.0):
         return f"facts.customary_dt: {stated.customary_dt!r} must be a positive number of seconds"
     return "" if isinstance(engine.version(), str) and engine.version() else "version() must say which"

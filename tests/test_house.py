@@ -68,6 +68,12 @@ def own_words():
     return words
 
 
+@pytest.mark.parametrize("engine", FOLDERS)
+def test_every_profile_of_ours_has_a_role_of_its_own(engine):
+    roles = registry.facts(engine).roles
+    assert list(roles) == list(registry.adapter(engine).profiles) and len(set(roles.values())) == len(roles)
+
+
 #: Words of engines where they mean something else, or where our own solver is meant.
 OTHER_WORDS = {
     ("adapters/engine.py", "one"): "a role",

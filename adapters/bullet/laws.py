@@ -18,7 +18,7 @@ import numpy as np
 
 from adapters.bullet.contact_law import ContactLaw, Fall, fall
 from adapters.bullet.profiles import law_of
-from adapters.bullet.shipped import RELEASES, RESIDUAL
+from adapters.bullet.shipped import CHECKED_ON, RESIDUAL
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
@@ -196,7 +196,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
             _ball_law(profile, metric),
             _BECAUSE[profile],
             _SOURCE[profile],
-            RELEASES,
+            CHECKED_ON,
         )
         for profile in ("default", "tuned", "one")
         for scene, metrics in _BALL_METRICS.items()
@@ -210,6 +210,6 @@ DEVIATIONS: tuple[Deviation, ...] = (
         sliding_with_drag,
         "drag 0.04 (1 + v) v of the multibody path brakes the slide",
         "btMultiBody.cpp:843 (bullet3 6c888f4)",
-        RELEASES,
+        CHECKED_ON,
     ),
 )

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Prefixes of the releases that laws and findings were checked on.
-RELEASES = ("3.2.7",)
+#: Prefixes of the releases that laws were checked on.
+CHECKED_ON = ("3.2.7",)
 
 #: Sweeps per step (PhysicsServerCommandProcessor.cpp:2800).
 ITERATIONS = 50

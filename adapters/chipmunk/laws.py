@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 
 from adapters.chipmunk.profiles import PROFILES
-from adapters.chipmunk.shipped import RELEASES
+from adapters.chipmunk.shipped import CHECKED_ON
 from adapters.engine import Array
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
@@ -129,7 +129,7 @@ def _bounce_laws() -> tuple[Deviation, ...]:
 
 
 def _deviation(profiles: tuple[str, ...], scene: str, metric: str, law: Law, because: str, source: str) -> Deviation:
-    return Deviation("chipmunk", profiles, scene, exactly(metric), law, because, source, RELEASES)
+    return Deviation("chipmunk", profiles, scene, exactly(metric), law, because, source, CHECKED_ON)
 
 
 DEVIATIONS: tuple[Deviation, ...] = (

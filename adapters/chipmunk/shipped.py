@@ -5,8 +5,8 @@ The odd digits are single-precision literals in its source. [Munk2D, cpSpace.c, 
 
 from __future__ import annotations
 
-#: Prefixes of the releases that laws and findings were checked on.
-RELEASES = ("7.3.",)
+#: Prefixes of the releases that laws were checked on.
+CHECKED_ON = ("7.3.",)
 
 #: Sweeps per step.
 ITERATIONS = 10

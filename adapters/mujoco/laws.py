@@ -5,7 +5,7 @@ from __future__ import annotations
 from adapters.law import Deviation, Law, exactly
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
-from adapters.mujoco.shipped import RELEASES
+from adapters.mujoco.shipped import CHECKED_ON
 
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
@@ -38,7 +38,7 @@ _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver
 
 
 def _deviation(profile: str, scene: str, metric: str, law: Law, because: str) -> Deviation:
-    return Deviation("mujoco", (profile,), scene, exactly(metric), law, _BECAUSE[profile, because], _SOURCE, RELEASES)
+    return Deviation("mujoco", (profile,), scene, exactly(metric), law, _BECAUSE[profile, because], _SOURCE, CHECKED_ON)
 
 
 DEVIATIONS: tuple[Deviation, ...] = (

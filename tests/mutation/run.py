@@ -59,6 +59,8 @@ SUBJECTS = {
     "adapters/plain.py": ("adapters/test_plain.py",),
     "adapters/needs.py": ("adapters/test_scene.py",),
     "adapters/scene.py": ("adapters/test_scene.py",),
+    "adapters/shapes.py": ("adapters/test_scene.py",),
+    "adapters/materials.py": ("adapters/test_scene.py",),
     "adapters/trajectory.py": ("adapters/test_stepping.py",),
     "adapters/stepping.py": ("adapters/test_stepping.py",),
     "adapters/receipts.py": ("adapters/test_receipts.py",),

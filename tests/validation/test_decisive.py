@@ -6,7 +6,7 @@ import pytest
 
 from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
 from adapters.experiment import Cured
-from adapters.registry import find
+from adapters.registry import find, profile_of
 from validation import decisive
 from validation.decisive import (
     ALONE,
@@ -82,6 +82,8 @@ def test_every_cure_is_listed_with_the_settings_that_its_profile_changes_today(e
         pytest.skip(f"{engine}: {find(engine).reason}")
     listed, targets = read(inside(engine, DECISIVE)), cured_of(engine)
     assert {e.engine for e in listed} == {engine}
+    roles = {(profile_of(engine, "shipped"), profile_of(engine, "tuned"))}
+    assert {(target.shipped, target.better) for target in targets} == roles
     assert [(e.scene, e.cells, e.metrics) for e in listed] == [(t.scene, t.cells, t.metrics) for t in targets] != []
     for own, target in zip(listed, targets, strict=True):
         every = [changes_of(slot, target.better) for slot in slots_of(engine, target)]
