@@ -15,10 +15,11 @@ from validation.scenes import OURS
 
 ROOT = Path(__file__).parent.parent
 LINE = ["reference_solver", "adapters", "validation", "reports"]
-ENGINES = ["pymunk", "pybullet", "mujoco"]
 #: Folders of our engines, by name.
 FOLDERS = {name: folder_of(name) for name in registry.names() if registry.is_ours(registry.entry(name))}
 SOLVER = registry.solver()
+#: What their folders import beside the standard library, numpy and us: the engines themselves.
+COMMON = {*sys.stdlib_module_names, "numpy", "packaging", *LINE}
 
 
 def imported(path):
@@ -27,6 +28,15 @@ def imported(path):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield node.module.split(".")[0]
+
+
+ENGINES = sorted(
+    {name for folder in FOLDERS.values() for path in folder.rglob("*.py") for name in imported(path)} - COMMON
+)
+
+
+def test_the_folders_import_the_engines_that_are_known_to_be_there():
+    assert {"pymunk", "pybullet", "mujoco"} <= set(ENGINES)
 
 
 @pytest.mark.parametrize("package", LINE)

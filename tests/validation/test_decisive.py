@@ -6,7 +6,7 @@ import pytest
 
 from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
 from adapters.experiment import Cured
-from adapters.registry import find, profile_of
+from adapters.registry import find, names, profile_of
 from validation import decisive
 from validation.decisive import (
     ALONE,
@@ -22,7 +22,7 @@ from validation.decisive import (
     write,
 )
 
-ENGINES = ("chipmunk", "bullet", "mujoco")
+ENGINES = [name for name in names() if cured_of(name)]
 
 
 def entry(*parts, engine="toy"):

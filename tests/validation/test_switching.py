@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from adapters import registry
 from adapters.engine_folder import candidates_of, experiments_of
 from adapters.experiment import Experiment
 from validation.canonical import Check
@@ -18,7 +19,7 @@ from validation.tuning import Score, broken, score
 pymunk = pytest.importorskip("pymunk", reason="pymunk is an optional engine")
 
 SLOT = Slot("stack", (("n", 2.0),), 2, "chipmunk", "default", QUICK_DT)
-OURS = ("bullet", "chipmunk", "mujoco", "reference")
+OURS = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
 
 
 def test_a_switched_slot_is_another_cell_that_survives_json_and_is_never_listed():
