@@ -29,7 +29,7 @@ from reference_solver.planar.flight import place, put_back
 from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
-from reference_solver.planar.slide import FAR, go_back, keep
+from reference_solver.planar.press import FAR, go_back, keep
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Pairs, Rows, SubStep
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping import phase

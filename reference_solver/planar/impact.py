@@ -89,10 +89,10 @@ def describe(bodies: Bodies, rows: Rows, c: int) -> None:
 
 
 @inner_kernel
-def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> None:
+def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, dt: float) -> None:
     """Drop all rows but those that touch (E20).
 
-    Where what is left goes by the fixed-step law, all gaps with e = 0 may be closed (E28).
+    Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed (E28).
     """
     left = sub.clock[LEFT]
     kept, manifolds = 0, 0
@@ -103,6 +103,8 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep) -> Non
             rows.real[c, RESTITUTION] = restitution(bodies, pairs, rows, c)
             reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
             may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
+            if may_close and rows.real[c, GAP] > reach:
+                may_close = -rows.real[c, APPROACH] <= soft_speed(bodies, rows, c, dt)
             if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
                 rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)

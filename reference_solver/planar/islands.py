@@ -23,7 +23,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.located import located_step
 from reference_solver.planar.manifolds import keep_remembered, pass_on
 from reference_solver.planar.meeting import Meeting
-from reference_solver.planar.slide import keep
+from reference_solver.planar.press import keep
 from reference_solver.planar.state import (
     CANDIDATES,
     FIXED,

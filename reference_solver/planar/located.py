@@ -28,14 +28,16 @@ from reference_solver.planar.entries import enter_release, enter_settled, enter_
 from reference_solver.planar.flight import begin_flight, move_along
 from reference_solver.planar.impact import collide_now, end_rocking, end_series, keep_loaded, keep_touching, release
 from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.jam import weigh_clusters
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
 from reference_solver.planar.midpoint import close_gaps, keep_change, levers_of_start, misses_end, take_back
 from reference_solver.planar.position import correct_positions
+from reference_solver.planar.press import cut_work, go_back, keep, press
 from reference_solver.planar.rows import warm_start
-from reference_solver.planar.slide import cut_work, go_back, keep, press, press_until_stick
-from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
+from reference_solver.planar.slide import press_until_stick
+from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.clock import (
@@ -57,11 +59,10 @@ from reference_solver.stepping.clock import (
     hold_rest,
     open_step,
     weigh_event,
-    weigh_jam,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
 from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
-from reference_solver.stepping.options import BLOCK, MIDPOINT, Options
+from reference_solver.stepping.options import BLOCK, Options
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
 
@@ -92,24 +93,6 @@ def located_step(
             end_run(bodies)
             sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
-
-
-@inner_kernel
-def free_bodies(bodies: Bodies) -> int:
-    """Number of bodies that forces move."""
-    count = 0
-    for i in range(len(bodies.kind)):
-        count += 1 if bodies.kind[i, MOTION] == FREE else 0
-    return count
-
-
-@inner_kernel
-def independent_rows(rows: Rows, options: Options) -> int:
-    """Number of rows, of flush faces no more than hold two bodies together: all others follow from them."""
-    count = 0
-    for m in range(rows.counts[MANIFOLDS]):
-        count += min((1 + options.friction) * (rows.manifold[m + 1] - rows.manifold[m]), 2 + options.friction)
-    return count
 
 
 @inner_kernel
@@ -150,14 +133,11 @@ def sub_step(
     left = sub.clock[LEFT]
     if not detect(bodies, pairs, rows, options):
         return False
-    keep_touching(bodies, pairs, rows, sub)
+    if sub.clock[LEFT] == options.dt and sub.clock[HELD] == 0.0:
+        weigh_clusters(bodies, rows, sub, options, tally)
+    keep_touching(bodies, pairs, rows, sub, options.dt)
     if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
         return False
-    if sub.clock[LEFT] == options.dt:
-        free = free_bodies(bodies)
-        weigh_jam(sub.clock, independent_rows(rows, options), 3 * free, free)
-        if options.scheme == MIDPOINT:
-            sub.clock[JAMMED] = 1.0
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     copy_vectors(bodies.twist, sub.before)
@@ -238,7 +218,7 @@ def settle(
     if options.solver == BLOCK:
         prepare_blocks(bodies, rows)
     keep_state(sub.journal, bodies.pose, bodies.twist)
-    moved = close_gaps(bodies, rows, problem, sub, options, tally)
+    moved = close_gaps(bodies, rows, sub, options)
     if moved:
         if not detect(bodies, pairs, rows, options):
             return False

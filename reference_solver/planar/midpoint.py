@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import row_work
@@ -43,24 +42,29 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.flight import keep_start, put_back
 from reference_solver.planar.impact import gap_noise
-from reference_solver.planar.iteration import solve_velocities
+from reference_solver.planar.iteration import sweep
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, copy_vectors, tangent_velocity
 from reference_solver.planar.lasting import displace, evaluate, hold
+from reference_solver.planar.residual import natural_map
 from reference_solver.planar.rows import measure_speed, prepare_masses
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.sweeps import CHECK_INTERVAL
 from reference_solver.tally import CONTACT_WORK, SURFACE_WORK
 
 #: Gaps above this share of what touches are closed: what is left is well inside.
 GAP_SHARE = 0.25
 #: Impulses of a solve for displacements start from this multiple of what its widest gap alone would take.
 FAR_ABOVE = 1e3
-#: Largest gap, as a share of the smaller body's reach, that the scheme may have left: (w h)^3 of a turn of .1 rad, as
-#: bodies that fall over have it in steps of 1/60 s, is 1e-3.
+#: Largest gap, as a share of the smaller body's reach, that is closed at a time: (w h)^3 of a turn of .1 rad, as bodies
+#: that fall over have it in steps of 1/60 s, is 1e-3.
 LEFT_OVER = 1e-3
+#: Residual of the solve that closes gaps, and the sweeps it may take: impulses count from a thousand times what the
+#: widest gap takes, so that it leaves some 1e-6 of that, and what is left is measured anew after the next sub-step.
+CLOSED, CLOSING_SWEEPS = 1e-8, 400
 #: Farthest that closing gaps may move a body, in multiples of the widest: a lever of a slender body.
 LEVERAGE = 100.0
 
@@ -169,19 +173,24 @@ def misses_end(bodies: Bodies, rows: Rows, options: Options, time: float) -> boo
 
 
 @inner_kernel
-def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> bool:
+def closable(bodies: Bodies, rows: Rows, c: int) -> float:
+    """What of the gap of row c is closed at a time [m]."""
+    most = LEFT_OVER * min(bodies.real[rows.integer[c, A], REACH], bodies.real[rows.integer[c, B], REACH])
+    return min(max(rows.real[c, GAP], -most), most)
+
+
+@inner_kernel
+def close_gaps(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> bool:
     """Move bodies until the gaps of all rows are closed, by M^-1 J^T; whether rows are not what they were.
 
-    A solve for displacements, whose impulses are counted from far above zero: contacts push and pull. Gaps and overlaps
-    that the scheme cannot have left are not its own to close, nor those that contradict each other: then bodies stay.
+    Sweeps for displacements, whose impulses are counted from far above zero: contacts push and pull. Of gaps and
+    overlaps that are wider than what the scheme leaves that much is closed at a time; where they contradict each other
+    bodies stay.
     """
     widest = 0.0
     for c in range(rows.counts[CONTACTS]):
-        reach = min(bodies.real[rows.integer[c, A], REACH], bodies.real[rows.integer[c, B], REACH])
-        if abs(rows.real[c, GAP]) > LEFT_OVER * reach:
-            return False
         if abs(rows.real[c, GAP]) > GAP_SHARE * gap_noise(bodies, rows, c):
-            widest = max(widest, abs(rows.real[c, GAP]))
+            widest = max(widest, abs(closable(bodies, rows, c)))
     if widest == 0.0:
         return False
     copy_vectors(bodies.twist, sub.after)
@@ -190,8 +199,12 @@ def close_gaps(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, optio
             bodies.twist[i, d] = 0.0
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN], rows.real[c, PT] = FAR_ABOVE * widest * rows.real[c, NORMAL_MASS], 0.0
-        rows.real[c, TARGET], rows.real[c, SPEED], rows.real[c, FRICTION] = -rows.real[c, GAP], widest, 0.0
-    solve_velocities(bodies, rows, problem, options, tally)
+        rows.real[c, TARGET], rows.real[c, SPEED] = -closable(bodies, rows, c), widest
+        rows.real[c, FRICTION] = 0.0
+    for k in range(CLOSING_SWEEPS):
+        sweep(bodies, rows, options, 1.0)
+        if k % CHECK_INTERVAL == 0 and natural_map(bodies, rows, options) <= CLOSED:
+            break
     farthest = 0.0
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FREE:

@@ -28,9 +28,9 @@ UNTIL_REST = 0.5
 
 #: Soft events located in a step, and one more per body.
 MOST_SOFT = 16
-#: Free bodies from which on an island may be jammed, and soft events that are located in a step of one that is.
+#: Free bodies of a cluster from which on it may jam, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
-#: Free bodies from which on two thirds as many rows jam an island: more than a contact for every body.
+#: Free bodies from which on a cluster jams however few its contacts.
 MANY_BODIES = 8
 #: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
 REBOUND = 0.25
@@ -55,14 +55,18 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
 
 
 @kernel
-def weigh_jam(clock: Array, rows: int, freedoms: int, bodies: int) -> None:
-    """Decide at the start of a step whether the island is jammed: its contacts have more rows than it has freedoms.
+def jams(rows: int, freedoms: int, bodies: int) -> bool:
+    """Whether a cluster of bodies that touch jams: it has more rows than freedoms.
 
-    Then whatever moves in it moves what it touches, and events have no end; few of them are located. Of many bodies
-    two thirds as many rows do.
+    Then whatever moves in it moves what it touches, and events have no end. Many bodies jam in any case.
     """
-    if bodies >= JAM_BODIES and (rows > freedoms or (bodies >= MANY_BODIES and 3 * rows > 2 * freedoms)):
-        clock[JAMMED], clock[PATIENCE] = 1.0, JAM_PATIENCE
+    return bodies >= MANY_BODIES or (bodies >= JAM_BODIES and rows > freedoms)
+
+
+@kernel
+def hurry(clock: Array) -> None:
+    """Locate few soft events in the step of an island that jams."""
+    clock[JAMMED], clock[PATIENCE] = 1.0, JAM_PATIENCE
 
 
 @kernel

@@ -462,6 +462,25 @@ def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
                 worst, which, what = lasting.monitor[LAST, k, m], k, m
     if which < 0:
         return False
+    end_mode(bodies, lasting, which, what)
+    return True
+
+
+@inner_kernel
+def end_first(bodies: Bodies, lasting: Lasting) -> None:
+    """Change the mode that ends as soon as the phase has begun: gaps that were open by round-off are closed by then."""
+    worst, which, what = 0.0, -1, LOAD
+    for k in range(lasting.size[CONTACTS]):
+        for m in range(MONITORS):
+            if lasting.monitor[START, k, m] > FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
+                worst, which, what = lasting.monitor[LAST, k, m], k, m
+    if which >= 0:
+        end_mode(bodies, lasting, which, what)
+
+
+@inner_kernel
+def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
+    """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
     if what == LOAD or what == FEATURE:
         lasting.mode[which] = OPEN
     elif what == ONWARD:
@@ -470,7 +489,6 @@ def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
         go_back(bodies, lasting)
         evaluate_forces(bodies, lasting)
         set_slip(lasting, which)
-    return True
 
 
 @inner_kernel
@@ -508,7 +526,7 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
         guess = predict(lasting, near, far)
         if not (near < guess < far):
             guess = 0.5 * (near + far)
-        if far - near <= SAME_TIME * far or guess <= near or guess >= far:
+        if far - near <= SAME_TIME * far or guess <= near or guess >= far or far < SHORTEST * length:
             break
         if step_phase(bodies, lasting, guess) < 0.0:
             return -1.0
@@ -568,9 +586,13 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = lasting.early[0] * length, SHORTENED
         elif lowest(lasting, LAST) < -LOCATED:
             end = find_end(bodies, lasting, length)
-            if end > 0.0:
+            if end >= SHORTEST * left:
                 return end, ENDED
-            break
+            if end < 0.0:
+                break
+            end_first(bodies, lasting)
+            if not start_slopes(bodies, lasting):
+                break
         else:
             return length, outcome
         if length < SHORTEST * left:
