@@ -8,10 +8,9 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.columns import GAP, NX, NY, PN, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, place, put_back
-from reference_solver.planar.impact import soft_speed
+from reference_solver.planar.impact import describe, gap_noise, soft_speed
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.narrowphase import collide
-from reference_solver.planar.rows import prepare_masses
 from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, Rows, SubStep
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
@@ -51,19 +50,34 @@ def pair_impact(rows: Rows, sub: SubStep, a: int, b: int, m: int, end: float) ->
 
 @inner_kernel
 def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int, t: float) -> bool:
-    """Whether a pair that meets at time t does so faster than what loads do in a step (E28)."""
+    """Whether a pair that meets at time t does so faster than what loads do in a step (E28).
+
+    Anywhere: a corner may land softly beside one that has, and another one hard.
+    """
     place(bodies, sub, a, t)
     place(bodies, sub, b, t)
-    nearest, approach, push = math.inf, 0.0, 0.0
-    for c in range(collide(bodies, a, b, UNLIMITED, options.dt, sub.probe, 0)):
-        if sub.probe.real[c, GAP] < nearest:
-            prepare_masses(bodies, sub.probe, c)
-            nearest = sub.probe.real[c, GAP]
+    nearest, hard = math.inf, False
+    count = collide(bodies, a, b, UNLIMITED, options.dt, sub.probe, 0)
+    for c in range(count):
+        describe(bodies, sub.probe, c)
+        nearest = min(nearest, sub.probe.real[c, GAP])
+    for c in range(count):
+        if sub.probe.real[c, GAP] <= max(nearest, gap_noise(bodies, sub.probe, c)):
             approach = normal_velocity(sub.start, sub.probe, c) + t * normal_velocity(sub.gain, sub.probe, c)
-            push = soft_speed(bodies, sub.probe, c, options.dt)
+            hard = hard or approach < -soft_speed(bodies, sub.probe, c, options.dt)
     put_back(bodies, sub, a)
     put_back(bodies, sub, b)
-    return approach < -push
+    return hard
+
+
+@inner_kernel
+def hard_impact(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int, t: float, end: float) -> float:
+    """Time of the hard impact of a pair that meets at time t: then, or of another corner after that; inf if none is."""
+    if strikes_hard(bodies, sub, options, a, b, t):
+        return t
+    nx, ny = sub.probe.real[0, NX], sub.probe.real[0, NY]
+    t = next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, t, end)
+    return t if t < end and strikes_hard(bodies, sub, options, a, b, t) else math.inf
 
 
 @inner_kernel
@@ -82,8 +96,9 @@ def next_impact(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options:
             m += 1
         own = m if m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) == key else -1
         t = pair_impact(rows, sub, key // n, key % n, own, end)
-        if t < end and (sub.clock[HELD] == 0.0 or strikes_hard(bodies, sub, options, key // n, key % n, t)):
-            end = t
+        if t < end and sub.clock[HELD] > 0.0:
+            t = hard_impact(bodies, sub, options, key // n, key % n, t, end)
+        end = min(end, t)
     return end
 
 

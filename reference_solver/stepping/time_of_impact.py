@@ -43,6 +43,8 @@ UNITS = 4.0 * 2.0**-52
 STEPS = 2000
 #: Steps of one whose bodies touch and do not part for certain.
 CREEPS = 100
+#: Steps shorter than this share of what is ahead are tried with a direction that turns along.
+TURN_ALONG = 0.01
 #: Corners that are off a face by less than this share of its body are on it.
 ON_FACE = 1e-9
 
@@ -82,8 +84,7 @@ def first_contact(meeting: Any, a: int, b: int, now: float, until: float) -> flo
         introduce(meeting, b, a)
     else:
         introduce(meeting, a, b)
-    for c in range(meeting.kind[CORNERS_SECOND]):
-        meeting.watched[c] = 1
+    watch_all(meeting)
     return advance(meeting, now, until)
 
 
@@ -272,6 +273,37 @@ def safe_time(meeting: Any, clearance: float, acceleration: float) -> float:
 
 
 @inner_kernel
+def safe_step(meeting: Any, clearance: float, acceleration: float, now: float, until: float) -> tuple[float, float]:
+    """`safe_time`, and the acceleration that it is for; small ones with the direction turning along with a face.
+
+    A corner over the face of a body that turns: along a fixed direction one end of the face comes up, however clear of
+    it the corner is.
+    """
+    step = safe_time(meeting, clearance, acceleration)
+    if meeting.kind[PLANE] or step > TURN_ALONG * (until - now):
+        return step, acceleration
+    first, second, n = meeting.kind[FIRST], meeting.kind[SECOND], meeting.vector[NORMAL]
+    nx, ny, nz = n[0], n[1], n[2]
+    if not choose_face(meeting, nx, ny, nz, now):
+        return step, acceleration
+    watch_all(meeting)
+    bend = relative_acceleration(meeting, now) - bend_bound(meeting, now, until)
+    along = safe_time(meeting, clearance, bend)
+    introduce(meeting, first, second)
+    watch_all(meeting)
+    stand(meeting, now)
+    set_normal(meeting, nx, ny, nz)
+    return (along, bend) if along > step else (step, acceleration)
+
+
+@inner_kernel
+def watch_all(meeting: Any) -> None:
+    """Let no corner of the second body come down unseen."""
+    for c in range(meeting.kind[CORNERS_SECOND]):
+        meeting.watched[c] = 1
+
+
+@inner_kernel
 def turn_bounds(paths: Paths, i: int, now: float, until: float) -> tuple[float, float]:
     """Bounds of the spin [rad/s] and of its change [rad/s^2] (see `bend_bound`); in the plane the last term is none."""
     spin, change = derivative_bound(paths, i, True, 1, now, until), derivative_bound(paths, i, True, 2, now, until)
@@ -329,13 +361,13 @@ def advance(meeting: Any, now: float, until: float) -> float:
     noise, least = gap_noise(meeting), round_off(meeting)
     floor, left = min(value, 0.0), value > noise
     for k in range(STEPS):
-        acceleration = relative_acceleration(meeting, t) - bend
-        step = safe_time(meeting, value - floor, acceleration)
+        fixed = relative_acceleration(meeting, t) - bend
+        step, acceleration = safe_step(meeting, value - floor, fixed, t, until)
         if not left:
             # The parabola that ends first rises to more than the noise: -a (step / 2)^2 / 2 at half its time.
             left = 0.0 < step < math.inf and -0.125 * acceleration * step * step > noise
             if step < math.inf and not left:
-                step = safe_time(meeting, value - floor + noise, acceleration)
+                step, _ = safe_step(meeting, value - floor + noise, fixed, t, until)
         if step >= until - t:
             return math.inf
         later = t + step
