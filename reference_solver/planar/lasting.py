@@ -109,6 +109,8 @@ def hold(bodies: Bodies, rows: Rows, lasting: Lasting, c: int, k: int) -> None:
         own_half_space(bodies, lasting, k, b, EDGE_OF_B)
     elif far_b <= near and edge_a >= 0:
         own_edge(bodies, lasting, k, EDGE_OF_A, edge_a, near)
+        if far_a <= near and edge_b >= 0 and leaves_edge(bodies, lasting, k, near):
+            own_edge(bodies, lasting, k, EDGE_OF_B, edge_b, near)  # past each other, on faces that stay flush
     elif far_a <= near and edge_b >= 0:
         own_edge(bodies, lasting, k, EDGE_OF_B, edge_b, near)
     elif far_a > near or far_b > near or ra + rb == 0.0:  # neither: a point of B that keeps to the plane through it
@@ -153,12 +155,19 @@ def own_edge(bodies: Bodies, lasting: Lasting, k: int, form: int, edge: int, nea
     vertex = lasting.kind[k, VERTEX_A if form == EDGE_OF_A else VERTEX_B]
     if bodies.real[owner, ROUNDING] + bodies.real[other, ROUNDING] == 0.0:
         return
-    along, rate = along_edge(bodies, lasting, k)
-    outside = (along <= place[LOW] + near and rate < 0.0) or (along >= place[HIGH] - near and rate > 0.0)
-    if outside or along < place[LOW] - near or along > place[HIGH] + near:
+    along, _ = along_edge(bodies, lasting, k)
+    if leaves_edge(bodies, lasting, k, near) or along < place[LOW] - near or along > place[HIGH] + near:
         vx, vy = corner(bodies, owner, vertex)
         set_pair(place, POINT_A if form == EDGE_OF_A else POINT_B, into_body(bodies, owner, vx, vy))
         lasting.kind[k, FORM] = POINTS
+
+
+@inner_kernel
+def leaves_edge(bodies: Bodies, lasting: Lasting, k: int, near: float) -> bool:
+    """Whether the core point stands at an end of its edge, on the way out."""
+    along, rate = along_edge(bodies, lasting, k)
+    low, high = lasting.place[k, LOW], lasting.place[k, HIGH]
+    return (along <= low + near and rate < 0.0) or (along >= high - near and rate > 0.0)
 
 
 @inner_kernel

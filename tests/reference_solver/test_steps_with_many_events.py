@@ -18,9 +18,10 @@ from reference_solver.stepping.clock import (
     PATIENCE,
     SOFT,
     count_event,
+    hurry,
+    jams,
     open_step,
     weigh_event,
-    weigh_jam,
 )
 from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD, new_tally
@@ -110,12 +111,13 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
     assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
 
 
-def test_an_island_is_jammed_where_contacts_have_more_rows_than_bodies_have_freedoms():
+def test_a_cluster_jams_where_contacts_have_more_rows_than_bodies_have_freedoms_or_bodies_are_many():
+    for rows, bodies, jammed in [(13, 4, True), (12, 4, False), (60, 3, False), (16, 8, True), (14, 7, False)]:
+        assert jams(rows, 3 * bodies, bodies) == jammed
     clock = np.zeros(CLOCK_SIZE)
-    for rows, bodies, jammed in [(13, 4, 1.0), (12, 4, 0.0), (60, 3, 0.0), (16, 8, 0.0), (17, 8, 1.0), (14, 7, 0.0)]:
-        open_step(clock, bodies, DT)
-        weigh_jam(clock, rows, 3 * bodies, bodies)
-        assert (clock[JAMMED], clock[PATIENCE]) == (jammed, JAM_PATIENCE if jammed else MOST_SOFT + bodies)
+    open_step(clock, 8, DT)
+    hurry(clock)
+    assert (clock[JAMMED], clock[PATIENCE]) == (1.0, JAM_PATIENCE)
 
 
 def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
