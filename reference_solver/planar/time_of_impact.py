@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import pair_bodies
-from reference_solver.planar.columns import GAP, NX, NY, PN, TARGET, A, B
+from reference_solver.planar.columns import GAP, NX, NY, OTHER, PN, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, place, put_back
 from reference_solver.planar.impact import describe, gap_noise, soft_speed
 from reference_solver.planar.kinematics import normal_velocity
@@ -42,8 +42,9 @@ def pair_impact(rows: Rows, sub: SubStep, a: int, b: int, m: int, end: float) ->
             pressed, normal = pressed + 1, c
     if pressed == 2:
         return math.inf
-    if pressed == 1:
-        nx, ny = rows.real[normal, NX], rows.real[normal, NY]
+    if pressed == 1:  # its normal at the start, where the rows are those of mid-drift as well
+        first = OTHER if sub.clock[HELD] > 0.0 else NX
+        nx, ny = rows.real[normal, first], rows.real[normal, first + 1]
         return next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, 0.0, end)
     return first_contact(sub.meeting, a, b, 0.0, end)
 
