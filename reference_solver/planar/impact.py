@@ -53,7 +53,7 @@ from reference_solver.stepping.impacts import (
     STRUCK,
     drifts_aside,
 )
-from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NOISE, ROUND_OFF, UNSOLVED
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, NOISE, ROUND_OFF, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
@@ -101,7 +101,8 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, dt: fl
         for c in range(rows.manifold[m], rows.manifold[m + 1]):
             describe(bodies, rows, c)
             rows.real[c, RESTITUTION] = restitution(bodies, pairs, rows, c)
-            reach = gap_noise(bodies, rows, c) + LATE * left * abs(rows.real[c, APPROACH])
+            late = NEARLY * dt if sub.clock[HELD] > 0.0 else LATE * left
+            reach = gap_noise(bodies, rows, c) + late * abs(rows.real[c, APPROACH])
             may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
             if may_close and rows.real[c, GAP] > reach:
                 may_close = -rows.real[c, APPROACH] <= soft_speed(bodies, rows, c, dt)

@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.broadphase import pair_bodies
-from reference_solver.planar.columns import GAP, NX, NY, OTHER, PN, TARGET, A, B
+from reference_solver.planar.columns import EXTENT, GAP, NX, NY, OTHER, PN, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, place, put_back
 from reference_solver.planar.impact import describe, gap_noise, soft_speed
 from reference_solver.planar.kinematics import normal_velocity
@@ -15,8 +15,10 @@ from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, 
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
-from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
+from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held, overlap_time
 
+#: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
+DEEP = 1e-4
 #: Margin with which every pair of shapes answers with its points, however far apart they are.
 UNLIMITED = 1e300
 
@@ -34,12 +36,22 @@ def begin_paths(bodies: Bodies, sub: SubStep, end: float) -> None:
 
 
 @inner_kernel
+def min_extent(sub: SubStep, a: int, b: int) -> float:
+    """Smaller half width of two bodies [m]."""
+    return min(sub.meeting.bodies.real[a, EXTENT], sub.meeting.bodies.real[b, EXTENT])
+
+
+@inner_kernel
 def pair_impact(rows: Rows, sub: SubStep, a: int, b: int, m: int, end: float) -> float:
     """Next impact of one pair, whose manifold is m (-1: none)."""
     pressed, normal = 0, -1
     for c in range(0 if m < 0 else rows.manifold[m], 0 if m < 0 else rows.manifold[m + 1]):
         if rows.real[c, TARGET] >= 0.0 or rows.real[c, PN] != 0.0:  # others were left
             pressed, normal = pressed + 1, c
+    if pressed > 0 and sub.clock[HELD] > 0.0:
+        t = overlap_time(sub.meeting, a, b, end, DEEP * min_extent(sub, a, b))
+        if t < end:
+            return t
     if pressed == 2:
         return math.inf
     if pressed == 1:  # its normal at the start, where the rows are those of mid-drift as well

@@ -19,6 +19,9 @@ NOISE = 1e-11
 #: A gap that its own approach closes within this share of the time left is closed: a few units in the last place of
 #: the time of impact.
 LATE = 1e-15
+#: The same at impulse level, as a share of a step: closing gaps moves bodies after an impact is located.
+#: What that anticipates of an impact is a share of what such a step leaves of gaps.
+NEARLY = 1e-3
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
 #: Share of a contact's usual force below which a force is none; stage forces are known to 1e-13 of it, and events are

@@ -96,7 +96,7 @@ def next_contact_of_held(
 
     The normal (nx, ny, nz) leads from a to b. Convex bodies that touch in a point or a line touch elsewhere no earlier
     than a face of one comes to lie along that of the other; which corners are held now is seen from their height. inf
-    if none comes down, if both have faces there, or none: then no other corner can be next.
+    if none comes down, or if neither has a face there: then no other corner can be next.
     """
     if is_half_space(meeting, b):
         introduce(meeting, b, a)
@@ -110,16 +110,34 @@ def next_contact_of_held(
     return advance(meeting, now, until)
 
 
+@kernel
+def overlap_time(meeting: Any, a: int, b: int, until: float, depth: float) -> float:
+    """Time at which bodies a and b that touch overlap by ``depth``, inf if they do not at ``until`` [s].
+
+    For bodies that are held at impulse level: what holds them may let go, and nobody looks for what touches.
+    """
+    if is_half_space(meeting, b):
+        introduce(meeting, b, a)
+    else:
+        introduce(meeting, a, b)
+    watch_all(meeting)
+    stand(meeting, until)
+    if gap(meeting) >= -depth:
+        return math.inf
+    stand(meeting, 0.0)
+    return crossing(meeting, -depth, 0.0, until) if gap(meeting) >= -depth else math.inf
+
+
 @inner_kernel
 def choose_face(meeting: Any, nx: float, ny: float, nz: float, now: float) -> bool:
-    """Make the body that alone has a face along the normal, from first to second, the first one, as a plane."""
+    """Make a body that has a face along the normal, from first to second, the first one, as a plane; False: none."""
     set_normal(meeting, nx, ny, nz)
     least = meeting.paths.coefficient.shape[1] // 3 + 1  # corners that span a face: 2 in the plane, 3 in space
     own = face_corners(meeting, 0, 1.0) >= least
     other = face_corners(meeting, 1, -1.0) >= least
-    if own == other:
+    if not own and not other:
         return False
-    if other:
+    if not own:
         introduce(meeting, meeting.kind[SECOND], meeting.kind[FIRST])
         set_normal(meeting, -nx, -ny, -nz)
         stand(meeting, now)
