@@ -122,7 +122,7 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, dt: fl
 
 @inner_kernel
 def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
-    """Drop all rows but those that carried load in the sub-step that has ended; False if none is left."""
+    """Drop all rows but those that carried load in the sub-step that has ended, or overlap; False if none is left."""
     kept, manifolds, old = 0, 0, 0
     for m in range(rows.counts[MANIFOLDS]):
         first = kept
@@ -130,12 +130,15 @@ def keep_loaded(bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
             key = row_key(bodies, rows, c)
             while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
                 old += 1
-            if old < rows.counts[REMEMBERED] and rows.old_key[old] == key and rows.old_impulse[old, 0] > 0.0:
-                describe(bodies, rows, c)
+            known = old < rows.counts[REMEMBERED] and rows.old_key[old] == key
+            loaded = known and rows.old_impulse[old, 0] > 0.0
+            describe(bodies, rows, c)
+            if loaded or rows.real[c, GAP] < -gap_noise(bodies, rows, c):
                 copy_row(rows, c, kept)
                 rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)
                 rows.real[kept, RESTITUTION] = 0.0
-                rows.real[kept, FORCE_N], rows.real[kept, FORCE_T] = rows.old_impulse[old, 0], rows.old_impulse[old, 1]
+                rows.real[kept, FORCE_N] = rows.old_impulse[old, 0] if loaded else 0.0
+                rows.real[kept, FORCE_T] = rows.old_impulse[old, 1] if loaded else 0.0
                 kept += 1
         if kept > first:
             rows.manifold[manifolds] = first

@@ -8,21 +8,12 @@ from reference_solver.planar.columns import GAP, MOTION, A, B
 from reference_solver.planar.impact import soft_speed
 from reference_solver.planar.state import FREE, MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import JAMMED, hold_rest, hurry, jams
-from reference_solver.stepping.islands import Indices
+from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.options import MIDPOINT, Options
 
 #: Columns of `SubStep.gain` that hold the free bodies of a cluster, and its rows, until the flight begins.
 MEMBERS, ROWS = 0, 1
-
-
-@inner_kernel
-def first_of(label: Indices, i: int) -> int:
-    """Lowest body of body i's cluster so far; shortens the way there."""
-    while label[i] != i:
-        label[i] = label[label[i]]
-        i = label[i]
-    return i
 
 
 @inner_kernel

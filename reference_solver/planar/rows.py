@@ -41,7 +41,7 @@ from reference_solver.planar.kinematics import (
     tangent_velocity,
 )
 from reference_solver.planar.state import CONTACTS, Bodies, Pairs, Rows
-from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
+from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
 from reference_solver.stepping.options import BAUMGARTE, Options
 
 
@@ -120,7 +120,8 @@ def measure_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
     meeting = math.sqrt(approach * approach + slip * slip)
     moving = speed_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
-    rows.real[c, SPEED] = max(meeting, push, SPEED_SHARE * moving)
+    still = STILL * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) / dt
+    rows.real[c, SPEED] = max(max(meeting, push), max(SPEED_SHARE * moving, still))
     return push
 
 

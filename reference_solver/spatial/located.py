@@ -14,6 +14,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.certificate import open_solve, point_work
 from reference_solver.spatial.entries import enter_release, enter_sub_step
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.jam import weigh_clusters
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts
 from reference_solver.spatial.motion import accelerate, displace
@@ -41,6 +42,7 @@ from reference_solver.stepping.clock import (
     EVENTS,
     HASTE,
     HELD,
+    JAMMED,
     LEFT,
     OUTCOME,
     REBOUND,
@@ -101,6 +103,10 @@ def sub_step(
     if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
         return False
     manifolds = room[:found]
+    if left == options.dt and sub.clock[JAMMED] == 0.0:
+        weigh_clusters(bodies, manifolds, sub, options, tally)
+        if sub.clock[HELD] > 0.0:
+            return True  # points that may close are looked for as well
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
     smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
     pushed = False

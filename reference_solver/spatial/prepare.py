@@ -7,7 +7,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
-from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE
+from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
 from reference_solver.stepping.options import BAUMGARTE, Options
 
 #: Approach speeds below this fraction of what the loads of one step bring about are a resting body's noise. As
@@ -109,7 +109,8 @@ def measure_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vecto
     push = load_speed(bodies, manifolds, m, p, dt)
     moving = length(point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0)))
     moving += length(point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0)))
-    manifolds.speed[m, p] = max(length(u), push, SPEED_SHARE * moving)
+    still = STILL * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]]) / dt
+    manifolds.speed[m, p] = max(max(length(u), push), max(SPEED_SHARE * moving, still))
     return push
 
 

@@ -65,12 +65,18 @@ def allocate_islands(dimension: int, bodies: int, candidates: int) -> Islands:
 
 
 @inner_kernel
-def root(islands: Islands, i: int) -> int:
-    """Lowest body joined with free body i so far; shortens the way there."""
-    while islands.label[i] != i:
-        islands.label[i] = islands.label[islands.label[i]]
-        i = islands.label[i]
+def first_of(label: Indices, i: int) -> int:
+    """Lowest body joined with body i so far; shortens the way there."""
+    while label[i] != i:
+        label[i] = label[label[i]]
+        i = label[i]
     return i
+
+
+@inner_kernel
+def root(islands: Islands, i: int) -> int:
+    """Lowest body joined with free body i so far."""
+    return first_of(islands.label, i)
 
 
 @inner_kernel

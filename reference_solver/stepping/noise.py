@@ -22,6 +22,9 @@ LATE = 1e-15
 #: The same at impulse level, as a share of a step: closing gaps moves bodies after an impact is located.
 #: What that anticipates of an impact is a share of what such a step leaves of gaps.
 NEARLY = 1e-3
+#: A body that goes no farther than this share of its smaller half width in a step stands still: that is no more than a
+#: few units in the last place of where it is.
+STILL = 1e-15
 #: What is left of a step below this share of it is nothing.
 NOTHING_LEFT = 1e-14
 #: Share of a contact's usual force below which a force is none; stage forces are known to 1e-13 of it, and events are

@@ -36,6 +36,7 @@ PARTS = (
     "rotation",
     "random_scenes",
     "falling",
+    "piles",
     "turning",
     "turning_in_space",
     "detection",

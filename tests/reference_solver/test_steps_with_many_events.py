@@ -46,13 +46,13 @@ def tilted(dimension, rng, place, mass):
 
 
 def pile(dimension, seed, restitution):
-    """Six tilted boxes of any mass fall between walls."""
+    """Tilted boxes of any mass fall between walls: ten, as many as always jam, in space six."""
     rng = np.random.default_rng(seed)
     across = np.eye(dimension)[: dimension - 1]
     fixed = [half_space(tuple(np.eye(dimension)[-1]))]
     fixed += [half_space(tuple(sign * n), -1.5) for n in across for sign in (1.0, -1.0)]
     boxes = []
-    for k in range(6):
+    for k in range(10 if dimension == 2 else 6):
         place = (*rng.uniform(-0.8, 0.8, dimension - 1), 0.8 + 0.9 * k)
         boxes.append(tilted(dimension, rng, place, 10.0 ** rng.uniform(-1.0, 1.0)))
     gravity = (*(0.0,) * (dimension - 1), -G)
@@ -72,7 +72,7 @@ def test_jammed_piles_obey_all_laws_but_for_an_overlap_that_is_told(dimension, r
     certificate = simulation.certificate
     assert all(reason.startswith("bodies overlap") for reason in certificate["reasons"]), certificate["reasons"]
     assert certificate["holds"] == (certificate["penetration"] <= LOCATED_OVERLAP)
-    assert certificate["events"] > 100
+    assert certificate["events"] > 50
     assert 0 < certificate["held_steps"] < 360
     lowest = simulation.pose[1 + 2 * (dimension - 1) :, dimension - 1].min()
     assert lowest > 0.15  # nothing sinks into the floor: least half width .2
@@ -82,7 +82,7 @@ def test_a_hard_impact_is_located_in_a_held_step_as_well():
     """A ball that flies a hundred diameters a step bounces between walls while it shares the world with a pile."""
     rng = np.random.default_rng(1)
     bodies = [half_space((0.0, 1.0)), half_space((1.0, 0.0), -1.5), half_space((-1.0, 0.0), -1.5)]
-    for k in range(6):
+    for k in range(14):
         place = (rng.uniform(-0.8, 0.8), 0.8 + 0.9 * k)
         bodies.append(tilted(2, rng, place, 10.0 ** rng.uniform(-1.0, 1.0)))
     speed, end = 480.0, 1.49
@@ -189,3 +189,23 @@ def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
     assert np.abs(simulation.twist[-1]).max() <= 1e-15
     assert simulation.certificate["held_steps"] == 0
     assert simulation.certificate["events"] == 3
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_block_that_slides_past_the_end_of_another_stays_on_it_until_its_centre_is_past(free):
+    """Faces stay flush: the corner that leaves hands its contact on to that of the block below."""
+    mass, below = 5.0, (0.0, 0.5, 0.0)
+    table = (
+        Body(Box((1.0, 0.5)), mass, mass * 1.25 / 3.0, below)
+        if free
+        else Body(Box((1.0, 0.5)), motion="fixed", pose=below)
+    )
+    block = Body(Box((0.5, 0.1)), 1.0, 0.26 / 3.0, (0.3, 1.1, 0.0), (2.0, 0.0, 0.0))
+    simulation = Simulation(
+        Model(2, [half_space((0.0, 1.0)), table, block], (0.0, -G), 0.0, 0.1), Settings.reference(DT)
+    )
+    while simulation.pose[2, 0] < 1.0 - 2.0 * DT:
+        simulation.advance(1)
+        assert simulation.pose[2, 1:] == pytest.approx([1.1, 0.0], abs=1e-12)
+    assert simulation.certificate["penetration"] < 1e-14
+    assert simulation.certificate["events"] > 0

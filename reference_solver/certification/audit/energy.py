@@ -40,7 +40,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, float]:
     most = np.zeros(len(pieces))
     np.add.at(most, owner, np.where(free, before + after + np.abs(load), 0.0))
     # What loads do to all free bodies in a step: at rest, all that there is of kinetic energy is round-off.
-    usual = float(run.mass[run.free].sum() * (run.pull * run.dt) ** 2) or 1.0
+    usual = float((run.mass * np.maximum(run.pull * run.dt, run.still) ** 2)[run.free].sum()) or 1.0
     mixed = np.zeros(len(pieces), bool)
     a, b = pieces.body_a, pieces.body_b
     lawful = (run.model.restitution[a, b] > 0.0) & (run.model.friction[a, b] > 0.0)

@@ -78,7 +78,7 @@ def _momentum(run: Run) -> float:
     linear, _, size, _ = run.pushed
     defect = np.linalg.norm(after - before - linear - load, axis=1)
     scale = np.linalg.norm(before, axis=1) + np.linalg.norm(after, axis=1) + size + np.linalg.norm(load, axis=1)
-    return _worst(defect, scale, run.free[pieces.body])
+    return _worst(defect, scale + mass[:, 0] * run.still[pieces.body], run.free[pieces.body])
 
 
 def _spin(run: Run) -> float:
@@ -99,7 +99,7 @@ def _spin(run: Run) -> float:
     gained = np.where(run.is_frozen[run.owner][:, None], gained, gained + cross(way, mass * last) - cross(over, force))
     # A body that spins about nothing has the momentum that its speed gives to a point at its outermost.
     arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
-    speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
+    speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1) + run.still[body]
     parts = (np.linalg.norm(x, axis=1) for x in (before, after, torque))
     scale = sum(parts) + moment_size + arm * (run.mass[body] * speed + size)
     return _worst(np.linalg.norm(gained, axis=1), scale, run.free[body])

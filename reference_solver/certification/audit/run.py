@@ -16,6 +16,10 @@ from reference_solver.shapes import smallest_extent
 Indices = NDArray[np.int64]
 
 
+#: Share of the smallest half width that is a few units in the last place of a place.
+UNITS = 1e-15
+
+
 @dataclass(frozen=True)
 class Run:
     """A model and the pieces of one run of it, with what follows for each *row*: one body in one piece.
@@ -66,6 +70,11 @@ class Run:
         """Smallest half width of all bodies that have one [m]."""
         finite = self.extent[np.isfinite(self.extent)]
         return float(finite.min()) if len(finite) else 1.0
+
+    @cached_property
+    def still(self) -> Array:
+        """(n,) speed [m/s] below which a body stands still: a few units in the last place of its size in a step."""
+        return UNITS * self.extent / self.dt
 
     @cached_property
     def reach(self) -> Array:

@@ -265,3 +265,31 @@ def test_a_turn_that_begins_at_rest_is_bounded():
     path[2, 1] = 0.02 / DT**2
     t = meet(WALL, Box(half), ((0.0,) * 3, (0.0, height, 0.0)), (STILL, path))
     assert 0.02 * (t / DT) ** 2 == pytest.approx(angle, rel=1e-11)
+
+
+@pytest.mark.parametrize("rise", [0.0, 50.0])
+@pytest.mark.parametrize("spin", [0.5, 5.0])
+def test_a_corner_over_a_face_that_turns_is_not_met_before_it_comes_down(spin, rise):
+    """One end of the face comes up along the fixed normal, however far from it the corner is."""
+    angle, gap = 0.3, 1e-10
+    small = Box((0.2, 0.2))
+    lever = np.array([0.2 * (np.cos(angle) - np.sin(angle)), -0.2 * (np.cos(angle) + np.sin(angle))])
+    lowest = outline(small, np.array([[0.0, 0.0, angle]]))[0]
+    lever = lowest[lowest[:, 1].argmin()]
+    start = ((0.0, 0.0, 0.0), (0.1 - lever[0], 1.0 + gap - lever[1], angle))
+    paths = np.zeros((2, 3, 5))
+    # both turn about the first one's centre; the second rises as well
+    paths[:, 2, 0] = spin
+    paths[1, 0, 0], paths[1, 1, 0] = -spin * start[1][1], spin * start[1][0]
+    paths[1, 0, 1], paths[1, 1, 1] = -0.5 * spin**2 * start[1][0], -0.5 * spin**2 * start[1][1] + 0.5 * rise
+    t = meet(Box((1.0, 1.0)), small, start, paths)
+    times = np.linspace(0.0, DT, 2000)[1:]
+    corner = np.stack([outline(small, poses(start[1], paths[1], times))[:, k] for k in range(4)], axis=1)
+    c, s = np.cos(spin * times)[:, None], np.sin(spin * times)[:, None]
+    height = (c * corner[..., 1] - s * corner[..., 0]).min(axis=1) - 1.0
+    first = times[np.nonzero(height < -TOUCHING)[0][0]] if (height < -TOUCHING).any() else math.inf
+    assert t <= first
+    if first == math.inf:
+        assert t == math.inf
+    else:
+        assert t > 1e-3 * first
