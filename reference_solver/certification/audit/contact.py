@@ -104,9 +104,12 @@ def _reduced_mass(run: Run) -> Array:
 
 
 def _speeds(run: Run) -> Array:
-    """Speeds (c,) whose differences a contact's velocity is: of both points, before and after, and of loads [m/s]."""
+    """Speeds (c,) whose differences a contact's velocity is: of both points, before and after, and of loads [m/s].
+
+    At least what moves a body by some units in the last place of its size.
+    """
     pieces = run.pieces
-    total = np.full(len(pieces.body_a), run.pull * run.dt)
+    total = run.pull * run.dt + 2.0 * np.minimum(run.still[pieces.body_a], run.still[pieces.body_b])
     for i, row in ((pieces.body_a, run.side[0]), (pieces.body_b, run.side[1])):
         arm = pieces.point - np.where((row >= 0)[:, None], pieces.pose_before[row, : run.d], pieces.point)
         far = np.linalg.norm(arm, axis=1)
