@@ -3,7 +3,19 @@
 One module per group of subcommands; importing it registers them.
 """
 
-from reports.command import accepting, benching, certifying, comparing, inspecting, reporting, running, showing, tuning
+from reports.command import (
+    accepting,
+    benching,
+    certifying,
+    comparing,
+    inspecting,
+    keeping,
+    releasing,
+    reporting,
+    running,
+    showing,
+    tuning,
+)
 from reports.command.group import main
 
 __all__ = [
@@ -12,7 +24,9 @@ __all__ = [
     "certifying",
     "comparing",
     "inspecting",
+    "keeping",
     "main",
+    "releasing",
     "reporting",
     "running",
     "showing",
