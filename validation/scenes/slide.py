@@ -17,11 +17,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import at, block, floor, upward
+from validation.scenes.parts import at, block, floor, states, upward
 
 HEIGHT = 0.5
 #: Runs on for this long after it should have stopped, as a share of the time to stop.
@@ -132,11 +132,6 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return found
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
-
-
 def track(scene: Scene) -> Track:
     """The exact parabola, until it stops."""
     p, start, heading = scene.params, scene.bodies[1].pose[: scene.dimension], _heading(scene)
@@ -179,7 +174,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(Variation({}), Variation({"heading": 22.5}, dimensions=(3,)), Variation({"heading": 45.0}, dimensions=(3,))),
     full=(
