@@ -116,6 +116,11 @@ def steady() -> Bound:
 # ---- what sticks or slides ----
 
 
+def straight(g: float, dt: float, way: float) -> Bound:
+    """Distance [m] from a straight line of what slides or rolls ``way`` [m] along it."""
+    return Bound(g * dt * dt + ROUND_OFF * way, "one step of a force across the path: g dt^2")
+
+
 def stuck(g: float, dt: float, duration: float) -> Bound:
     """Mean speed [m/s] of what sticks."""
     because = "a sticking box may move by what one step of free fall adds, g dt^2, over the whole run"

@@ -133,6 +133,18 @@ def lateral_drift(trajectory: Trajectory) -> float:
     return float(np.linalg.norm(moved, axis=1).max())
 
 
+def hop(trajectory: Trajectory, body: int = 1) -> float:
+    """Largest change of a body's height, up or down [m]."""
+    height = trajectory.pose[:, body, trajectory.dimension - 1]
+    return float(np.abs(height - height[0]).max())
+
+
+def astray(trajectory: Trajectory, line: Array, body: int = 1) -> float:
+    """Largest level distance of a body from the ``line`` (d - 1,) through its start [m]; 0 in the plane."""
+    way = trajectory.pose[:, body, : trajectory.dimension - 1] - trajectory.pose[0, body, : trajectory.dimension - 1]
+    return float(np.linalg.norm(way - np.outer(way @ line, line), axis=1).max())
+
+
 def deepest_overlap(scene: Scene, trajectory: Trajectory) -> float:
     """Deepest overlap of neighbouring bodies at any sample, >= 0 [m]."""
     bodies, pose = scene.bodies, trajectory.pose

@@ -230,3 +230,60 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         )
     ),
 )
+
+EXPERIMENTS += (
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-drag",
+            "without drag the ball slides, rolls and spins as it should; solving further does nothing",
+            "default",
+            scene,
+            metric,
+            _NO_DRAG,
+            params,
+            dimension,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for scene, metric, params, dimension in (
+            ("slide_to_roll", "final_speed", {}, 2),
+            ("slide_to_roll", "rolling_time", {"mu": 0.1}, 3),
+            ("slide_to_roll", "rolling_place", {}, 2),
+            ("roll_incline", "acceleration", {"ratio": 0.99}, 2),
+            ("roll_incline", "turning", {"ratio": 1.5}, 3),
+            ("rolling_spin", "spin", {}, 3),
+            ("rolling_spin", "speed", {}, 3),
+            ("masse", "final_vy", {}, 3),
+            ("masse", "turned", {}, 3),
+            ("masse", "end_y", {}, 3),
+        )
+    ),
+    *(
+        Experiment(
+            family,
+            "without speculation, push-out, slop, drag and thresholds the bounce is exact",
+            profile,
+            "oblique",
+            metric,
+            off,
+            {"mu": 0.1},
+            idle=idle,
+        )
+        for family, profile, off, idle, metrics in (
+            (
+                "oblique-shipped-contact",
+                "default",
+                _BARE,
+                (_NO_DRAG,),
+                ("rebound_ratio", "forward_speed", "spin_speed"),
+            ),
+            (
+                "oblique-push-out",
+                "one",
+                {"contactERP": 0.0, "contactSlop": 0.0},
+                ({"iterations": 1000},),
+                ("rebound_ratio", "forward_speed"),
+            ),
+        )
+        for metric in metrics
+    ),
+)

@@ -154,3 +154,57 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ),
     )
 )
+
+#: Family, what is shown, profile, scene, metric, switched off, parameters.
+_Row = tuple[str, str, str, str, str, dict[str, Any], dict[str, float]]
+_ASKEW: dict[str, float] = {"back": 4.0, "side": 1.0}
+_TURNED: dict[str, float] = {"mu": 0.1, "heading": 30.0}
+_CONE = "an elliptic cone does not know the heading; solving the pyramid further does nothing"
+_BALLS: tuple[_Row, ...] = (
+    ("oblique-pyramid", _CONE, "default", "oblique", "sideways", {"cone": "elliptic"}, _TURNED),
+    (
+        "oblique-pyramid",
+        "with the velocity reflected in the step after contact, and friction too slow to lift, e is exact",
+        "default",
+        "oblique",
+        "rebound_ratio",
+        _REFLECT | {"solreffriction": (0.05, 1.0)},
+        _TURNED,
+    ),
+    *(
+        ("slide-to-roll-pyramid", _CONE, "default", "slide_to_roll", metric, _SLIDE, {"heading": 30.0})
+        for metric in ("rolling_time", "rolling_place", "astray")
+    ),
+    *(
+        (
+            "rolling-spin-soft-contact",
+            "with rigid contacts that start with the touch the ball does not sink in",
+            "default",
+            "rolling_spin",
+            "hop",
+            _HOLD,
+            params,
+        )
+        for params in (dict[str, float](), {"v": 0.0, "spin": 50.0})
+    ),
+    ("masse-pyramid", _CONE, "default", "masse", "end_x", {"cone": "elliptic"}, {}),
+    ("masse-pyramid", _CONE, "default", "masse", "end_y", {"cone": "elliptic"}, {}),
+    ("masse-pyramid", _CONE, "default", "masse", "end_y", {"cone": "elliptic"}, _ASKEW),
+    ("masse-pyramid", _CONE, "default", "masse", "turned", {"cone": "elliptic"}, _ASKEW),
+    *(
+        (
+            "masse-slip-lifts",
+            "friction damped so slowly that it stops no slip in a step lifts nothing",
+            "tuned",
+            "masse",
+            "hop",
+            {"solreffriction": (1.0, 1.0)},
+            params,
+        )
+        for params in (dict[str, float](), _ASKEW)
+    ),
+)
+EXPERIMENTS += tuple(
+    Experiment(family, says, profile, scene, metric, off, params, 3, idle=({"tolerance": 0.0},))
+    for family, says, profile, scene, metric, off, params in _BALLS
+)

@@ -21,4 +21,9 @@ OURS = (
     "v_groove",
     "pinch",
     "slide",
+    "slide_to_roll",
+    "oblique",
+    "roll_incline",
+    "rolling_spin",
+    "masse",
 )

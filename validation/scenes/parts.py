@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from adapters.scene import Body, Box, Disc, HalfSpace, Sphere
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.trajectory import Sampling
 from validation.canonical import Parameter
 
@@ -57,6 +61,12 @@ def cube(name: str, dimension: int, mass: float, side: float, height: float) -> 
 def along(dimension: int, x: float, height: float = 0.0) -> tuple[float, ...]:
     """Vector with ``x`` along the first axis and ``height`` along the vertical."""
     return (x, *(0.0,) * (dimension - 2), height)
+
+
+def heading(scene: Scene) -> Array:
+    """Unit vector of a motion along the floor, (d - 1,): parameter ``heading`` [degrees], of spatial scenes."""
+    angle = math.radians(scene.params.get("heading", 0.0))
+    return np.array([1.0] if scene.dimension == 2 else [math.cos(angle), math.sin(angle)])
 
 
 def at(body: Body, dimension: int, position: tuple[float, ...], velocity: tuple[float, ...] = ()) -> Body:
