@@ -287,3 +287,29 @@ EXPERIMENTS += (
         for metric in metrics
     ),
 )
+
+EXPERIMENTS += (
+    Experiment(
+        "pivot-residual",
+        "without the residual at which it stops the box does not twist; more sweeps alone change nothing",
+        "default",
+        "pivot",
+        "twisted",
+        {"solverResidualThreshold": 0.0},
+        dimension=3,
+        idle=({"iterations": 1000},),
+    ),
+    *(
+        Experiment(
+            "rocking-block-drag",
+            "without drag the block rocks as high as it should; solving further does nothing",
+            "default",
+            "rocking_block",
+            metric,
+            _NO_DRAG,
+            params,
+            idle=({"solverResidualThreshold": 0.0}, {"contactERP": 0.0}, {"contactProcessingThreshold": 0.0}),
+        )
+        for metric, params in (("amplitude[1]", {"aspect": 0.5, "tilt": 0.7}), ("amplitude[3]", {}))
+    ),
+)

@@ -54,3 +54,15 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
     )
     for metric in metrics
 )
+
+EXPERIMENTS += (
+    Experiment(
+        "pivot-starved",
+        "with more sweeps nothing is left to be seen",
+        "classical",
+        "pivot",
+        "twisted",
+        {"iterations": 1000},
+        dimension=3,
+    ),
+)

@@ -26,4 +26,6 @@ OURS = (
     "roll_incline",
     "rolling_spin",
     "masse",
+    "pivot",
+    "rocking_block",
 )

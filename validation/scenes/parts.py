@@ -75,6 +75,14 @@ def at(body: Body, dimension: int, position: tuple[float, ...], velocity: tuple[
     return replace(body, pose=pose_at(dimension, position), twist=(*(velocity or (0.0,) * dimension), *spin))
 
 
+def tilted(body: Body, dimension: int, place: tuple[float, float], tilt: float) -> Body:
+    """The body at ``place`` (along, up) [m], turned by ``tilt`` [rad] counter-clockwise in the plane of both."""
+    if dimension == 2:
+        return replace(body, pose=(*place, tilt))
+    half = 0.5 * tilt
+    return replace(body, pose=(place[0], 0.0, place[1], math.cos(half), 0.0, -math.sin(half), 0.0))
+
+
 def block(name: str, dimension: int, mass: float, width: float, height: float) -> Body:
     """Uniform box at the origin, as deep as it is wide; I = m (a^2 + b^2)/12 about each principal axis."""
     upright = mass * (width**2 + height**2) / 12.0
