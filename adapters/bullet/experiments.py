@@ -312,4 +312,33 @@ EXPERIMENTS += (
         )
         for metric, params in (("amplitude[1]", {"aspect": 0.5, "tilt": 0.7}), ("amplitude[3]", {}))
     ),
+    *(
+        Experiment(
+            "tumble-drag", "without drag the box tumbles as it should", "default", "tumble", metric, _NO_DRAG, {}, 3
+        )
+        for metric in ("flip_time", "momentum_drift", "energy_drift")
+    ),
+    *(
+        Experiment(
+            family,
+            "without speculation, push-out, slop, drag and thresholds each pair has its own e and mu",
+            profile,
+            "pair_matrix",
+            metric,
+            off,
+            idle=idle,
+        )
+        for family, profile, off, idle, metrics in (
+            ("pair-matrix-shipped-contact", "default", _BARE, (_NO_DRAG,), ("restitution[1]",)),
+            ("pair-matrix-shipped-contact", "default", _BARE, (), ("friction[1]", "friction[3]")),
+            (
+                "pair-matrix-push-out",
+                "one",
+                {"contactERP": 0.0, "contactSlop": 0.0},
+                ({"iterations": 1000},),
+                ("restitution[1]", "restitution[4]"),
+            ),
+        )
+        for metric in metrics
+    ),
 )

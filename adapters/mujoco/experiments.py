@@ -208,3 +208,21 @@ EXPERIMENTS += tuple(
     Experiment(family, says, profile, scene, metric, off, params, 3, idle=({"tolerance": 0.0},))
     for family, says, profile, scene, metric, off, params in _BALLS
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        family,
+        "with the velocity reflected in the step after contact, and friction too slow to lift, e is exact",
+        profile,
+        "pair_matrix",
+        "restitution[1]",
+        off,
+        dimension=dimension,
+        idle=({"tolerance": 0.0},) if profile == "default" else ({"impratio": 100.0},),
+    )
+    for family, profile, off in (
+        ("pair-matrix-soft-contact", "default", _REFLECT | {"solreffriction": (0.05, 1.0)}),
+        ("pair-matrix-slip-lifts", "tuned", {"solreffriction": (0.05, 1.0)}),
+    )
+    for dimension in (2, 3)
+)

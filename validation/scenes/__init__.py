@@ -28,4 +28,6 @@ OURS = (
     "masse",
     "pivot",
     "rocking_block",
+    "tumble",
+    "pair_matrix",
 )
