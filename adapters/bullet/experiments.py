@@ -341,4 +341,17 @@ EXPERIMENTS += (
         )
         for metric in metrics
     ),
+    *(
+        Experiment(
+            "rocker-drag",
+            "without drag the board swings on; solving further does nothing",
+            "default",
+            "rocker",
+            "amplitude",
+            _NO_DRAG,
+            params,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for params in (dict[str, float](), {"tilt": 5.0})
+    ),
 )

@@ -226,3 +226,17 @@ EXPERIMENTS += tuple(
     )
     for dimension in (2, 3)
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "rocker-soft-contact",
+        "with the stiffest impedance the board swings on; an elliptic cone alone, or solving further, does not do it",
+        "default",
+        "rocker",
+        "amplitude",
+        off,
+        params,
+        idle=({"cone": "elliptic"}, {"tolerance": 0.0}),
+    )
+    for params, off in ((dict[str, float](), {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)}), ({"tilt": 5.0}, _HOLD))
+)

@@ -30,4 +30,5 @@ OURS = (
     "rocking_block",
     "tumble",
     "pair_matrix",
+    "rocker",
 )
