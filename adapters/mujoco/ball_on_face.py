@@ -60,11 +60,11 @@ def _path(ball: BallOnFace, steps: int, height: float, twist: Triple) -> Array:
 
 def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
     """The problem of a scene with one ball and one rough face, or None if it is not that."""
-    if len(scene.bodies) != 2 or not isinstance(scene.bodies[1].shape, Disc | Sphere):
+    if len(scene.bodies) != 2:
         return None
     face, body = scene.bodies
-    friction = scene.material(face.name, body.name).friction
-    if not (isinstance(face.shape, HalfSpace) and friction):
+    friction, shape = scene.material(face.name, body.name).friction, body.shape
+    if not (isinstance(shape, Disc | Sphere) and isinstance(face.shape, HalfSpace) and friction):
         return None  # smooth: the scalar law's
     settings, contact = settings_of(profile, scene, dt), law_of(profile, scene, dt)
     own = pair_solreffriction(settings, dt)
@@ -76,7 +76,7 @@ def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
         ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else contact.damping,
         settings["impratio"],
         0.0,
-        body.shape.radius,
+        shape.radius,
         moment / body.mass,
         (scene.gravity[0], scene.gravity[-1]),
     )

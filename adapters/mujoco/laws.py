@@ -26,8 +26,8 @@ _BECAUSE = {
     ("tuned", "slide"): "friction couples to the normal: a sliding box hops, and friction is that of its hops",
     ("default", "rolling"): "contact is a soft spring of 0.02 s, friction is viscous and couples to the normal: a ball "
     "sinks in, and one that slides is thrown up",
-    ("tuned", "rolling"): "friction couples to the normal, as the cone is convex without complementarity: what stops the "
-    "slip lifts the ball",
+    ("tuned", "rolling"): "friction couples to the normal, as the cone is convex without complementarity: what stops "
+    "the slip lifts the ball",
     ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
     ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
     "corners, a blow is off by 1e-4 of it",

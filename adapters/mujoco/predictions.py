@@ -55,6 +55,7 @@ SUM_ROUND_OFF = 1e-12
 
 
 def settings_of(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
+    """Settings of a profile by their names, as a scene needs them."""
     return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
 
 
