@@ -354,4 +354,16 @@ EXPERIMENTS += (
         )
         for params in (dict[str, float](), {"tilt": 5.0})
     ),
+    *(
+        Experiment(
+            "hilltop-drag",
+            "without drag the disc leaves where it should; solving further does nothing",
+            "default",
+            "hilltop",
+            metric,
+            _NO_DRAG,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for metric in ("level_speed", "leaving_angle", "leaving_time")
+    ),
 )

@@ -240,3 +240,32 @@ EXPERIMENTS += tuple(
     )
     for params, off in ((dict[str, float](), {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)}), ({"tilt": 5.0}, _HOLD))
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "hilltop-soft-friction",
+        "with stiffer friction, or damped as the normal, the disc rolls; the share of softness alone changes nothing",
+        "tuned",
+        "hilltop",
+        metric,
+        off,
+        idle=({"impratio": 1.0}, {"margin": 0.0}),
+    )
+    for metric in ("level_speed", "leaving_angle")
+    for off in ({"solreffriction": (0.01, 1.0)}, {"solreffriction": None})
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "hilltop-soft-contact",
+        "with stiffer contacts the disc leaves where it should; solving further does nothing",
+        "default",
+        "hilltop",
+        metric,
+        off,
+        {"mu": 0.1},
+        idle=({"tolerance": 0.0},),
+    )
+    for metric in ("level_speed", "leaving_angle")
+    for off in ({"solref": (0.01, 1.0)}, {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)})
+)

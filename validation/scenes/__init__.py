@@ -31,4 +31,5 @@ OURS = (
     "tumble",
     "pair_matrix",
     "rocker",
+    "hilltop",
 )
