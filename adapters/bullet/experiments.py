@@ -366,4 +366,22 @@ EXPERIMENTS += (
         )
         for metric in ("level_speed", "leaving_angle", "leaving_time")
     ),
+    Experiment(
+        "thin-wall-shipped-contact",
+        "without speculation, push-out, slop, drag and thresholds the rebound is exact; without drag alone it is not",
+        "default",
+        "thin_wall",
+        "rebound_ratio",
+        _BARE,
+        idle=(_NO_DRAG,),
+    ),
+    Experiment(
+        "thin-wall-push-out",
+        "without push-out (and slop) the rebound is exact",
+        "one",
+        "thin_wall",
+        "rebound_ratio",
+        {"contactERP": 0.0, "contactSlop": 0.0},
+        idle=({"iterations": 1000},),
+    ),
 )

@@ -269,3 +269,16 @@ EXPERIMENTS += tuple(
     for metric in ("level_speed", "leaving_angle")
     for off in ({"solref": (0.01, 1.0)}, {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)})
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "thin-wall-soft-contact",
+        "with the velocity reflected in the step after contact the rebound is exact; solving further does nothing",
+        "default",
+        "thin_wall",
+        metric,
+        _REFLECT,
+        idle=({"tolerance": 0.0},),
+    )
+    for metric in ("rebound_ratio", "beyond")
+)

@@ -7,6 +7,7 @@ from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
+from adapters.unswept import passing_law
 
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
@@ -88,4 +89,19 @@ DEVIATIONS: tuple[Deviation, ...] = (
         _deviation(profile, "incline", "acceleration", incline_law(profile, "acceleration"), "incline")
         for profile in PROFILES
     ),
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "mujoco",
+        (profile,),
+        "thin_wall",
+        metric,
+        passing_law(metric),
+        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+        "MuJoCo documentation, computation: collision detection at the start of a step",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for metric in ("rebound_ratio", "beyond")
 )

@@ -32,4 +32,5 @@ OURS = (
     "pair_matrix",
     "rocker",
     "hilltop",
+    "thin_wall",
 )
