@@ -31,7 +31,7 @@ def passing_law(metric: str) -> Law:
             return None
         if any(ball.twist[1:]):
             return None
-        times = np.arange(step_count(scene.duration, dt) + 1) * dt
+        times = np.array([k * dt for k in range(step_count(scene.duration, dt) + 1)])
         x, reach = ball.pose[0] + ball.twist[0] * times, plate.shape.half_extents[0] + ball.shape.radius
         if (np.abs(x - plate.pose[0]) <= reach).any() or not (x[0] - plate.pose[0]) * (x[-1] - plate.pose[0]) < 0.0:
             return None

@@ -385,3 +385,22 @@ EXPERIMENTS += (
         idle=({"iterations": 1000},),
     ),
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-sweeps",
+        "solved to the end (no residual stop, 1000 sweeps) the stack stands",
+        profile,
+        "overhang",
+        metric,
+        {"solverResidualThreshold": 0.0, "iterations": 1000},
+        params,
+    )
+    for profile, metric, params in (
+        ("default", "settle_time", dict[str, float]()),
+        ("default", "drift", {"margin": 0.02}),
+        ("default", "kinetic_energy", dict[str, float]()),
+        ("one", "penetration", dict[str, float]()),
+        ("one", "drift", {"margin": 0.02}),
+    )
+)

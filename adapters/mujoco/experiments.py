@@ -282,3 +282,17 @@ EXPERIMENTS += tuple(
     )
     for metric in ("rebound_ratio", "beyond")
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-soft-contact",
+        "with rigid contacts that start with the touch nothing sinks; solving further does nothing",
+        "default",
+        "overhang",
+        "penetration",
+        _HOLD,
+        params,
+        idle=({"tolerance": 0.0},),
+    )
+    for params in (dict[str, float](), {"margin": 0.02})
+)

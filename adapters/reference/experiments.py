@@ -66,3 +66,16 @@ EXPERIMENTS += (
         dimension=3,
     ),
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-starved",
+        "with more sweeps nothing is left to be seen",
+        "classical",
+        "overhang",
+        "penetration",
+        {"iterations": 1000},
+        params,
+    )
+    for params in (dict[str, float](), {"margin": 0.02})
+)

@@ -33,4 +33,5 @@ OURS = (
     "rocker",
     "hilltop",
     "thin_wall",
+    "overhang",
 )
