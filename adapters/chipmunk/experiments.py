@@ -120,7 +120,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
 EXPERIMENTS += tuple(
     Experiment(
         "overhang-touching-start",
-        "with 1000 sweeps from a start inside the slop nothing lifts off; such a start alone, or a smaller slop, do not",
+        "with 1000 sweeps from a start inside the slop nothing lifts off; such a start or a smaller slop alone do not",
         "default",
         "overhang",
         "penetration",
