@@ -12,6 +12,7 @@ A fixed-step method that locates contact within a step cannot be asked for less 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from validation.canonical import Check
@@ -46,6 +47,11 @@ class Bound:
 def exact(scale: float = 1.0) -> Bound:
     """A law that holds at every dt; ``scale`` is the size of the numbers that are added, in the metric's unit."""
     return Bound(ROUND_OFF * scale, "exact law at every dt: only round-off of at most 1000 velocity updates remains")
+
+
+def exact_laws(scales: Mapping[str, tuple[str, float]], truth: Mapping[str, float], source: str) -> list[Check]:
+    """One `exact` check per metric; ``scales``: its unit and the size of the numbers that are added."""
+    return [exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
 
 
 def bookkeeping(scale: float = 1.0) -> Bound:
@@ -108,6 +114,11 @@ def steady() -> Bound:
 
 
 # ---- what sticks or slides ----
+
+
+def straight(g: float, dt: float, way: float) -> Bound:
+    """Distance [m] from a straight line of what slides or rolls ``way`` [m] along it."""
+    return Bound(g * dt * dt + ROUND_OFF * way, "one step of a force across the path: g dt^2")
 
 
 def stuck(g: float, dt: float, duration: float) -> Bound:

@@ -48,7 +48,8 @@ def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT
     One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault.
     """
     seen: dict[tuple[str, str, str], float | None] = {}
-    cells = [(name, params) for name, canonical in CATALOGUE.items() for params in canonical.planted]
+    there = {name: canonical for name, canonical in CATALOGUE.items() if dimension in canonical.dimensions}
+    cells = [(name, params) for name, canonical in there.items() for params in canonical.planted]
     for scene, params in cells:
         healthy = _watchers(engine, profile, scene, params, dimension, dt)
         for fault in SIZED:

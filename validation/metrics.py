@@ -29,6 +29,8 @@ WORDS = {
     "impulse_scatter": "shakes: loads scatter by {value}",
     "rest_time": "rests after {value}",
 }
+#: Said of a time at which a value that was waited for did not come.
+NOT_PASSED = "it never gets there"
 #: Begins the reason of a time that is only the end of the run: what has not come to rest has no time of rest.
 NEVER = "never settled"
 
@@ -131,6 +133,59 @@ def lateral_drift(trajectory: Trajectory) -> float:
     d = trajectory.dimension
     moved = trajectory.pose[-1, :, : d - 1] - trajectory.pose[0, :, : d - 1]
     return float(np.linalg.norm(moved, axis=1).max())
+
+
+def hop(trajectory: Trajectory, body: int = 1) -> float:
+    """Largest change of a body's height, up or down [m]."""
+    height = trajectory.pose[:, body, trajectory.dimension - 1]
+    return float(np.abs(height - height[0]).max())
+
+
+def astray(trajectory: Trajectory, line: Array, body: int = 1) -> float:
+    """Largest level distance of a body from the ``line`` (d - 1,) through its start [m]; 0 in the plane."""
+    way = trajectory.pose[:, body, : trajectory.dimension - 1] - trajectory.pose[0, body, : trajectory.dimension - 1]
+    return float(np.linalg.norm(way - np.outer(way @ line, line), axis=1).max())
+
+
+def tilt(trajectory: Trajectory, body: int = 1) -> Array:
+    """Angle of a body in the upright plane along the first axis, counter-clockwise, whole turns counted, (s,) [rad]."""
+    pose = trajectory.pose[:, body]
+    if trajectory.dimension == 2:
+        return np.asarray(pose[:, 2])
+    turned = rotation(pose)
+    return np.unwrap(np.arctan2(turned[:, 2, 0], turned[:, 0, 0]))
+
+
+def tilt_rate(trajectory: Trajectory, body: int = 1) -> Array:
+    """Spin about the axis that `tilt` turns about, (s,) [rad/s]."""
+    return np.asarray(trajectory.twist[:, body, 2] if trajectory.dimension == 2 else -trajectory.twist[:, body, 4])
+
+
+def point(trajectory: Trajectory, body: int, place: tuple[float, ...]) -> Array:
+    """Where a point of a body that is at ``place`` in its own axes is, (s, d) [m]."""
+    d, pose = trajectory.dimension, trajectory.pose[:, body]
+    if d == 3:
+        return np.asarray(pose[:, :3] + rotation(pose) @ np.array(place))
+    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    x, y = place
+    return np.asarray(pose[:, :2] + np.column_stack([c * x - s * y, s * x + c * y]))
+
+
+def crossing(t: Array, value: Array, rate: Array, level: float) -> tuple[Measured, Measured]:
+    """Time at which ``value`` first rises through ``level``, and its rate then, on the cubic between two samples."""
+    over = np.flatnonzero((value[:-1] < level) & (value[1:] >= level))
+    if len(over) == 0:
+        return (None, NOT_PASSED), (None, NOT_PASSED)
+    k = int(over[0])
+    h = t[k + 1] - t[k]
+    # Cubic of both values and rates, over s from 0 to 1; one root at least lies in between.
+    a, b, da, db = value[k], value[k + 1], h * rate[k], h * rate[k + 1]
+    cubic = [2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db, da, a - level]
+    roots = np.roots(cubic)
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    inside = real[(real > -1e-9) & (real < 1.0 + 1e-9)]
+    s = float(np.clip(inside.min(), 0.0, 1.0)) if len(inside) else float((level - a) / (b - a))
+    return (float(t[k] + s * h), ""), (float(np.polyval(np.polyder(np.array(cubic)), s) / h), "")
 
 
 def deepest_overlap(scene: Scene, trajectory: Trajectory) -> float:

@@ -230,3 +230,177 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         )
     ),
 )
+
+EXPERIMENTS += (
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-drag",
+            "without drag the ball slides, rolls and spins as it should; solving further does nothing",
+            "default",
+            scene,
+            metric,
+            _NO_DRAG,
+            params,
+            dimension,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for scene, metric, params, dimension in (
+            ("slide_to_roll", "final_speed", {}, 2),
+            ("slide_to_roll", "rolling_time", {"mu": 0.1}, 3),
+            ("slide_to_roll", "rolling_place", {}, 2),
+            ("roll_incline", "acceleration", {"ratio": 0.99}, 2),
+            ("roll_incline", "turning", {"ratio": 1.5}, 3),
+            ("rolling_spin", "spin", {}, 3),
+            ("rolling_spin", "speed", {}, 3),
+            ("masse", "final_vy", {}, 3),
+            ("masse", "turned", {}, 3),
+            ("masse", "end_y", {}, 3),
+        )
+    ),
+    *(
+        Experiment(
+            family,
+            "without speculation, push-out, slop, drag and thresholds the bounce is exact",
+            profile,
+            "oblique",
+            metric,
+            off,
+            {"mu": 0.1},
+            idle=idle,
+        )
+        for family, profile, off, idle, metrics in (
+            (
+                "oblique-shipped-contact",
+                "default",
+                _BARE,
+                (_NO_DRAG,),
+                ("rebound_ratio", "forward_speed", "spin_speed"),
+            ),
+            (
+                "oblique-push-out",
+                "one",
+                {"contactERP": 0.0, "contactSlop": 0.0},
+                ({"iterations": 1000},),
+                ("rebound_ratio", "forward_speed"),
+            ),
+        )
+        for metric in metrics
+    ),
+)
+
+EXPERIMENTS += (
+    Experiment(
+        "pivot-residual",
+        "without the residual at which it stops the box does not twist; more sweeps alone change nothing",
+        "default",
+        "pivot",
+        "twisted",
+        {"solverResidualThreshold": 0.0},
+        dimension=3,
+        idle=({"iterations": 1000},),
+    ),
+    *(
+        Experiment(
+            "rocking-block-drag",
+            "without drag the block rocks as high as it should; solving further does nothing",
+            "default",
+            "rocking_block",
+            metric,
+            _NO_DRAG,
+            params,
+            idle=({"solverResidualThreshold": 0.0}, {"contactERP": 0.0}, {"contactProcessingThreshold": 0.0}),
+        )
+        for metric, params in (("amplitude[1]", {"aspect": 0.5, "tilt": 0.7}), ("amplitude[3]", {}))
+    ),
+    *(
+        Experiment(
+            "tumble-drag", "without drag the box tumbles as it should", "default", "tumble", metric, _NO_DRAG, {}, 3
+        )
+        for metric in ("flip_time", "momentum_drift", "energy_drift")
+    ),
+    *(
+        Experiment(
+            family,
+            "without speculation, push-out, slop, drag and thresholds each pair has its own e and mu",
+            profile,
+            "pair_matrix",
+            metric,
+            off,
+            idle=idle,
+        )
+        for family, profile, off, idle, metrics in (
+            ("pair-matrix-shipped-contact", "default", _BARE, (_NO_DRAG,), ("restitution[1]",)),
+            ("pair-matrix-shipped-contact", "default", _BARE, (), ("friction[1]", "friction[3]")),
+            (
+                "pair-matrix-push-out",
+                "one",
+                {"contactERP": 0.0, "contactSlop": 0.0},
+                ({"iterations": 1000},),
+                ("restitution[1]", "restitution[4]"),
+            ),
+        )
+        for metric in metrics
+    ),
+    *(
+        Experiment(
+            "rocker-drag",
+            "without drag the board swings on; solving further does nothing",
+            "default",
+            "rocker",
+            "amplitude",
+            _NO_DRAG,
+            params,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for params in (dict[str, float](), {"tilt": 5.0})
+    ),
+    *(
+        Experiment(
+            "hilltop-drag",
+            "without drag the disc leaves where it should; solving further does nothing",
+            "default",
+            "hilltop",
+            metric,
+            _NO_DRAG,
+            idle=({"solverResidualThreshold": 0.0, "iterations": 1000},),
+        )
+        for metric in ("level_speed", "leaving_angle", "leaving_time")
+    ),
+    Experiment(
+        "thin-wall-shipped-contact",
+        "without speculation, push-out, slop, drag and thresholds the rebound is exact; without drag alone it is not",
+        "default",
+        "thin_wall",
+        "rebound_ratio",
+        _BARE,
+        idle=(_NO_DRAG,),
+    ),
+    Experiment(
+        "thin-wall-push-out",
+        "without push-out (and slop) the rebound is exact",
+        "one",
+        "thin_wall",
+        "rebound_ratio",
+        {"contactERP": 0.0, "contactSlop": 0.0},
+        idle=({"iterations": 1000},),
+    ),
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-sweeps",
+        "solved to the end (no residual stop, 1000 sweeps) the stack stands",
+        profile,
+        "overhang",
+        metric,
+        {"solverResidualThreshold": 0.0, "iterations": 1000},
+        params,
+    )
+    for profile, metric, params in (
+        ("default", "settle_time", dict[str, float]()),
+        ("default", "drift", {"margin": 0.02}),
+        ("default", "kinetic_energy", dict[str, float]()),
+        ("one", "penetration", dict[str, float]()),
+        ("one", "drift", {"margin": 0.02}),
+    )
+)

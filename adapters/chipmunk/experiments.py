@@ -116,3 +116,17 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         for off in ({"iterations": 1000}, _INSIDE)
     ),
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-touching-start",
+        "with 1000 sweeps from a start inside the slop nothing lifts off; such a start or a smaller slop alone do not",
+        "default",
+        "overhang",
+        "penetration",
+        {"iterations": 1000, **_INSIDE},
+        params,
+        idle=(_INSIDE, {"collision_slop": 1e-5}),
+    )
+    for params in (dict[str, float](), {"margin": 0.02})
+)

@@ -7,7 +7,7 @@ spec           a scene as MuJoCo's own model
 simulation     one model and its data
 engine         the adapter
 releases       what older releases do differently, and how that is handled
-contact_law    one contact, as a scalar recurrence; box_on_face, blows and motions build on it
+contact_law    one contact, as a scalar recurrence; box_on_face, ball_on_face, blows and motions build on it
 """
 
 from adapters.mujoco.engine import MujocoEngine

@@ -49,6 +49,8 @@ class BoxOnFace:
         [m], [m], [m^2] (over the mass).
     load
         Acceleration without contact, along and up [m/s^2].
+    share
+        Contacts of the engine that each contact of the figure stands for.
     """
 
     law: ContactLaw
@@ -60,6 +62,7 @@ class BoxOnFace:
     half_height: float
     inertia: float
     load: tuple[float, float]
+    share: float = 2.0
 
     def slide(self, steps: int, velocity: float = 0.0) -> list[tuple[float, float]]:
         """Position and velocity along the face from a touching start, at samples 0 ... ``steps``."""
@@ -67,7 +70,10 @@ class BoxOnFace:
 
     def motion(self, steps: int, velocity: float = 0.0) -> list[tuple[Triple, Triple]]:
         """Poses and twists (along, up, turn) from a touching start, at samples 0 ... ``steps``."""
-        pose, twist = (0.0, self.half_height, 0.0), (velocity, 0.0, 0.0)
+        return self.path(steps, (0.0, self.half_height, 0.0), (velocity, 0.0, 0.0))
+
+    def path(self, steps: int, pose: Triple, twist: Triple) -> list[tuple[Triple, Triple]]:
+        """Poses and twists (along, up, turn) from any start, at samples 0 ... ``steps``."""
         path, acceleration = [(pose, twist)], (*self.load, 0.0)
         dt = self.law.dt
         for _ in range(steps):
@@ -117,7 +123,7 @@ class BoxOnFace:
         d = self.law.impedance(overlap)
         stiff = d / (4.0 * self.law.softness * (1.0 - d))
         rows: list[Row] = []
-        for mu, weight in ((self.mu, 2.0), (-self.mu, 2.0), (0.0, 4.0)):
+        for mu, weight in ((self.mu, self.share), (-self.mu, self.share), (0.0, 2.0 * self.share)):
             j = (mu, 1.0, along - mu * up)
             rows.append((j, -self.law.damping * _dot(j, twist) - self.law.stiffness * d * overlap, weight * stiff))
         return rows
@@ -126,7 +132,7 @@ class BoxOnFace:
         """Normal and friction row of one corner of the figure."""
         d = self.law.impedance(overlap)
         normal, slip = (0.0, 1.0, along), (1.0, 0.0, -up)
-        stiff = 2.0 * d / (self.law.softness * (1.0 - d))
+        stiff = self.share * d / (self.law.softness * (1.0 - d))
         reference = -self.law.damping * _dot(normal, twist) - self.law.stiffness * d * overlap
         return [
             (normal, reference, stiff),

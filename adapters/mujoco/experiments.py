@@ -154,3 +154,145 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ),
     )
 )
+
+#: Family, what is shown, profile, scene, metric, switched off, parameters.
+_Row = tuple[str, str, str, str, str, dict[str, Any], dict[str, float]]
+_ASKEW: dict[str, float] = {"back": 4.0, "side": 1.0}
+_TURNED: dict[str, float] = {"mu": 0.1, "heading": 30.0}
+_CONE = "an elliptic cone does not know the heading; solving the pyramid further does nothing"
+_BALLS: tuple[_Row, ...] = (
+    ("oblique-pyramid", _CONE, "default", "oblique", "sideways", {"cone": "elliptic"}, _TURNED),
+    (
+        "oblique-pyramid",
+        "with the velocity reflected in the step after contact, and friction too slow to lift, e is exact",
+        "default",
+        "oblique",
+        "rebound_ratio",
+        _REFLECT | {"solreffriction": (0.05, 1.0)},
+        _TURNED,
+    ),
+    *(
+        ("slide-to-roll-pyramid", _CONE, "default", "slide_to_roll", metric, _SLIDE, {"heading": 30.0})
+        for metric in ("rolling_time", "rolling_place", "astray")
+    ),
+    *(
+        (
+            "rolling-spin-soft-contact",
+            "with rigid contacts that start with the touch the ball does not sink in",
+            "default",
+            "rolling_spin",
+            "hop",
+            _HOLD,
+            params,
+        )
+        for params in (dict[str, float](), {"v": 0.0, "spin": 50.0})
+    ),
+    ("masse-pyramid", _CONE, "default", "masse", "end_x", {"cone": "elliptic"}, {}),
+    ("masse-pyramid", _CONE, "default", "masse", "end_y", {"cone": "elliptic"}, {}),
+    ("masse-pyramid", _CONE, "default", "masse", "end_y", {"cone": "elliptic"}, _ASKEW),
+    ("masse-pyramid", _CONE, "default", "masse", "turned", {"cone": "elliptic"}, _ASKEW),
+    *(
+        (
+            "masse-slip-lifts",
+            "friction damped so slowly that it stops no slip in a step lifts nothing",
+            "tuned",
+            "masse",
+            "hop",
+            {"solreffriction": (1.0, 1.0)},
+            params,
+        )
+        for params in (dict[str, float](), _ASKEW)
+    ),
+)
+EXPERIMENTS += tuple(
+    Experiment(family, says, profile, scene, metric, off, params, 3, idle=({"tolerance": 0.0},))
+    for family, says, profile, scene, metric, off, params in _BALLS
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        family,
+        "with the velocity reflected in the step after contact, and friction too slow to lift, e is exact",
+        profile,
+        "pair_matrix",
+        "restitution[1]",
+        off,
+        dimension=dimension,
+        idle=({"tolerance": 0.0},) if profile == "default" else ({"impratio": 100.0},),
+    )
+    for family, profile, off in (
+        ("pair-matrix-soft-contact", "default", _REFLECT | {"solreffriction": (0.05, 1.0)}),
+        ("pair-matrix-slip-lifts", "tuned", {"solreffriction": (0.05, 1.0)}),
+    )
+    for dimension in (2, 3)
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "rocker-soft-contact",
+        "with the stiffest impedance the board swings on; an elliptic cone alone, or solving further, does not do it",
+        "default",
+        "rocker",
+        "amplitude",
+        off,
+        params,
+        idle=({"cone": "elliptic"}, {"tolerance": 0.0}),
+    )
+    for params, off in ((dict[str, float](), {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)}), ({"tilt": 5.0}, _HOLD))
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "hilltop-soft-friction",
+        "with stiffer friction, or damped as the normal, the disc rolls; the share of softness alone changes nothing",
+        "tuned",
+        "hilltop",
+        metric,
+        off,
+        idle=({"impratio": 1.0}, {"margin": 0.0}),
+    )
+    for metric in ("level_speed", "leaving_angle")
+    for off in ({"solreffriction": (0.01, 1.0)}, {"solreffriction": None})
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "hilltop-soft-contact",
+        "with stiffer contacts the disc leaves where it should; solving further does nothing",
+        "default",
+        "hilltop",
+        metric,
+        off,
+        {"mu": 0.1},
+        idle=({"tolerance": 0.0},),
+    )
+    for metric in ("level_speed", "leaving_angle")
+    for off in ({"solref": (0.01, 1.0)}, {"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)})
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "thin-wall-soft-contact",
+        "with the velocity reflected in the step after contact the rebound is exact; solving further does nothing",
+        "default",
+        "thin_wall",
+        metric,
+        _REFLECT,
+        idle=({"tolerance": 0.0},),
+    )
+    for metric in ("rebound_ratio", "beyond")
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-soft-contact",
+        "with rigid contacts that start with the touch nothing sinks; solving further does nothing",
+        "default",
+        "overhang",
+        "penetration",
+        _HOLD,
+        params,
+        idle=({"tolerance": 0.0},),
+    )
+    for params in (dict[str, float](), {"margin": 0.02})
+)

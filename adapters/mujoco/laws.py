@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from adapters.law import Deviation, Law, exactly
+from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
+from adapters.unswept import passing_law
 
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
@@ -23,9 +25,19 @@ _BECAUSE = {
         "slide",
     ): "friction is viscous and couples to the normal: a sliding box is thrown up and brakes unevenly",
     ("tuned", "slide"): "friction couples to the normal: a sliding box hops, and friction is that of its hops",
+    ("default", "rolling"): "contact is a soft spring of 0.02 s, friction is viscous and couples to the normal: a ball "
+    "sinks in, and one that slides is thrown up",
+    ("tuned", "rolling"): "friction couples to the normal, as the cone is convex without complementarity: what stops "
+    "the slip lifts the ball",
     ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
     ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
     "corners, a blow is off by 1e-4 of it",
+}
+#: Speeds and spins after bounces, accelerations and hops of balls.
+_ROLLING = {
+    "oblique": ("rebound_ratio", "forward_speed", "spin_speed"),
+    "slide_to_roll": ("final_speed", "slip", "rolling_time", "rolling_place", "hop"),
+    "roll_incline": ("acceleration", "turning", "hop"),
 }
 #: Beside the centre the shipped contact lasts so long that the bar turns under it: what then acts is not predicted.
 _BLOWS = (
@@ -66,9 +78,30 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for profile in PROFILES
         for metric in ("stopping_distance", "braking", "hop", "turned")
     ),
+    *(
+        _deviation(profile, scene, metric, rolling_law(profile, metric), "rolling")
+        for profile in PROFILES
+        for scene, metrics in _ROLLING.items()
+        for metric in metrics
+    ),
     _deviation("default", "incline", "creep", incline_law("default", "creep"), "incline"),
     *(
         _deviation(profile, "incline", "acceleration", incline_law(profile, "acceleration"), "incline")
         for profile in PROFILES
     ),
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "mujoco",
+        (profile,),
+        "thin_wall",
+        metric,
+        passing_law(metric),
+        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+        "MuJoCo documentation, computation: collision detection at the start of a step",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for metric in ("rebound_ratio", "beyond")
 )

@@ -54,23 +54,24 @@ EITHER = 1e-2
 SUM_ROUND_OFF = 1e-12
 
 
-def _settings(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
+def settings_of(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
+    """Settings of a profile by their names, as a scene needs them."""
     return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
 
 
-def _law(profile: str, scene: Scene, dt: float) -> ContactLaw:
+def law_of(profile: str, scene: Scene, dt: float) -> ContactLaw:
     """Law of the lowest pair; the scenes here have one material."""
     material = scene.material(scene.bodies[0].name, scene.bodies[1].name)
-    return contact_law(_settings(profile, scene, dt), material.restitution, material.friction, dt)
+    return contact_law(settings_of(profile, scene, dt), material.restitution, material.friction, dt)
 
 
-def _solver_error(profile: str, scene: Scene, dt: float) -> float:
+def solver_error(profile: str, scene: Scene, dt: float) -> float:
     """Velocity [m/s] by which one step of a box may be off: Newton stops when a step gains less than the tolerance.
 
     The cost counts in units of the mean inertia, (3 m + 3 I)/6 < m here, times 6 unknowns; short of its minimum by
     that, an acceleration is off by ``sqrt(2 * 6 * tolerance)`` m/s^2 at most.
     """
-    return math.sqrt(12.0 * float(_settings(profile, scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
+    return math.sqrt(12.0 * float(settings_of(profile, scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
 
 
 # ---- a ball on a floor -------------------------------------------------------------------------------------------
@@ -110,7 +111,7 @@ def ball_law(profile: str, metric: str) -> Law:
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         if not (is_vertical(scene) and len(scene.bodies) == 2 and isinstance(scene.bodies[1].shape, Disc | Sphere)):
             return None
-        contact = _law(profile, scene, dt)
+        contact = law_of(profile, scene, dt)
         value, *others = (
             _ball_metrics(scene, measure, contact, k * GAP_ROUND_OFF)[metric][0] for k in (0.0, *PERTURBATIONS)
         )
@@ -137,7 +138,7 @@ def column_law(profile: str, metric: str) -> Law:
         shapes = [body.shape for body in boxes if isinstance(body.shape, Box)]
         if not is_vertical(scene) or len(shapes) != len(boxes):
             return None
-        contact = _law(profile, scene, dt)
+        contact = law_of(profile, scene, dt)
         heights = tuple(body.pose[up] for body in boxes)
         sizes = tuple(2.0 * shape.half_extents[up] for shape in shapes)
         masses = tuple(body.mass for body in boxes)
@@ -149,7 +150,7 @@ def column_law(profile: str, metric: str) -> Law:
         if value is None or other is None:
             return None
         # A speed that falls below its threshold may do so one step away.
-        unit = dt if metric == "settle_time" else _solver_error(profile, scene, dt) * dt + GAP_ROUND_OFF
+        unit = dt if metric == "settle_time" else solver_error(profile, scene, dt) * dt + GAP_ROUND_OFF
         spread = abs(other - value)
         return (value, 2.0 * spread + unit) if spread <= 0.5 * value else None
 
@@ -173,7 +174,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
         return None
     if any(body.twist[scene.dimension - 1 :]) or any(body.force) or any(body.torque):
         return None
-    settings, law = _settings(profile, scene, dt), _law(profile, scene, dt)
+    settings, law = settings_of(profile, scene, dt), law_of(profile, scene, dt)
     own = pair_solreffriction(settings, dt)
     damping = ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else law.damping
     half, moments = body.shape.half_extents, body.inertia
@@ -197,7 +198,7 @@ def incline_law(profile: str, metric: str) -> Law:
         box = box_on_face(profile, scene, dt)
         if box is None or any(scene.bodies[1].twist):
             return None
-        steps, error = step_count(scene.duration, dt), _solver_error(profile, scene, dt)
+        steps, error = step_count(scene.duration, dt), solver_error(profile, scene, dt)
         middle = (steps + 1) // 2
         column, window = {"creep": 0, "acceleration": 1}[metric], (steps - middle) * dt
         paths = [_slide(box, steps, k * error) for k in (0.0, 1.0, -1.0)]
@@ -238,7 +239,7 @@ def stopping_law(profile: str, metric: str) -> Law:
         heading = level / speed
         if np.abs(heading).max() < 1.0 and box.cone != "elliptic":
             return None
-        steps, error = step_count(scene.duration, dt), _solver_error(profile, scene, dt)
+        steps, error = step_count(scene.duration, dt), solver_error(profile, scene, dt)
         longer = replace(box, half_length=box.half_length * float(np.abs(heading).sum()))
         starts = [(box, speed), (box, speed + error), (box, speed - error), (longer, speed)]
         found = [
@@ -268,13 +269,13 @@ def blow_law(profile: str, metric: str) -> Law:
         blow = blow_of(scene)
         if blow is None:
             return None
-        contact, steps = _law(profile, scene, dt), steps_of(scene, dt)
+        contact, steps = law_of(profile, scene, dt), steps_of(scene, dt)
         runs = [metrics_of(scene, blow, blow.after(contact, steps, k * GAP_ROUND_OFF)) for k in (0.0, *PERTURBATIONS)]
         value, *others = (run[metric] for run in runs)
         scale = 1.0 / blow.inverse_mass * blow.closing if metric == "impulse" else max(1.0, blow.closing)
         band = SPREAD_FACTOR * max(abs(other - value) for other in others) + SUM_ROUND_OFF * scale
         # The solver stops short in every step of a contact; a ratio of speeds and energies alike.
-        band += _solver_error(profile, scene, dt) * (scale if metric == "impulse" else 1.0)
+        band += solver_error(profile, scene, dt) * (scale if metric == "impulse" else 1.0)
         if metric == "impulse":
             band += _force_round_off(contact) * scale
         return value, band

@@ -54,3 +54,28 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
     )
     for metric in metrics
 )
+
+EXPERIMENTS += (
+    Experiment(
+        "pivot-starved",
+        "with more sweeps nothing is left to be seen",
+        "classical",
+        "pivot",
+        "twisted",
+        {"iterations": 1000},
+        dimension=3,
+    ),
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "overhang-starved",
+        "with more sweeps nothing is left to be seen",
+        "classical",
+        "overhang",
+        "penetration",
+        {"iterations": 1000},
+        params,
+    )
+    for params in (dict[str, float](), {"margin": 0.02})
+)

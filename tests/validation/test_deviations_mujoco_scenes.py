@@ -29,6 +29,13 @@ CELLS = [
     ("slide", {}, "default", 2, {"braking", "hop", "turned"}),
     ("slide", {}, "tuned", 3, {"braking", "hop"}),
     ("slide", {"heading": 22.5}, "tuned", 3, {"braking", "hop"}),
+    ("oblique", {"mu": 0.1}, "default", 2, {"rebound_ratio", "forward_speed", "spin_speed"}),
+    ("oblique", {"mu": 0.1, "heading": 30.0}, "tuned", 3, {"rebound_ratio", "forward_speed", "spin_speed"}),
+    ("oblique", {"v": 1.0, "spin": -10.0, "mu": 1.0}, "default", 3, {"rebound_ratio", "forward_speed", "spin_speed"}),
+    ("slide_to_roll", {}, "default", 2, {"rolling_time", "rolling_place", "hop"}),
+    ("slide_to_roll", {"heading": 30.0}, "tuned", 3, {"hop"}),
+    ("roll_incline", {"ratio": 1.5}, "default", 3, {"acceleration", "turning", "hop"}),
+    ("roll_incline", {"ratio": 1.5}, "tuned", 2, {"acceleration", "turning", "hop"}),
 ]
 
 
@@ -50,7 +57,12 @@ def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, prof
 
 @pytest.mark.parametrize(
     ("name", "params", "profile", "metric"),
-    [("slide", {"heading": 22.5}, "default", "braking"), ("slide", {"heading": 45.0}, "default", "hop")],
+    [
+        ("slide", {"heading": 22.5}, "default", "braking"),
+        ("slide", {"heading": 45.0}, "default", "hop"),
+        ("slide_to_roll", {"heading": 30.0}, "default", "hop"),
+        ("oblique", {"heading": 30.0}, "default", "spin_speed"),
+    ],
 )
 def test_a_pyramid_off_its_axis_is_not_predicted(name, params, profile, metric):
     (law,) = covering("mujoco", "4.0.1", profile, name, metric)

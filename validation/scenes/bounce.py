@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import (
     GRAVITY,
@@ -33,7 +33,7 @@ from validation.canonical import (
     Variation,
     halves,
 )
-from validation.scenes.parts import ball, floor, upward
+from validation.scenes.parts import ball, floor, states, upward
 
 RADIUS = 0.5
 #: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
@@ -94,11 +94,6 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     measured["apex_interval_ratio"] = metrics.interval_ratio(times)
     measured["rest_time"] = metrics.last_motion(trajectory.t, velocity, least)
     return measured
-
-
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
 
 
 def track(scene: Scene) -> Track:
@@ -248,7 +243,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(*_from_all_heights(0.8), *(Variation({"e": e, "height": HEIGHTS[0]}) for e in (0.5, 0.95, 1.0))),
     full=_from_all_heights(0.5, 0.8, 0.95, 1.0),

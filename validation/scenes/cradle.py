@@ -20,18 +20,14 @@ import numpy as np
 
 from adapters.engine import Array
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, ball
+from validation.scenes.parts import PHASES, along, at, ball, delay, phases, states
 
 RADIUS = 0.5
-#: Time until the first contact [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
-#: Phases of the first contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -99,11 +95,6 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return found + (speeds if apart >= bounds.APART * dt else [check.unjudged() for check in speeds])
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
-
-
 def track(scene: Scene) -> Track | None:
     """The last ball: at rest until it is struck. None for a touching row, whose answer depends on the law."""
     p, n = scene.params, len(scene.bodies)
@@ -136,14 +127,14 @@ SCENE = CanonicalScene(
         Parameter("n", 4, "1", "number of balls with the striker", 2, 100, integer=True),
         Parameter("apart", 0.05, "s", "time between impacts, 12 steps of 1/240 s; 0: the row touches", 0.0, 1.0),
         Parameter("v", 2.0, "m/s", "of the striker", 0.0, 1e2, positive=True),
-        Parameter("delay", DELAY, "s", "time until the first contact: its phase in a step", 0.0, 10.0, positive=True),
+        delay("the first contact"),
         Parameter("mass", 1.0, "kg", "of each ball", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(Variation({}), Variation({"n": 3.0, "apart": 0.0})),
     full=tuple(Variation({"n": float(n), "apart": apart}) for n in (2, 3, 5, 10) for apart in (0.0, 0.05)),
@@ -153,7 +144,7 @@ SCENE = CanonicalScene(
         "1",
         f"largest error of a ball's speed over the striker's, of 4 balls, over {PHASES} phases of the first contact",
         "a row of impacts hands on every error that one makes; with gaps, since touching there is no one answer",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         error,
         "the whole scene: approach, impacts, departure",
     ),

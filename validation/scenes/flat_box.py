@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import (
     CanonicalScene,
@@ -29,15 +29,21 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import at, block, floor, upward
+from validation.scenes.parts import (
+    PHASES,
+    at,
+    between_impacts,
+    block,
+    delay,
+    floor,
+    phases,
+    states_and_impulses,
+    upward,
+)
 
 HEIGHT = 1.0
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.45
-#: Time until contact [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
-#: Phases of the contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -86,23 +92,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         "sideways": ("m/s", v),
         "impulse": ("N s", mass * v),
     }
-    return [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
-
-
-def sampling(scene: Scene) -> Sampling:
-    """Every step, with contacts from the start: the impulse is summed over the contact."""
-    return Sampling(1, 0.0)
+    return bounds.exact_laws(scales, truth, source)
 
 
 def track(scene: Scene) -> Track:
     """Straight in, straight out."""
     p = scene.params
-
-    def position(t: float) -> tuple[float, ...]:
-        since = t - p["delay"]
-        return upward(scene.dimension, 0.5 * HEIGHT - p["v"] * since * (1.0 if since < 0.0 else -p["e"]))
-
-    return Track("box", position)
+    height = between_impacts(0.5 * HEIGHT + p["v"] * p["delay"], -p["v"], [(p["delay"], p["e"] * p["v"])])
+    return Track("box", lambda t: upward(scene.dimension, height(t)))
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -125,14 +122,14 @@ SCENE = CanonicalScene(
         Parameter("aspect", 1.0, "1", "width over height; corners of a wide box couple more", 0.1, 20.0),
         Parameter("v", 3.0, "m/s", "approach speed", 0.0, 1e3, positive=True),
         Parameter("mu", 0.3, "1", "friction of the pair; nothing moves along the floor", 0.0, 10.0),
-        Parameter("delay", DELAY, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        delay(),
         Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states_and_impulses,
     track=track,
     quick=(Variation({}), Variation({"e": 1.0}), Variation({"e": 0.8, "aspect": 4.0})),
     full=tuple(Variation({"e": e, "aspect": a}) for e in (0.0, 0.2, 0.5, 0.8, 1.0) for a in (0.25, 1.0, 4.0, 10.0)),
@@ -143,7 +140,7 @@ SCENE = CanonicalScene(
         f"larger of |v+/v- - e| and of a corner's speed by spin over v-, over {PHASES} contact times within a step",
         "restitution of several contacts of one body has an exact answer only if they are solved together; spin is "
         "what a pass over them one by one leaves",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         error,
         "the whole scene: approach, contact, departure",
     ),

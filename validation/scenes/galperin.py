@@ -17,18 +17,14 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from adapters.scene import Body, HalfSpace, Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, ball
+from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, phases, states
 
 SMALL, LARGE = 0.1, 0.4
-#: Time until the balls first meet [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
-#: Phases of the first contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def _turn(params: Params) -> float:
@@ -116,24 +112,11 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return found if apart >= bounds.APART * dt else [check.unjudged() for check in found]
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
-
-
 def track(scene: Scene) -> Track:
     """The large ball: straight from impact to impact."""
-    start, known = scene.bodies[2].pose[0], impacts(scene.params)
-
-    def position(t: float) -> tuple[float, ...]:
-        x, since, speed = start, 0.0, -scene.params["v"]
-        for time, _, after in known:
-            if t < time:
-                break
-            x, since, speed = x + speed * (time - since), time, after
-        return along(scene.dimension, x + speed * (t - since))
-
-    return Track("large", position)
+    known = [(time, large) for time, _, large in impacts(scene.params)]
+    x = between_impacts(scene.bodies[2].pose[0], -scene.params["v"], known)
+    return Track("large", lambda t: along(scene.dimension, x(t)))
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -157,14 +140,14 @@ SCENE = CanonicalScene(
         Parameter("ratio", 16.0, "1", "mass of the large ball over that of the small one; 16: 12 impacts", 1.0, 1e6),
         Parameter("v", 1.0, "m/s", "of the large ball, towards the wall", 0.0, 1e2, positive=True),
         Parameter("gap", 1.0, "m", "of the small ball; sets the times between impacts", 0.0, 1e3, positive=True),
-        Parameter("delay", DELAY, "s", "time until the first contact: its phase in a step", 0.0, 10.0, positive=True),
+        delay("the balls first meet"),
         Parameter("mass", 0.5, "kg", "of the small ball", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(Variation({}), Variation({"ratio": 100.0, "gap": 2.0})),  # 12 and 31 impacts
     full=tuple(Variation({"ratio": r, "gap": 2.0}) for r in (1.0, 3.0, 16.0, 100.0)),
@@ -174,7 +157,7 @@ SCENE = CanonicalScene(
         "1",
         f"distance of both speeds from theirs on the circle of energy over its radius, {PHASES} phases of the contact",
         "a dozen impacts in the right order: one too many, too few or too soft turns the point on the circle",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         error,
         "the whole scene: 12 impacts",
     ),

@@ -14,28 +14,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, ball
+from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, phases, states_and_impulses
 
 RADIUS = 0.5
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.45
-#: Time until contact [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
-#: Phases of the contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def make(dimension: int, params: Params) -> Scene:
     """Build the scene: the surfaces meet at the origin after ``delay`` seconds."""
-    mass, delay = params["mass"], params["delay"]
+    mass, wait = params["mass"], params["delay"]
     bodies = [
         at(
             ball(name, dimension, own, RADIUS, 0.0),
             dimension,
-            along(dimension, side * RADIUS - speed * delay),
+            along(dimension, side * RADIUS - speed * wait),
             along(dimension, speed),
         )
         for name, own, side, speed in (
@@ -44,7 +40,7 @@ def make(dimension: int, params: Params) -> Scene:
         )
     ]
     pairs = (Pair(restitution=params["e"], friction=0.0),)
-    return Scene("head_on", 1, dimension, tuple(bodies), pairs, (0.0,) * dimension, delay + AFTERMATH, params)
+    return Scene("head_on", 1, dimension, tuple(bodies), pairs, (0.0,) * dimension, wait + AFTERMATH, params)
 
 
 def exact(scene: Scene) -> dict[str, float]:
@@ -92,25 +88,16 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         "second_speed": ("m/s", speeds),
         "impulse": ("N s", p["mass"] * speeds),
     }
-    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
+    found = bounds.exact_laws(scales, truth, source)
     defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
     return [*found, defect]
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step, with contacts from the start: the impulse is summed over the contact."""
-    return Sampling(1, 0.0)
-
-
 def track(scene: Scene) -> Track:
     """The first ball: straight in, straight out."""
-    p, after = scene.params, exact(scene)["first_speed"]
-
-    def position(t: float) -> tuple[float, ...]:
-        since = t - p["delay"]
-        return along(scene.dimension, -RADIUS + since * (p["v1"] if since < 0.0 else after))
-
-    return Track("first", position)
+    p = scene.params
+    x = between_impacts(-RADIUS - p["v1"] * p["delay"], p["v1"], [(p["delay"], exact(scene)["first_speed"])])
+    return Track("first", lambda t: along(scene.dimension, x(t)))
 
 
 def rebound_error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -131,14 +118,14 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v1", 4.0, "m/s", "of the first ball, to the right", 0.0, 1e3, positive=True),
         Parameter("v2", -2.0, "m/s", "of the second ball; to the left, so that both move", -1e3, 0.0),
-        Parameter("delay", DELAY, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        delay(),
         Parameter("mass", 0.5, "kg", "of the first ball", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states_and_impulses,
     track=track,
     quick=(Variation({}), Variation({"ratio": 1.0, "e": 1.0}), Variation({"ratio": 1e6, "e": 0.5})),
     full=tuple(Variation({"ratio": 10.0**k, "e": e}) for k in range(-6, 7) for e in (0.0, 0.5, 0.8, 1.0)),
@@ -148,7 +135,7 @@ SCENE = CanonicalScene(
         "1",
         f"largest |(v2' - v1')/(v1 - v2) - e| over {PHASES} contact times within a step",
         "the impact law between two free bodies: what a contact with a floor cannot show; the worst phase counts",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         rebound_error,
         "the whole scene: approach, contact, departure",
     ),

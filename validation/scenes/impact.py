@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from itertools import product
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import (
     CanonicalScene,
@@ -30,15 +30,10 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import ball, floor, upward
+from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, phases, states_and_impulses, upward
 
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.45
-#: Time until contact [s]: 12.6 steps of 1/240 s, so that the contact falls inside a step and not on its edge, where
-#: engines may differ by whether a touching contact counts.
-DELAY = 0.0525
-#: Phases of the contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -87,42 +82,27 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     }
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step, with contacts from the start: the impulse is summed over the contact."""
-    return Sampling(1, 0.0)
-
-
 def track(scene: Scene) -> Track:
     """Straight in, straight out."""
     p = scene.params
-
-    def position(t: float) -> tuple[float, ...]:
-        since = t - p["delay"]
-        return upward(scene.dimension, p["radius"] - p["v"] * since * (1.0 if since < 0.0 else -p["e"]))
-
-    return Track("ball", position)
+    height = between_impacts(p["radius"] + p["v"] * p["delay"], -p["v"], [(p["delay"], p["e"] * p["v"])])
+    return Track("ball", lambda t: upward(scene.dimension, height(t)))
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """One contact and no external force: exact at every step."""
     v, mass = scene.params["v"], scene.params["mass"]
     source = "Newton's law of restitution; one contact, no external force"
-    units = {
+    scales = {
         "rebound_ratio": ("1", 1.0),
         "rebound_speed": ("m/s", v),
         "velocity_change": ("m/s", v),
         "impulse": ("N s", mass * v),
     }
-    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in units.items()]
     return [
-        *found,
+        *bounds.exact_laws(scales, truth, source),
         bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum"),
     ]
-
-
-def phases(dt: float) -> list[dict[str, float]]:
-    """Contact times spread evenly over one step, in the middle of each sixteenth."""
-    return [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)]
 
 
 def rebound_error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -141,7 +121,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
-        Parameter("delay", DELAY, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        delay(),
         Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
         Parameter("mass", 0.5, "kg", "of the ball (worked example)", 0.0, 1e6, positive=True),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
@@ -150,7 +130,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states_and_impulses,
     track=track,
     quick=tuple(
         Variation({"e": e, "v": v}) for e, v in product((0.0, 0.2, 0.5, 0.8, 0.95, 1.0), (0.1, 1.0, 6.0, 50.0))

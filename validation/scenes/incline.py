@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import (
     GRAVITY,
@@ -32,7 +32,7 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import cube, floor
+from validation.scenes.parts import cube, floor, states
 
 SIDE = 1.0
 RATIOS = (0.5, 0.9, 0.99, 0.999, 1.001, 1.01, 1.1, 2.0)
@@ -73,11 +73,6 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     measured = {"creep": metrics.mean_rate(trajectory.t, x)}
     measured["acceleration"] = metrics.mean_rate(trajectory.t, v)
     return measured
-
-
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
 
 
 def track(scene: Scene) -> Track:
@@ -164,7 +159,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=tuple(Variation({"ratio": ratio}) for ratio in RATIOS),
     representative={"ratio": 1.1},  # a box that slides shows more than one that does not

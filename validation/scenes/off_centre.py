@@ -23,19 +23,25 @@ from collections.abc import Mapping
 import numpy as np
 
 from adapters.scene import Pair, Scene, SceneError
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, ball, block
+from validation.scenes.parts import (
+    PHASES,
+    along,
+    at,
+    ball,
+    between_impacts,
+    block,
+    delay,
+    phases,
+    states_and_impulses,
+)
 
 RADIUS, WIDTH, HEIGHT = 0.25, 2.0, 0.5
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s; the bar must
 #: not turn into the ball meanwhile.
 AFTERMATH = 0.2
-#: Time until contact [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
-#: Phases of the contact within a step; the primary error is the supremum over them.
-PHASES = 16
 
 
 def _moment(params: Params) -> float:
@@ -147,25 +153,16 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         # A difference of energies: round-off of all of them, in units of what there is to lose.
         "energy_lost": ("1", _energy(p, p["v"], p["rise"], 0.0) / _available(p)),
     }
-    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
+    found = bounds.exact_laws(scales, truth, source)
     defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
     return [*found, defect]
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step, with contacts from the start: the impulse is summed over the contact."""
-    return Sampling(1, 0.0)
-
-
 def track(scene: Scene) -> Track:
     """The ball: straight down, then with what the blow leaves it."""
-    p, after = scene.params, exact(scene)["ball_speed"]
-
-    def position(t: float) -> tuple[float, ...]:
-        since = t - p["delay"]
-        return along(scene.dimension, -p["offset"], RADIUS + since * (-p["v"] if since < 0.0 else after))
-
-    return Track("ball", position)
+    p = scene.params
+    height = between_impacts(RADIUS + p["v"] * p["delay"], -p["v"], [(p["delay"], exact(scene)["ball_speed"])])
+    return Track("ball", lambda t: along(scene.dimension, -p["offset"], height(t)))
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -193,14 +190,14 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
         Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
-        Parameter("delay", DELAY, "s", "time until contact: sets the phase within a step", 0.0, 10.0, positive=True),
+        delay(),
         Parameter("mass", 0.5, "kg", "of the ball", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states_and_impulses,
     track=track,
     quick=(Variation({}), Variation({"offset": 0.3, "e": 1.0})),
     full=tuple(
@@ -215,7 +212,7 @@ SCENE = CanonicalScene(
         "1",
         f"largest error of the ball's, the bar's and its end's speed over the closing speed, {PHASES} contact times",
         "a blow beside the centre tests what a central one cannot: the mass that a turning body has where it is struck",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         error,
         "the whole scene: approach, blow, departure",
     ),

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from adapters.scene import Body, Box, Disc, HalfSpace, Sphere
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
+from adapters.trajectory import Sampling
+from validation.canonical import Parameter
+
+#: Time until a first contact [s]: 12.6 steps of 1/240 s, so that it falls inside a step and not on its edge, where
+#: engines may differ by whether a touching contact counts.
+DELAY = 0.0525
+#: Phases of a contact within a step; primary errors of impacts are suprema over them.
+PHASES = 16
 
 
 def upward(dimension: int, length: float) -> tuple[float, ...]:
@@ -50,10 +63,24 @@ def along(dimension: int, x: float, height: float = 0.0) -> tuple[float, ...]:
     return (x, *(0.0,) * (dimension - 2), height)
 
 
+def heading(scene: Scene) -> Array:
+    """Unit vector of a motion along the floor, (d - 1,): parameter ``heading`` [degrees], of spatial scenes."""
+    angle = math.radians(scene.params.get("heading", 0.0))
+    return np.array([1.0] if scene.dimension == 2 else [math.cos(angle), math.sin(angle)])
+
+
 def at(body: Body, dimension: int, position: tuple[float, ...], velocity: tuple[float, ...] = ()) -> Body:
     """The same body at ``position``, not turned, moving with ``velocity`` without spin."""
     spin = (0.0,) if dimension == 2 else (0.0, 0.0, 0.0)
     return replace(body, pose=pose_at(dimension, position), twist=(*(velocity or (0.0,) * dimension), *spin))
+
+
+def tilted(body: Body, dimension: int, place: tuple[float, float], tilt: float) -> Body:
+    """The body at ``place`` (along, up) [m], turned by ``tilt`` [rad] counter-clockwise in the plane of both."""
+    if dimension == 2:
+        return replace(body, pose=(*place, tilt))
+    half = 0.5 * tilt
+    return replace(body, pose=(place[0], 0.0, place[1], math.cos(half), 0.0, -math.sin(half), 0.0))
 
 
 def block(name: str, dimension: int, mass: float, width: float, height: float) -> Body:
@@ -64,3 +91,48 @@ def block(name: str, dimension: int, mass: float, width: float, height: float) -
         inertia = (upright, upright, mass * width**2 / 6.0)
     half = (*(0.5 * width,) * (dimension - 1), 0.5 * height)
     return Body(name, Box(half), mass, inertia, pose_at(dimension, (0.0,) * dimension))
+
+
+# ---- when a contact falls within a step ----
+
+
+def phases(dt: float) -> list[dict[str, float]]:
+    """Contact times spread evenly over one step, in the middle of each of its `PHASES` parts."""
+    return [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)]
+
+
+def delay(until: str = "contact") -> Parameter:
+    """The parameter that `phases` varies: time ``until`` something is met."""
+    because = f"time until {until}: sets its phase within a step"
+    return Parameter("delay", DELAY, "s", because, 0.0, 10.0, positive=True)
+
+
+# ---- what is recorded ----
+
+
+def states(scene: object) -> Sampling:
+    """Every step, without contacts."""
+    return Sampling(1, None)
+
+
+def states_and_impulses(scene: object) -> Sampling:
+    """Every step, with contacts from the start: impulses are summed over a contact."""
+    return Sampling(1, 0.0)
+
+
+# ---- motion between impacts ----
+
+
+def between_impacts(start: float, speed: float, impacts: Iterable[tuple[float, float]]) -> Callable[[float], float]:
+    """Coordinate [m] over time [s] of what moves straight but for ``impacts``: times [s] and speeds after them."""
+    known = tuple(impacts)
+
+    def place(t: float) -> float:
+        x, since, now = start, 0.0, speed
+        for time, after in known:
+            if t < time:
+                break
+            x, since, now = x + now * (time - since), time, after
+        return x + now * (t - since)
+
+    return place

@@ -17,21 +17,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from adapters.scene import Pair, Scene
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import at, block, floor, upward
+from validation.scenes.parts import at, block, floor, heading, states, upward
 
 HEIGHT = 0.5
 #: Runs on for this long after it should have stopped, as a share of the time to stop.
 AFTERMATH = 0.5
-
-
-def _heading(scene: Scene) -> np.ndarray:
-    """Unit vector along which the box slides, (d - 1,)."""
-    angle = math.radians(scene.params["heading"])
-    return np.array([1.0] if scene.dimension == 2 else [math.cos(angle), math.sin(angle)])
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -59,19 +53,19 @@ def exact(scene: Scene) -> dict[str, float]:
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Way along and across the heading, deepest and highest place of the lower face, turn against the start."""
-    d, heading = scene.dimension, _heading(scene)
+    d, line = scene.dimension, heading(scene)
     pose = trajectory.pose[:, 1]
     way = pose[-1, : d - 1] - pose[0, : d - 1]
-    along = float(way @ heading)
+    along = float(way @ line)
     measured: dict[str, Measured] = {
         "stopping_distance": (along, ""),
         "braking": _braking(scene, trajectory),
         "end_speed": (float(np.linalg.norm(trajectory.twist[-1, 1, :d])), ""),
-        "hop": (float(np.abs(pose[:, d - 1] - pose[0, d - 1]).max()), ""),
+        "hop": (metrics.hop(trajectory), ""),
         "turned": (_turned(pose) * metrics.reach(scene.bodies[1].shape), ""),
     }
     if d == 3:
-        measured["astray"] = (float(np.linalg.norm(way - along * heading)), "")
+        measured["astray"] = (float(np.linalg.norm(way - along * line)), "")
     return measured
 
 
@@ -86,7 +80,7 @@ def _braking(scene: Scene, trajectory: Trajectory) -> Measured:
     first, last = np.searchsorted(trajectory.t, (0.25 * stop, 0.75 * stop))
     if last <= first:
         return None, "the slide lasts less than two steps"
-    speed = trajectory.twist[:, 1, : scene.dimension - 1] @ _heading(scene)
+    speed = trajectory.twist[:, 1, : scene.dimension - 1] @ heading(scene)
     return float((speed[first] - speed[last]) / (trajectory.t[last] - trajectory.t[first])), ""
 
 
@@ -127,24 +121,18 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         turn.check("turned", "m", truth["turned"], source),
     ]
     if "astray" in truth:
-        straight = bounds.Bound(g * dt * dt + bounds.ROUND_OFF * place, "one step of a force across the path: g dt^2")
-        found.append(straight.check("astray", "m", truth["astray"], source))
+        found.append(bounds.straight(g, dt, place).check("astray", "m", truth["astray"], source))
     return found
-
-
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
 
 
 def track(scene: Scene) -> Track:
     """The exact parabola, until it stops."""
-    p, start, heading = scene.params, scene.bodies[1].pose[: scene.dimension], _heading(scene)
+    p, start, line = scene.params, scene.bodies[1].pose[: scene.dimension], heading(scene)
     stop = _stop(p)
 
     def position(t: float) -> tuple[float, ...]:
         t = min(t, stop)
-        way = (p["v"] * t - 0.5 * p["mu"] * p["g"] * t * t) * heading
+        way = (p["v"] * t - 0.5 * p["mu"] * p["g"] * t * t) * line
         return (*(float(x) for x in start[:-1] + way), start[-1])
 
     return Track("box", position)
@@ -179,7 +167,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(Variation({}), Variation({"heading": 22.5}, dimensions=(3,)), Variation({"heading": 45.0}, dimensions=(3,))),
     full=(

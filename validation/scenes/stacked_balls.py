@@ -18,16 +18,12 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from adapters.scene import Pair, Scene, SceneError
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import ball, floor, upward
+from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, phases, states, upward
 
 LARGE, SMALL = 0.5, 0.2
-#: Time until the large ball hits the floor [s]: 12.6 steps of 1/240 s, inside a step and not on its edge.
-DELAY = 0.0525
-#: Phases of the first impact within a step; the primary error is the supremum over them.
-PHASES = 16
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
 #: Impacts that are followed at most.
@@ -109,29 +105,16 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         "large_speed": ("m/s", p["v"]),
         "energy_lost": ("1", 1.0 + 9.0 / p["ratio"]),
     }
-    found = [bounds.exact(scale).check(name, unit, truth[name], source) for name, (unit, scale) in scales.items()]
+    found = bounds.exact_laws(scales, truth, source)
     apart = min(later - earlier for earlier, later in pairwise(times))
     return found if apart >= bounds.APART * dt else [check.unjudged() for check in found]
 
 
-def sampling(scene: Scene) -> Sampling:
-    """Every step; impulses are not judged here."""
-    return Sampling(1, None)
-
-
 def track(scene: Scene) -> Track:
     """The small ball: straight from impact to impact."""
-    start, known = scene.bodies[2].pose[scene.dimension - 1], impacts(scene.params)
-
-    def position(t: float) -> tuple[float, ...]:
-        height, since, speed = start, 0.0, -scene.params["v"]
-        for time, _, after in known:
-            if t < time:
-                break
-            height, since, speed = height + speed * (time - since), time, after
-        return upward(scene.dimension, height + speed * (t - since))
-
-    return Track("small", position)
+    known = [(time, small) for time, _, small in impacts(scene.params)]
+    height = between_impacts(scene.bodies[2].pose[scene.dimension - 1], -scene.params["v"], known)
+    return Track("small", lambda t: upward(scene.dimension, height(t)))
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -157,14 +140,14 @@ SCENE = CanonicalScene(
         Parameter("e", 0.9, "1", "coefficient of restitution of all pairs", 0.1, 1.0),
         Parameter("v", 2.0, "m/s", "of both balls, downwards", 0.0, 1e2, positive=True),
         Parameter("apart", 0.05, "s", "time between the impacts; 12 steps of 1/240 s", 0.0, 1.0, positive=True),
-        Parameter("delay", DELAY, "s", "time until the floor: sets the phase within a step", 0.0, 10.0, positive=True),
+        delay("the floor"),
         Parameter("mass", 0.5, "kg", "of the small ball", 0.0, 1e6, positive=True),
     ),
     make=make,
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=sampling,
+    sampling=states,
     track=track,
     quick=(Variation({}), Variation({"ratio": 1000.0, "e": 1.0}), Variation({"ratio": 1.0, "e": 0.5})),
     full=tuple(Variation({"ratio": r, "e": e}) for r in (1.0, 3.0, 10.0, 1e3, 1e6) for e in (0.3, 0.5, 0.9, 1.0)),
@@ -174,7 +157,7 @@ SCENE = CanonicalScene(
         "1",
         f"larger error of the balls' speeds at the end over that of the fall, over {PHASES} phases of the first impact",
         "what the second impact makes of the first shows whether they are resolved one by one; the worst phase counts",
-        lambda dt: [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)],
+        phases,
         error,
         "the whole scene: fall, two or three impacts, departure",
     ),

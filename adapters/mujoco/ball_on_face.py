@@ -1,0 +1,123 @@
+"""MuJoCo's contact law for one ball on a level face, in the plane of its motion: it slides, rolls and bounces.
+
+      z ^    ( )             the problem of `adapters.mujoco.box_on_face` with one contact, below the centre
+        |     |
+        +-----+------> x     state  x, z, theta (counter-clockwise), vx, vz, omega
+
+The cone is convex and knows no complementarity: a contact that slips on its edge pushes along ``n - mu t``, so that
+stopping the slip also lifts the ball.
+
+Source: MuJoCo documentation, "Computation: constraint model", friction cones and primal problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.law import Law, Measure, Prediction
+from adapters.mujoco.box_on_face import BoxOnFace, Triple
+from adapters.mujoco.contact_law import ContactLaw
+from adapters.mujoco.motions import along_a_heading
+from adapters.mujoco.pairs import pair_solreffriction
+from adapters.mujoco.predictions import (
+    BLURRED,
+    EITHER,
+    EPS,
+    GAP_ROUND_OFF,
+    PERTURBATIONS,
+    SPREAD_FACTOR,
+    law_of,
+    settings_of,
+    solver_error,
+)
+from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import step_count
+
+#: Metrics that are ways, and those that are accelerations over half a run; all others are speeds, times and ratios.
+WAYS, ACCELERATIONS = ("rolling_place", "hop"), ("acceleration", "turning")
+
+
+@dataclass(frozen=True)
+class BallOnFace(BoxOnFace):
+    """Constants of the problem, as of a box; ``half_height`` is the radius and ``half_length`` 0."""
+
+    share: float = 1.0
+
+    def _contacts(self, pose: Triple) -> list[tuple[float, float, float]]:
+        """Lever arm (along, up) and overlap of the lowest point; a contact lies halfway into the overlap."""
+        gap = pose[1] - self.half_height
+        return [(0.0, 0.5 * gap - pose[1], gap - self.law.margin)] if gap < self.law.margin else []
+
+
+@lru_cache(maxsize=64)
+def _path(ball: BallOnFace, steps: int, height: float, twist: Triple) -> Array:
+    return np.array(ball.path(steps, (0.0, height, 0.0), twist))
+
+
+def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
+    """The problem of a scene with one ball and one rough face, or None if it is not that."""
+    if len(scene.bodies) != 2:
+        return None
+    face, body = scene.bodies
+    friction, shape = scene.material(face.name, body.name).friction, body.shape
+    if not (isinstance(shape, Disc | Sphere) and isinstance(face.shape, HalfSpace) and friction):
+        return None  # smooth: the scalar law's
+    settings, contact = settings_of(profile, scene, dt), law_of(profile, scene, dt)
+    own = pair_solreffriction(settings, dt)
+    moment = body.inertia[0] if isinstance(body.inertia, tuple) else body.inertia
+    return BallOnFace(
+        contact,
+        settings["cone"],
+        friction,
+        ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else contact.damping,
+        settings["impratio"],
+        0.0,
+        shape.radius,
+        moment / body.mass,
+        (scene.gravity[0], scene.gravity[-1]),
+    )
+
+
+def rolling_law(profile: str, metric: str) -> Law:
+    """A ball on a level face that moves and turns in one upright plane, measured like the engine's own.
+
+    An elliptic cone does not know the heading; a pyramid does, and the law is silent off its axes.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        ball, d = _ball_on_face(profile, scene, dt), scene.dimension
+        if ball is None:
+            return None
+        body = scene.bodies[1]
+        level = np.array(body.twist[: d - 1])
+        speed = float(np.linalg.norm(level))
+        heading = level / speed if speed else np.eye(d - 1)[0]
+        if np.abs(heading).max() < 1.0 and ball.cone != "elliptic":
+            return None
+        # Rolling along the heading turns clockwise in the plane that contains it.
+        spin = body.twist[2] if d == 2 else -float(np.array([-heading[1], heading[0]]) @ body.twist[3:5])
+        steps, off = step_count(scene.duration, dt), solver_error(profile, scene, dt)
+        starts = [(0.0, 0.0), (0.0, off), (0.0, -off)]
+        if body.pose[d - 1] > ball.half_height:  # a start that touches exactly has no round-off
+            starts += [(k * GAP_ROUND_OFF, 0.0) for k in PERTURBATIONS]
+        paths = (
+            _path(ball, steps, body.pose[d - 1] + up, (speed + more, body.twist[d - 1], spin)) for up, more in starts
+        )
+        value, *others = (measure(scene, along_a_heading(scene, dt, heading, path))[metric][0] for path in paths)
+        if value is None or None in others:
+            return None
+        spread = max(abs(other - value) for other in others if other is not None)
+        # One step of the solver is off by `off` in speed: that over the whole run in place, and at both ends of a mean
+        # over half of it.
+        unit = scene.duration if metric in WAYS else 4.0 / scene.duration if metric in ACCELERATIONS else 1.0
+        floor = (off + EPS / (1.0 - ball.law.impedance.deep)) * unit
+        # On the edge between two paths (one hop more or less) the engine takes either.
+        if spread > BLURRED * abs(value):
+            return (value, 2.0 * spread + floor) if spread <= EITHER * abs(value) else None
+        return value, SPREAD_FACTOR * spread + floor
+
+    return law

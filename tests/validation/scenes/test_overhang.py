@@ -1,0 +1,85 @@
+"""Blocks as far out as they stand: balances of moments anew, loads at rest, and what sinks, slips or falls fails."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes.overhang import HEIGHT, LENGTH
+
+DT = 1 / 240
+
+
+def made(**params):
+    canonical = CATALOGUE["overhang"]
+    return canonical, canonical.scene(2, params)
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, trajectory.dt)
+        if not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+def at_rest(scene, duration=2.0):
+    """A record in which nothing moves and each face carries the weight of all above it."""
+    n, blocks = round(duration / DT) + 1, len(scene.bodies) - 1
+    pose = np.array([[body.pose for body in scene.bodies]] * n)
+    lower = np.tile(np.arange(blocks), n)
+    weights = np.array([[0.0, scene.params["g"] * (blocks - k) * DT] for k in range(blocks)])
+    rows = Contacts(
+        lower, lower + 1, *(np.zeros((n * blocks, 2)) for _ in range(2)), np.tile(weights, (n, 1)), 0.0 * lower
+    )
+    record = ContactRecord(np.arange(n), blocks * np.arange(n + 1), rows)
+    return Trajectory(np.arange(n) * DT, pose, np.zeros_like(pose), record, DT, "completed")
+
+
+@pytest.mark.parametrize("n", [2, 4, 8])
+@pytest.mark.parametrize("margin", [0.3, 0.05, 1e-6, -1e-6, -0.05])
+def test_moments_about_each_edge_say_whether_it_stands(n, margin):
+    """The centre of all above an interface, against the face that both blocks share there."""
+    canonical, scene = made(n=float(n), margin=margin)
+    x = np.array([body.pose[0] for body in scene.bodies[1:]])
+    stands = all(
+        x[k - 1] - LENGTH / 2 < x[k:].mean() < x[k - 1] + LENGTH / 2 and x[k] - LENGTH / 2 < x[k:].mean()
+        for k in range(1, n)
+    )
+    assert canonical.exact(scene)["stands"] == float(stands) == float(margin > 0.0)
+
+
+def test_without_a_margin_the_reach_is_the_harmonic_sum():
+    """Four blocks reach L/2 (1 + 1/2 + 1/3) beyond the one that stands on the floor: 11/12 of a block."""
+    _, scene = made(margin=0.0)
+    assert scene.bodies[-1].pose[0] - scene.bodies[1].pose[0] == pytest.approx(LENGTH * 11 / 12)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+def test_a_stack_that_sinks_slips_shakes_or_carries_too_little_fails(size):
+    canonical, scene = made()
+    good = at_rest(scene)
+    assert failing(canonical, scene, good) == set()
+    for axis, metric in ((1, "penetration"), (0, "drift")):
+        moved = good.pose.copy()
+        moved[1:, 4, axis] += -size if axis else size
+        assert failing(canonical, scene, replace(good, pose=moved)) == {metric}
+    light = replace(good.contacts.rows, impulse=(1.0 - size) * good.contacts.rows.impulse)
+    light = replace(good, contacts=replace(good.contacts, rows=light))
+    assert failing(canonical, scene, light) == {f"interface_impulse[{k}]" for k in range(1, 5)}
+    moving = good.twist.copy()
+    moving[:, 2, 2] = 4.0 * size
+    assert failing(canonical, scene, replace(good, twist=moving)) == {"settle_time", "kinetic_energy"}
+
+
+def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
+    for margin, fails in ((0.05, True), (-0.05, False)):
+        canonical, scene = made(margin=margin)
+        fallen = at_rest(scene)
+        fallen.pose[-1, -1, :2] += [LENGTH, -2.0 * HEIGHT]
+        assert ("stands" in failing(canonical, scene, fallen)) is fails
+    assert failing(canonical, scene, at_rest(scene)) == {"stands"}

@@ -1,0 +1,89 @@
+"""Four pairs of materials: each pair's own numbers come out of balls that obey them, and no other table does."""
+
+import numpy as np
+import pytest
+
+from adapters.scene import SceneError
+from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes.pair_matrix import GAP, RADIUS, materials
+
+DT = 1 / 240
+
+
+def made(dimension=2, **params):
+    canonical = CATALOGUE["pair_matrix"]
+    return canonical, canonical.scene(dimension, params)
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, trajectory.dt)
+        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+def bouncing(scene, table, dt=DT):
+    """Balls stepped between both faces, with Newton's and Coulomb's laws of impacts that slip at each, found late."""
+    d, p = scene.dimension, scene.params
+    times = np.arange(round(scene.duration / dt) + 1) * dt
+    pose = np.array([[b.pose for b in scene.bodies]] * len(times))
+    twist = np.zeros((len(times), 4, 3 if d == 2 else 6))
+    for ball in (0, 1):
+        height, along, up = RADIUS + p["fall"] * p["delay"], p["v"], -p["fall"]
+        for k in range(len(times)):
+            pose[k, 2 + ball, d - 1], twist[k, 2 + ball, 0], twist[k, 2 + ball, d - 1] = height, along, up
+            height += dt * up
+            if height < RADIUS and up < 0.0:
+                e, mu = table[2 * ball]
+            elif height > RADIUS + GAP and up > 0.0:
+                e, mu = table[2 * ball + 1]
+            else:
+                continue
+            along, up = along - mu * (1.0 + e) * abs(up), -e * up
+    return Trajectory(times, pose, twist, None, dt, "completed")
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
+@pytest.mark.parametrize("cross", [0.5, 1.0, 1.5])
+def test_balls_that_obey_the_table_pass_in_every_phase(cross, dt, dimension):
+    canonical, scene = made(dimension, cross=cross)
+    table = materials(scene.params)
+    assert table[3] == pytest.approx((0.4 * cross, 0.05 * cross))
+    assert failing(canonical, scene, bouncing(scene, table, dt)) == set()
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
+@pytest.mark.parametrize("pair", [0, 1, 2, 3])
+def test_a_pair_that_is_off_is_named(pair, size):
+    canonical, scene = made()
+    for quantity, name in ((0, "restitution"), (1, "friction")):
+        table = [list(row) for row in materials(scene.params)]
+        table[pair][quantity] *= 1.0 - size
+        assert failing(canonical, scene, bouncing(scene, table)) == {f"{name}[{pair + 1}]"}
+
+
+@pytest.mark.parametrize("rule", [np.minimum, np.maximum, lambda a, b: 0.5 * (a + b), lambda a, b: np.sqrt(a * b)])
+def test_rules_that_combine_two_numbers_otherwise_fail(rule):
+    """Each face's and ball's number is its pairs' mean; no such rule gives all four pairs back."""
+    canonical, scene = made(cross=1.5)
+    table = np.array(materials(scene.params)).reshape(2, 2, 2)
+    balls, faces = table.mean(axis=1), table.mean(axis=0)
+    combined = [tuple(rule(balls[i], faces[j])) for i in (0, 1) for j in (0, 1)]
+    assert failing(canonical, scene, bouncing(scene, combined))
+
+
+def test_a_ball_that_does_not_come_back_has_no_restitution():
+    canonical, scene = made()
+    table = [(0.0, 0.2), *materials(scene.params)[1:]]
+    measured = canonical.measure(scene, bouncing(scene, table))
+    assert measured["restitution[1]"] == (0.0, "")
+    assert measured["restitution[2]"] == measured["friction[2]"] == (None, "it does not come back")
+
+
+def test_impacts_that_would_grip_are_refused():
+    with pytest.raises(SceneError, match=r"pair_matrix\.v"):
+        made(v=1.0)

@@ -1,0 +1,215 @@
+r"""A ball is pushed and spun askew (a masse shot): its path is a parabola until it rolls, then straight.
+
+          u0 \                    slip u0 = v0 + w0 x (-r z): its direction u never changes
+      v0 ---> \__                 path  x = v0 t - mu g t^2 u/2,   t <= t_f = |u0| k/((1 + k) mu g)
+                  \__  v_f        then  v_f = v0 - u0 k/(1 + k),   k = 2/5
+
+Friction acts against the slip, not against the motion: both velocity and slip lose along the one direction u. A cone
+that is a pyramid, or friction that is solved axis by axis, turns it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.rolling import gyration, of_the_arm
+from validation.scenes.parts import ball, floor, states, upward
+
+K = gyration(3)
+#: Runs for this many times the time until it rolls.
+RUNS = 2.0
+
+
+def _spin(p: Params) -> Array:
+    """Spin at the start [rad/s]: of the surface at the floor, ``side`` [m/s] across the motion."""
+    return np.array([p["side"] / p["radius"], -p["back"] / p["radius"], 0.0])
+
+
+def _slip(p: Params, arm: float) -> Array:
+    """Velocity of the point that touches, ``arm`` [m] below the centre, at the start [m/s]."""
+    wx, wy, _ = _spin(p)
+    return np.array([p["v"] - wy * arm, wx * arm])
+
+
+def _rolling(p: Params, arm: float) -> tuple[float, Array, Array]:
+    """Time [s], place [m] and velocity [m/s] with which rolling begins, if friction acts ``arm`` [m] below."""
+    k, slip, start = K * (p["radius"] / arm) ** 2, _slip(p, arm), np.array([p["v"], 0.0])
+    time = float(np.linalg.norm(slip)) * k / ((1.0 + k) * p["mu"] * p["g"])
+    lost = slip * k / (1.0 + k)
+    return time, (start - 0.5 * lost) * time, start - lost
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the ball touches the floor."""
+    p = params
+    still = ball("ball", dimension, p["mass"], p["radius"], p["radius"])
+    shot = replace(still, twist=(p["v"], 0.0, 0.0, *(float(w) for w in _spin(p))))
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    duration = RUNS * _rolling(p, p["radius"])[0]
+    return Scene("masse", 1, dimension, (floor(dimension), shot), pairs, upward(dimension, -p["g"]), duration, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Coulomb's law along a slip whose direction is constant."""
+    p = scene.params
+    time, place, velocity = _rolling(p, p["radius"])
+    end = place + velocity * (scene.duration - time)
+    return {
+        "final_vx": float(velocity[0]),
+        "final_vy": float(velocity[1]),
+        "end_x": float(end[0]),
+        "end_y": float(end[1]),
+        "turned": 0.0,
+        "hop": 0.0,
+    }
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Velocity and place at the end; the angle by which the slip's direction changes before it is nearly gone.
+
+    The last step may end some time before or after the scene's duration: the place is told at that, straight on.
+    """
+    p = scene.params
+    velocity, spin = trajectory.twist[:, 1, :2], trajectory.twist[:, 1, 3:]
+    way = trajectory.pose[-1, 1, :2] - trajectory.pose[0, 1, :2]
+    way = way + velocity[-1] * (scene.duration - trajectory.t[-1])
+    slip = velocity + p["radius"] * np.column_stack([-spin[:, 1], spin[:, 0]])
+    size = np.linalg.norm(slip, axis=1)
+    slow = np.flatnonzero(size < 0.25 * size[0])
+    still = slip[: slow[0] if len(slow) else len(slip)]
+    first = still[0] / size[0]
+    across = still @ [-first[1], first[0]]
+    return {
+        "final_vx": (float(velocity[-1, 0]), ""),
+        "final_vy": (float(velocity[-1, 1]), ""),
+        "end_x": (float(way[0]), ""),
+        "end_y": (float(way[1]), ""),
+        "turned": (float(np.abs(np.arctan2(across, still @ first)).max()), ""),
+        "hop": (metrics.hop(trajectory), ""),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """As a slide that ends in rolling: velocities exact on their arm, places shifted by step order and a late contact.
+
+    On an arm that is shorter by a depth h the slip is off by w h; told with the radius while the slip is at least a
+    quarter of the first, its direction is off by 4 w h/|u0|.
+    """
+    p, r = scene.params, scene.params["radius"]
+    depth = p["g"] * dt * dt
+    slip, fastest = float(np.linalg.norm(_slip(p, r))), abs(p["v"]) + abs(p["side"]) + abs(p["back"])
+    lost = slip * K / (1.0 + K)
+    source = "Coulomb's law along the slip; angular momentum about the point of contact"
+
+    def end(arm: float) -> Array:
+        time, place, velocity = _rolling(p, arm)
+        return np.asarray(place + velocity * (scene.duration - time))
+
+    def velocity(axis: int) -> bounds.Bound:
+        change = of_the_arm(lambda arm: float(_rolling(p, arm)[2][axis]), r, depth)
+        return bounds.Bound(
+            change + bounds.ROUND_OFF * fastest,
+            "exact at every dt but for the arm of friction, shorter by the depth at which a late contact is found",
+        )
+
+    def place(axis: int) -> bounds.Bound:
+        because = "a contact found one step late is |u0| k/(1 + k) dt without friction, a step order shows half of it"
+        change = of_the_arm(lambda arm: float(end(arm)[axis]), r, depth)
+        return bounds.Bound(1.5 * lost * dt + p["mu"] * depth + change + bounds.ROUND_OFF * fastest, because)
+
+    turned = bounds.Bound(
+        4.0 * float(np.linalg.norm(_spin(p))) * depth / slip + bounds.ROUND_OFF * fastest / slip,
+        "friction keeps the slip's direction; told with the radius it is off by 4 w g dt^2/|u0| at a quarter of it",
+    )
+    found = {
+        "final_vx": ("m/s", velocity(0)),
+        "final_vy": ("m/s", velocity(1)),
+        "end_x": ("m", place(0)),
+        "end_y": ("m", place(1)),
+        "turned": ("rad", turned),
+        "hop": ("m", bounds.found_late(p["g"], dt, r)),
+    }
+    return [bound.check(name, unit, truth[name], source) for name, (unit, bound) in found.items()]
+
+
+def track(scene: Scene) -> Track:
+    """The parabola, then straight on."""
+    p, start = scene.params, np.array(scene.bodies[1].pose[:2])
+    time, _, velocity = _rolling(p, p["radius"])
+    first = np.array([p["v"], 0.0])
+
+    def position(t: float) -> tuple[float, ...]:
+        slid = min(t, time)
+        way = first * slid + 0.5 * (velocity - first) / time * slid * slid + velocity * (t - slid)
+        return (*(float(x) for x in start + way), p["radius"])
+
+    return Track("ball", position)
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Distance of the end from where it should be, over the way that friction has changed."""
+    p, truth, off = scene.params, exact(scene), []
+    for name in ("end_x", "end_y"):
+        value, reason = found[name]
+        if value is None:
+            return None, reason
+        off.append(value - truth[name])
+    straight = np.array([p["v"], 0.0]) * scene.duration
+    return math.hypot(*off) / float(np.linalg.norm(straight - [truth["end_x"], truth["end_y"]])), ""
+
+
+SCENE = CanonicalScene(
+    name="masse",
+    version=1,
+    title="Ball pushed and spun askew: a parabola until it rolls",
+    figure=__doc__ or "",
+    law="x = v0 t - mu g t^2 u/2 until t = |u0| k/((1 + k) mu g), then v_f = v0 - u0 k/(1 + k)",
+    dimensions=(3,),
+    parameters=(
+        Parameter("v", 2.0, "m/s", "of the centre, along x", 0.0, 1e2, positive=True),
+        Parameter("side", 3.0, "m/s", "of the surface at the floor by spin, across the motion", -1e2, 1e2),
+        Parameter("back", 1.0, "m/s", "of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2),
+        Parameter("mu", 0.2, "1", "friction of the pair", 0.0, 10.0, positive=True),
+        Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    track=track,
+    quick=(Variation({}), Variation({"back": 4.0, "side": 1.0})),
+    full=tuple(
+        Variation({"side": s, "back": b, "mu": mu}) for s in (1.0, 3.0) for b in (0.0, 1.0, 4.0) for mu in (0.05, 0.2)
+    ),
+    planted=({},),
+    primary=Primary(
+        "place error",
+        "1",
+        "distance of the end from where it should be, over how far friction moves the end",
+        "friction whose direction is wrong for a moment shows in where the ball goes",
+        lambda dt: [{}],
+        error,
+        "the whole scene: the ball slides askew, then rolls",
+    ),
+    smooth=("end_x", "end_y"),
+    words={
+        "final_vx": "rolls along with {value}",
+        "final_vy": "rolls across with {value}",
+        "end_x": "ends {value} along",
+        "end_y": "ends {value} across",
+        "turned": "turns the direction of its slip by {value}",
+        "hop": "leaves the floor, up or down, by {value}",
+    },
+)

@@ -1,0 +1,106 @@
+"""Blocks that are stacked as far out as they will stand.
+
+               [_____]            the k-th block from above reaches L/(2 k) beyond the one below it:
+            [_____]               then the centre of mass of all above lies over its edge,
+        [_____]                   and n blocks reach  L/2 (1 + 1/2 + ... + 1/n)  beyond the first
+    =====================         a share ``margin`` less stands, a share more falls
+
+Each face carries a weight that is all but at its end. A block that gives by a hair, or a slop that lets it, is enough
+to bring the stack down where the margin is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds, columns
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.scenes.parts import at, block, floor, upward
+
+LENGTH, HEIGHT = 2.0, 0.5
+
+
+def _places(p: Params) -> list[float]:
+    """Centres of the blocks along the floor [m], from below."""
+    n = int(p["n"])
+    places = [0.0]
+    for k in range(n - 1, 0, -1):  # as many blocks stand on the edge of the one below
+        places.append(places[-1] + (1.0 - p["margin"]) * 0.5 * LENGTH / k)
+    return places
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: each block touches the one below."""
+    p = params
+    blocks = [
+        at(block(f"block{k + 1}", dimension, p["mass"], LENGTH, HEIGHT), dimension, (x, (k + 0.5) * HEIGHT))
+        for k, x in enumerate(_places(p))
+    ]
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    bodies = (floor(dimension), *blocks)
+    return Scene("overhang", 1, dimension, bodies, pairs, upward(dimension, -p["g"]), p["duration"], p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Equilibrium on this side of the limit; beyond it only that the stack falls."""
+    return {"stands": 1.0} | columns.exact(scene) if scene.params["margin"] > 0.0 else {"stands": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """As of a column, and whether the block on top is still up: half a block lower it is not."""
+    height = trajectory.pose[:, -1, scene.dimension - 1]
+    stands = 1.0 if abs(float(height[-1] - height[0])) < 0.5 * HEIGHT else 0.0
+    return {"stands": (stands, "")} | columns.measure(scene, trajectory)
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """A column whose loads are at its edges: the bounds are those of any column."""
+    told = bounds.Bound(0.5, "it stands or it falls; half a block lower is fallen")
+    found = [told.check("stands", "1", truth["stands"], "the centre of mass of each part lies over what carries it")]
+    return found + (columns.checks(scene, dt, truth) if scene.params["margin"] > 0.0 else [])
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Larger of the drift and the deepest overlap, in heights of a block."""
+    return columns.displacement(found, HEIGHT)
+
+
+SCENE = CanonicalScene(
+    name="overhang",
+    version=1,
+    title="Blocks stacked as far out as they stand",
+    figure=__doc__ or "",
+    law="stands if each block reaches less than L/(2 k) beyond the next, k blocks on the edge",
+    dimensions=(2,),
+    parameters=(
+        Parameter("n", 4.0, "1", "number of blocks", 2.0, 20.0, integer=True),
+        Parameter("margin", 0.05, "1", "share of each step that is left; below 0 it falls", -0.5, 1.0),
+        Parameter("mu", 0.5, "1", "friction of all pairs", 0.0, 10.0, positive=True),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("duration", 4.0, "s", "of the run; beyond the limit it takes time to fall", 1.5, 100.0),
+        Parameter("mass", 1.0, "kg", "of each block", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=columns.sampling,
+    quick=(Variation({}), Variation({"margin": 0.02})),
+    full=tuple(Variation({"margin": m, "n": n}) for n in (2.0, 4.0, 8.0) for m in (0.2, 0.05, 0.005, 1e-6, -0.05)),
+    planted=({},),
+    primary=Primary(
+        "displacement",
+        "block heights",
+        "larger of the drift and of the deepest overlap",
+        "what does not stand shows in both",
+        lambda dt: [{}],
+        error,
+        "the resting stack",
+        1.0,
+        1.0,
+    ),
+    size="n",
+    words={"stands": "stands at the end: {value} (1: yes, 0: no)"},
+)

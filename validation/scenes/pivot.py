@@ -1,0 +1,183 @@
+r"""A box that leans beyond its balance falls over its edge.
+
+       ,+.             phi'' = p^2 sin(phi),   p^2 = 3 g/(4 rho)
+      +   \            phi: of the diagonal against the vertical
+       \   \           phi'^2 = 2 p^2 (cos(phi_0) - cos(phi))
+        \   +          rho: half the diagonal
+         \,'
+    ======+===========  the edge stays where it is
+
+Friction must hold the edge, which carries less and less; and the solver must turn a body about a point that is not its
+centre. Judged are time and spin when phi passes ``to``, before the side lands, and what the edge has moved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from adapters.scene import Pair, Scene, SceneError
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.pivoting import Pivot
+from validation.scenes.parts import along, block, floor, states, tilted, upward
+
+#: Runs on for this long after the angle should be passed [s]: a step of 1/30 s at least.
+AFTERMATH = 0.05
+#: Angles at which it is asked whether friction can hold the edge.
+ASKED = 64
+
+
+def pivot(p: Params) -> Pivot:
+    """The box on its edge."""
+    return Pivot(p["aspect"] * p["height"], p["height"], p["g"])
+
+
+def _angles(p: Params) -> tuple[float, float]:
+    return math.radians(p["from"]), math.radians(p["to"])
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the box rests on its lower right edge, which touches the floor at the origin.
+
+    Raises
+    ------
+    SceneError
+        If its side lands, or friction cannot hold the edge, before ``to`` is passed.
+    """
+    p, on = params, pivot(params)
+    start, end = _angles(p)
+    if not start < end:
+        raise SceneError(f"pivot.to: {p['to']:g} must be greater than from, {p['from']:g}")
+    # The spin at the end turns it on meanwhile, faster than that by less than half.
+    further = end + 1.5 * AFTERMATH * on.speed(start, 0.0, end)
+    if further > 0.5 * math.pi - on.alpha:
+        raise SceneError(f"pivot.to: at {p['to']:g} degrees the side of a box of this aspect is about to land")
+    for angle in np.linspace(start, further, ASKED):
+        friction, normal = on.grip(start, 0.0, float(angle))
+        if abs(friction) > p["mu"] * normal:
+            raise SceneError(f"pivot.mu: {p['mu']:g} does not hold the edge at {math.degrees(angle):.0f} degrees")
+    box = tilted(
+        block("box", dimension, p["mass"], on.width, on.height),
+        dimension,
+        (on.arm * math.sin(start), on.arm * math.cos(start)),
+        -(start + on.alpha),
+    )
+    duration = on.time(start, 0.0, end) + AFTERMATH
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    return Scene("pivot", 1, dimension, (floor(dimension), box), pairs, upward(dimension, -p["g"]), duration, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Energy gives the spin, and its integral the time."""
+    on, (start, end) = pivot(scene.params), _angles(scene.params)
+    truth = {
+        "passing_time": on.time(start, 0.0, end),
+        "passing_spin": on.speed(start, 0.0, end),
+        "edge_moved": 0.0,
+    }
+    return truth | ({} if scene.dimension == 2 else {"twisted": 0.0})
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """When and how fast the angle of the diagonal passes, and the largest way of the edge from where it was."""
+    on, (_, end), d = pivot(scene.params), _angles(scene.params), scene.dimension
+    angle, spin = -metrics.tilt(trajectory) - on.alpha, -metrics.tilt_rate(trajectory)
+    time, speed = metrics.crossing(trajectory.t, angle, spin, end)
+    edge = metrics.point(trajectory, 1, along(d, 0.5 * on.width, -0.5 * on.height))
+    before = trajectory.t <= (trajectory.t[-1] if time[0] is None else time[0])
+    measured: dict[str, Measured] = {
+        "passing_time": time,
+        "passing_spin": speed,
+        "edge_moved": (float(np.linalg.norm(edge - edge[0], axis=1)[before].max()), ""),
+    }
+    if d == 3:
+        measured["twisted"] = (float(np.linalg.norm(trajectory.twist[:, 1, [3, 5]], axis=1).max()), "")
+    return measured
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Steps of first order: what they do of a fall whose contact may be found one step late.
+
+    Half a step of acceleration is what the order of a step shows, and a whole one is missing where a contact is found
+    late, at the start or after the edge was carried off the floor: 1.5 dt in time, and 1.5 steps in spin. What carries
+    the edge away raises the centre or moves its arm: energy m g times that, and the torque's share of it over the arm.
+    """
+    on, (start, end) = pivot(scene.params), _angles(scene.params)
+    g, spin = scene.params["g"], truth["passing_spin"]
+    carried = on.carried_away(start, 0.0, end, dt) + g * dt * dt
+    round_off = bounds.ROUND_OFF * on.arm
+    moved = bounds.Bound(
+        carried + round_off, "a step turns the box and moves its centre along the tangent: rho (w dt)^2/2 each; g dt^2"
+    )
+    time = bounds.Bound(
+        1.5 * dt + truth["passing_time"] * carried / on.arm,
+        "half a step by the order of a step, one for a contact found late, and the torque of an edge that moved",
+    )
+    speed = bounds.Bound(
+        1.5 * dt * on.rate * math.sin(end) + on.rate / (on.arm * spin) * carried,
+        "half a step of the acceleration by the order of a step, one for a contact found late, and an edge that moved",
+    )
+    source = "energy of a pendulum that is held by an edge; its integral"
+    found = [
+        time.check("passing_time", "s", truth["passing_time"], source),
+        speed.check("passing_spin", "rad/s", truth["passing_spin"], source),
+        moved.check("edge_moved", "m", truth["edge_moved"], source),
+    ]
+    if "twisted" in truth:
+        still = bounds.Bound(bounds.STILL * g * dt / on.arm, "a corner slower than v1/100 = g dt/100 does not move")
+        found.append(still.check("twisted", "rad/s", truth["twisted"], "symmetry"))
+    return found
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Error of the time at which the angle is passed, relative to it."""
+    truth = exact(scene)["passing_time"]
+    value, reason = found["passing_time"]
+    return (None, reason) if value is None else (abs(value / truth - 1.0), "")
+
+
+SCENE = CanonicalScene(
+    name="pivot",
+    version=1,
+    title="Box that falls over its edge",
+    figure=__doc__ or "",
+    law="phi'' = p^2 sin(phi), p^2 = 3 g/(4 rho), about an edge that stays where it is",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("from", 10.0, "degrees", "of the diagonal against the vertical at the start", 0.01, 80.0),
+        Parameter("to", 40.0, "degrees", "at which time and spin are told, before the side lands", 0.1, 85.0),
+        Parameter("aspect", 0.5, "1", "width over height", 0.02, 2.0),
+        Parameter("height", 1.0, "m", "of the box", 0.0, 1e3, positive=True),
+        Parameter("mu", 0.8, "1", "friction: must hold the edge, to the end", 0.0, 10.0),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    quick=(Variation({}), Variation({"from": 1.0, "to": 30.0})),
+    full=tuple(Variation({"from": a, "aspect": b}) for a in (1.0, 10.0, 25.0) for b in (0.2, 0.5)),
+    planted=({},),
+    primary=Primary(
+        "time error",
+        "1",
+        "|t/t_exact - 1| of the time at which the diagonal passes 40 degrees",
+        "time gathers all that is wrong on the way: a slipping edge, lost energy, a late start",
+        lambda dt: [{}, {"from": 1.0, "to": 30.0}],
+        error,
+        "the whole fall",
+    ),
+    smooth=("passing_time", "passing_spin"),
+    words={
+        "passing_time": "falls through the angle after {value}",
+        "passing_spin": "turns with {value} there",
+        "edge_moved": "its edge moves by {value}",
+        "twisted": "twists out of the plane with {value}",
+    },
+)

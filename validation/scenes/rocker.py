@@ -1,0 +1,239 @@
+"""A board rocks on a round log, rolling without slipping.
+
+         ____________         theta: tilt of the board; where it touches moves by R theta along it
+        |_____.______|  2 h   m (h^2 + R^2 theta^2 + i^2) theta'^2/2
+             ( )                + m g ((R + h) cos(theta) + R theta sin(theta)) = E
+             ( )  R           stable for R > h; small swings: omega^2 = g (R - h)/(h^2 + i^2)
+
+Nothing is lost: the contact rolls, and friction does no work. The time from one side to the other is the integral of
+d theta/theta', for any amplitude. A solver that loses or adds energy at a contact that wanders shows it here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from adapters.engine import Array
+from adapters.scene import Body, Disc, Pair, Scene, SceneError, Sphere
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.scenes.parts import block, pose_at, states, tilted, upward
+
+#: Swings from side to side that are followed.
+SWINGS = 3
+#: Nodes of the quadrature: twice as many change nothing at 1e-12.
+NODES = 96
+
+
+def _square(p: Params) -> float:
+    """Square of the board's radius of gyration, i^2 [m^2]."""
+    return (p["length"] ** 2 + p["thickness"] ** 2) / 12.0
+
+
+def _inertia(p: Params, theta: Array) -> Array:
+    """What theta'^2/2 is multiplied by, over the mass [m^2]."""
+    return np.asarray((0.5 * p["thickness"]) ** 2 + (p["radius"] * theta) ** 2 + _square(p))
+
+
+def _raised(p: Params, theta: Array) -> Array:
+    """Height of the centre over that of the level board [m], without loss of digits where it is small."""
+    half = np.sin(0.5 * theta)
+    return np.asarray(p["radius"] * theta * np.sin(theta) - 2.0 * (p["radius"] + 0.5 * p["thickness"]) * half**2)
+
+
+def _swing(p: Params) -> float:
+    """Time from one side to the other [s]: twice that from the side to level; theta = start sin(s)."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    s = 0.25 * math.pi * (x + 1.0)
+    start = np.array(math.radians(p["tilt"]))
+    theta = start * np.sin(s)
+    speed = np.sqrt(2.0 * p["g"] * (_raised(p, start) - _raised(p, theta)) / _inertia(p, theta))
+    return float(2.0 * 0.25 * math.pi * (weight @ (start * np.cos(s) / speed)))
+
+
+def _grips(p: Params) -> bool:
+    """Whether friction holds the contact all the way, and it carries."""
+    start = np.array(math.radians(p["tilt"]))
+    theta = np.linspace(-start, start, 201)
+    inertia, r, h, g = _inertia(p, theta), p["radius"], 0.5 * p["thickness"], p["g"]
+    spin = np.sqrt(np.maximum(0.0, 2.0 * g * (_raised(p, start) - _raised(p, theta)) / inertia))
+    # Lagrange: inertia theta'' + R^2 theta theta'^2 = g ((R + h) sin(theta) - R sin(theta) - R theta cos(theta))
+    turn = (g * (h * np.sin(theta) - r * theta * np.cos(theta)) - r * r * theta * spin**2) / inertia
+    # Acceleration of the centre along the board (t) and off it (n): its velocity is theta' (-h t + R theta n).
+    along = -h * turn - r * theta * spin**2
+    off = r * theta * turn + (r - h) * spin**2
+    friction, normal = along + g * np.sin(theta), off + g * np.cos(theta)
+    return bool((normal > 0.0).all() and (np.abs(friction) <= p["mu"] * normal).all())
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the board touches the log, tilted and at rest.
+
+    Raises
+    ------
+    SceneError
+        If the board would fall off, slip, or not come back.
+    """
+    p, theta = params, math.radians(params["tilt"])
+    r, h = p["radius"], 0.5 * p["thickness"]
+    if r <= h:
+        raise SceneError(f"rocker.radius: {r:g} m does not hold a board of {2.0 * h:g} m, half as thick it would")
+    path = np.linspace(0.0, theta, 101)[1:]
+    if r * theta > 0.45 * p["length"] or (np.diff(_raised(p, path)) <= 0.0).any():
+        raise SceneError(f"rocker.tilt: at {p['tilt']:g} degrees the board falls off")
+    if not _grips(p):
+        raise SceneError(f"rocker.mu: {p['mu']:g} lets the board slip on the log")
+    log = Body(
+        "log", Disc(r) if dimension == 2 else Sphere(r), pose=pose_at(dimension, (0.0,) * dimension), motion="fixed"
+    )
+    # The centre lies h off the contact and R theta along the board from it.
+    place = (
+        -(r + h) * math.sin(theta) + r * theta * math.cos(theta),
+        (r + h) * math.cos(theta) + r * theta * math.sin(theta),
+    )
+    board = tilted(block("board", dimension, p["mass"], p["length"], p["thickness"]), dimension, place, theta)
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    duration = (SWINGS + 0.25) * _swing(p)
+    return Scene("rocker", 1, dimension, (log, board), pairs, upward(dimension, -p["g"]), duration, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Energy, and the time that it takes from side to side."""
+    truth = {"swing_time": _swing(scene.params), "amplitude": 1.0, "slip": 0.0}
+    return truth | ({} if scene.dimension == 2 else {"yaw": 0.0})
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Times at which the board is level, its last tilt to a side, and how far the contact has slipped along it."""
+    p, d = scene.params, scene.dimension
+    theta, spin = metrics.tilt(trajectory), metrics.tilt_rate(trajectory)
+    first, _ = metrics.crossing(trajectory.t, -theta, -spin, 0.0)
+    after = trajectory.t > (SWINGS - 0.75) * _swing(p)
+    direction = 1.0 if SWINGS % 2 == 0 else -1.0
+    last, _ = metrics.crossing(trajectory.t[after], direction * theta[after], direction * spin[after], 0.0)
+    swing: Measured = (None, metrics.NOT_PASSED)
+    if first[0] is not None and last[0] is not None:
+        swing = ((last[0] - first[0]) / (SWINGS - 1), "")
+    # Where the log's normal along the board meets it, against how far the tilt has rolled it.
+    centre = trajectory.pose[:, 1, [0, d - 1]]
+    along = -(np.cos(theta) * centre[:, 0] + np.sin(theta) * centre[:, 1])
+    rolled = along + p["radius"] * theta
+    top = trajectory.t > (SWINGS - 0.5) * _swing(p)
+    measured: dict[str, Measured] = {
+        "swing_time": swing,
+        "amplitude": (float(np.abs(theta[top]).max()) / math.radians(p["tilt"]), ""),
+        "slip": (float(np.abs(rolled - rolled[0]).max()), ""),
+    }
+    if d == 3:
+        measured["yaw"] = (float(np.linalg.norm(trajectory.twist[:, 1, [3, 5]], axis=1).max()), "")
+    return measured
+
+
+def _left_out(p: Params) -> tuple[float, float]:
+    """What steps of first order leave out over one swing, over dt: way of the centre [m/s], and energy as height [m/s].
+
+    A step moves the centre by its velocity: dt^2/2 times the acceleration a that keeps it on the log is missing. The
+    next one takes the velocity a dt off it, (a dt)^2/2 of energy.
+    """
+    start = np.array(math.radians(p["tilt"]))
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    theta = start * np.sin(0.5 * math.pi * x)
+    inertia, r, h = _inertia(p, theta), p["radius"], 0.5 * p["thickness"]
+    speed = np.sqrt(2.0 * p["g"] * (_raised(p, start) - _raised(p, theta)) / inertia)
+    turn = (p["g"] * (h * np.sin(theta) - r * theta * np.cos(theta)) - r * r * theta * speed**2) / inertia
+    pace = 0.5 * math.pi * weight * start * np.cos(0.5 * math.pi * x) / speed
+    square = (r * theta * turn + (r - h) * speed**2) ** 2 + (h * turn + r * theta * speed**2) ** 2
+    return 0.5 * float(pace @ np.sqrt(2.0 * square)), 0.5 * float(pace @ square) / p["g"]
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Steps of first order: what they leave out of the way of the contact, and take off its energy.
+
+    An amplitude is as far off as that energy takes it, and as a step and a half of acceleration at the start do, for
+    the order of a step and a contact found late. A swing takes the time of its amplitude, and each of the two times at
+    which the board is level may be a step off.
+    """
+    p, g = scene.params, scene.params["g"]
+    start = math.radians(p["tilt"])
+    way, energy = _left_out(p)
+    slope = float((_raised(p, np.array(start * 1.001)) - _raised(p, np.array(start * 0.999))) / (0.002 * start))
+    kick = 0.5 * (1.5 * dt) ** 2 * g * slope**2 / float(_inertia(p, np.array(start)))
+    error = (SWINGS * energy * dt + kick) / slope / start + bounds.ROUND_OFF
+    other = [_swing({**p, "tilt": p["tilt"] * (1.0 + side * min(error, 0.2))}) for side in (-1.0, 1.0)]
+    swing = bounds.Bound(
+        2.0 * dt / (SWINGS - 1) + max(abs(each - truth["swing_time"]) for each in other),
+        "a step at both ends of the swings, and the time that an amplitude takes that steps of first order change",
+    )
+    amplitude = bounds.Bound(
+        error, "steps take (a dt)^2/2 off the energy, a: what keeps the board on the log; and 1.5 steps at the start"
+    )
+    slip = bounds.Bound(
+        SWINGS * way * dt + g * dt * dt,
+        "a step leaves out dt^2/2 of the acceleration that keeps the board on the log; a contact found one step late",
+    )
+    source = "Lagrange's equation of a board that rolls on a log; energy"
+    found = [
+        swing.check("swing_time", "s", truth["swing_time"], source),
+        amplitude.check("amplitude", "1", truth["amplitude"], source),
+        slip.check("slip", "m", truth["slip"], source),
+    ]
+    if "yaw" in truth:
+        still = bounds.Bound(
+            bounds.STILL * g * dt / (0.5 * p["length"]), "an end slower than v1/100 = g dt/100 does not move"
+        )
+        found.append(still.check("yaw", "rad/s", truth["yaw"], "symmetry"))
+    return found
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Error of the time of a swing, relative to it."""
+    truth = exact(scene)["swing_time"]
+    value, reason = found["swing_time"]
+    return (None, reason) if value is None else (abs(value / truth - 1.0), "")
+
+
+SCENE = CanonicalScene(
+    name="rocker",
+    version=1,
+    title="Board that rocks on a log",
+    figure=__doc__ or "",
+    law="(h^2 + R^2 theta^2 + i^2) theta'^2/2 + g ((R + h) cos(theta) + R theta sin(theta)) is kept",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("tilt", 15.0, "degrees", "of the board at the start", 0.1, 60.0),
+        Parameter("radius", 0.5, "m", "of the log", 0.0, 1e3, positive=True),
+        Parameter("thickness", 0.1, "m", "of the board; less than twice the radius", 0.0, 1e3, positive=True),
+        Parameter("length", 2.0, "m", "of the board", 0.0, 1e3, positive=True),
+        Parameter("mu", 0.8, "1", "friction: must hold the contact", 0.0, 10.0, positive=True),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("mass", 1.0, "kg", "of the board", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    quick=(Variation({}), Variation({"tilt": 5.0})),
+    full=tuple(Variation({"tilt": t, "thickness": h}) for t in (2.0, 5.0, 15.0) for h in (0.05, 0.1, 0.4)),
+    planted=({},),
+    primary=Primary(
+        "time error",
+        "1",
+        "error of the time from side to side, over it",
+        "a period gathers inertia, gravity and the place of a contact that wanders",
+        lambda dt: [{}],
+        error,
+        "the rocking board",
+    ),
+    smooth=("swing_time",),
+    words={
+        "swing_time": "swings from side to side in {value}",
+        "amplitude": "still swings to {value} of its first tilt",
+        "slip": "slips on the log by {value}",
+        "yaw": "turns out of its plane with {value}",
+    },
+)

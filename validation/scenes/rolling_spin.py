@@ -1,0 +1,130 @@
+"""A ball rolls and spins about the vertical as well: a point of contact cannot brake that spin.
+
+         | s                  spin about the normal: s for ever
+        (|)  -->  v           speed:                 v for ever, straight on
+    ====================
+
+Friction at a point has no lever arm about the normal, and a rolling point does not slip: Coulomb's law takes nothing
+from either. Spin that decays is torsional friction, speed that decays is resistance to rolling; neither was asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.rolling import forward, gyration, launched, on_a_late_arm, struck
+from validation.scenes.parts import ball, floor, heading, states, upward
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the ball touches the floor and rolls."""
+    p = params
+    still = ball("ball", dimension, p["mass"], p["radius"], p["radius"])
+    rolling = launched(still, dimension, math.radians(p["heading"]), p["v"], p["v"] / p["radius"])
+    spinning = replace(rolling, twist=(*rolling.twist[:5], p["spin"]))
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    return Scene(
+        "rolling_spin", 1, dimension, (floor(dimension), spinning), pairs, upward(dimension, -p["g"]), p["duration"], p
+    )
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Nothing acts but the load and what carries it."""
+    return {"spin": scene.params["spin"], "speed": scene.params["v"], "hop": 0.0, "astray": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Spin about the vertical and speed along the heading at the end."""
+    return {
+        "spin": (float(trajectory.twist[-1, 1, 5]), ""),
+        "speed": (float(forward(scene, trajectory)[0][-1]), ""),
+        "hop": (metrics.hop(trajectory), ""),
+        "astray": (metrics.astray(trajectory, heading(scene)), ""),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Exact at every step, but that a contact found one step late is g dt^2 deep: rolling there needs less speed.
+
+    The impulse that makes it roll on the shorter arm is told by the law of an impact that grips.
+    """
+    p, r = scene.params, scene.params["radius"]
+    depth = p["g"] * dt * dt
+
+    def speed(arm: float) -> float:
+        return struck(p["v"], p["v"] / r, math.inf, p["mu"], gyration(scene.dimension), r, arm)[0]
+
+    source = "Coulomb's law at a point: no torque about the normal, no work while it rolls"
+    rolls = on_a_late_arm(speed, r, depth, p["v"])
+    return [
+        bounds.exact(p["spin"]).check("spin", "rad/s", truth["spin"], source),
+        rolls.check("speed", "m/s", truth["speed"], source),
+        bounds.found_late(p["g"], dt, r).check("hop", "m", truth["hop"], source),
+        bounds.straight(p["g"], dt, p["v"] * scene.duration).check("astray", "m", truth["astray"], source),
+    ]
+
+
+def track(scene: Scene) -> Track:
+    """Straight on."""
+    v, line, start = scene.params["v"], heading(scene), scene.bodies[1].pose[:3]
+    return Track("ball", lambda t: (*(float(x) for x in v * t * line), start[2]))
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Spin that is lost, relative to the spin."""
+    value, reason = found["spin"]
+    return (None, reason) if value is None else (abs(value / scene.params["spin"] - 1.0), "")
+
+
+SCENE = CanonicalScene(
+    name="rolling_spin",
+    version=1,
+    title="Ball that rolls and spins about the vertical",
+    figure=__doc__ or "",
+    law="spin about the normal and speed of rolling last for ever: friction at a point takes from neither",
+    dimensions=(3,),
+    parameters=(
+        Parameter("spin", 10.0, "rad/s", "about the vertical", 0.0, 1e3, positive=True),
+        Parameter("v", 1.0, "m/s", "of the centre; the ball rolls from the start", 0.0, 1e2),
+        Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
+        Parameter("heading", 30.0, "degrees", "of the motion against the axes", 0.0, 90.0),
+        Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
+        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        Parameter("duration", 2.0, "s", "of the run", 0.1, 100.0),
+        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    track=track,
+    quick=(Variation({}), Variation({"v": 0.0, "spin": 50.0})),
+    full=tuple(
+        Variation({"v": v, "spin": s, "heading": h}) for v in (0.0, 1.0) for s in (1.0, 50.0) for h in (0.0, 30.0)
+    ),
+    planted=({},),
+    primary=Primary(
+        "lost spin",
+        "1",
+        "spin about the vertical that is lost by the end, over the spin",
+        "a point of contact has no torsional friction: what is lost is the engine's own",
+        lambda dt: [{}],
+        error,
+        "the rolling, spinning ball",
+        0.1,
+        0.5,
+    ),
+    words={
+        "spin": "spins about the vertical with {value}",
+        "speed": "rolls on with {value}",
+        "hop": "leaves the floor, up or down, by {value}",
+        "astray": "strays sideways by {value}",
+    },
+)

@@ -1,0 +1,140 @@
+"""A fast ball meets a thin plate in free space: it comes back, however fast it is.
+
+              |#|
+       o -->  |#|  d         v+ = -e v-,  on the side that it came from
+              |#|
+       |<- v dt ->|          a method of fixed steps sees it only where its steps end
+
+Newton's law knows no speed and no thickness. A method that looks at overlaps at the ends of its steps finds a contact
+up to v dt late; a ball that is on the other side by then is not found, or is pushed out there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.scene import Body, Box, Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds
+from validation.canonical import (
+    CanonicalScene,
+    Check,
+    Measured,
+    Parameter,
+    Params,
+    Primary,
+    Restitution,
+    Track,
+    Variation,
+)
+from validation.scenes.parts import (
+    PHASES,
+    along,
+    at,
+    ball,
+    between_impacts,
+    delay,
+    phases,
+    pose_at,
+    states,
+)
+
+#: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
+AFTERMATH = 0.35
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the plate's near face is at 0, and the ball meets its middle after ``delay`` seconds."""
+    p = params
+    half = (0.5 * p["thickness"], *(1.0,) * (dimension - 1))
+    place = pose_at(dimension, along(dimension, 0.5 * p["thickness"]))
+    plate = Body("plate", Box(half), pose=place, motion="fixed")
+    thrown = at(
+        ball("ball", dimension, p["mass"], p["radius"], 0.0),
+        dimension,
+        along(dimension, -p["radius"] - p["v"] * p["delay"]),
+        along(dimension, p["v"]),
+    )
+    pairs = (Pair(restitution=p["e"], friction=0.0),)
+    return Scene("thin_wall", 1, dimension, (plate, thrown), pairs, (0.0,) * dimension, p["delay"] + AFTERMATH, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Newton's law of restitution against what does not move."""
+    return {"rebound_ratio": scene.params["e"], "beyond": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Speed away from the plate at the end, and how far the ball has been beyond where it touches."""
+    p = scene.params
+    x = trajectory.pose[:, 1, 0]
+    return {
+        "rebound_ratio": (float(-trajectory.twist[-1, 1, 0]) / p["v"], ""),
+        "beyond": (max(0.0, float(x.max()) + p["radius"]), ""),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """The law is exact at every step; what is found late is v dt deep, whatever is behind the face."""
+    p = scene.params
+    reach = p["v"] * (p["delay"] + AFTERMATH)
+    deep = bounds.Bound(p["v"] * dt + bounds.ROUND_OFF * reach, "the contact is found up to one step late, v dt deep")
+    source = "Newton's law of restitution; bodies do not pass through each other"
+    return [
+        bounds.exact().check("rebound_ratio", "1", truth["rebound_ratio"], source),
+        deep.check("beyond", "m", truth["beyond"], source),
+    ]
+
+
+def track(scene: Scene) -> Track:
+    """Straight in, straight out."""
+    p = scene.params
+    x = between_impacts(-p["radius"] - p["v"] * p["delay"], p["v"], [(p["delay"], -p["e"] * p["v"])])
+    return Track("ball", lambda t: along(scene.dimension, x(t)))
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Distance of the rebound ratio from e: 1 + e for a ball that passes."""
+    value, reason = found["rebound_ratio"]
+    return (None, reason) if value is None else (abs(value - scene.params["e"]), "")
+
+
+SCENE = CanonicalScene(
+    name="thin_wall",
+    version=1,
+    title="Fast ball against a thin plate",
+    figure=__doc__ or "",
+    law="v+ = -e v- at any speed and thickness",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("v", 20.0, "m/s", "approach speed; 20: 8 cm in a step of 1/240 s", 0.0, 1e4, positive=True),
+        Parameter("thickness", 0.02, "m", "of the plate", 0.0, 1.0, positive=True),
+        Parameter("e", 0.5, "1", "coefficient of restitution of the pair", 0.0, 1.0),
+        Parameter("radius", 0.1, "m", "of the ball", 0.0, 1.0, positive=True),
+        delay(),
+        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    track=track,
+    quick=(Variation({}), Variation({"v": 200.0})),
+    full=tuple(Variation({"v": v, "thickness": d}) for v in (5.0, 20.0, 50.0, 200.0, 1000.0) for d in (0.02, 0.2)),
+    planted=({},),
+    primary=Primary(
+        "rebound error",
+        "1",
+        f"largest |v+/v- - e| over {PHASES} contact times within a step; 1 + e for a ball that passes",
+        "the worst phase of the contact decides whether a ball passes",
+        phases,
+        error,
+        "the whole scene: approach, contact, departure",
+    ),
+    words={
+        "rebound_ratio": "comes back at {value} of its speed (below 0: it has passed)",
+        "beyond": "gets {value} beyond the face",
+    },
+    restitution=Restitution("rebound_ratio", "e", "v"),
+)
