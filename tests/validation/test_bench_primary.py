@@ -12,13 +12,18 @@ from validation.posed import primary_of, resolve
 DT = 1 / 240
 
 
+def lowest(scene):
+    """The plane, of scenes that exist in it."""
+    return min(resolve(scene).dimensions)
+
+
 def error(scene, params, metrics, dt=DT):
-    made = resolve(scene).scene(2, params)
+    made = resolve(scene).scene(lowest(scene), params)
     return primary_of(scene).error(made, dt, {name: (value, "") for name, value in metrics.items()})
 
 
 def truth(scene, params):
-    return dict(resolve(scene).exact(resolve(scene).scene(2, params)))
+    return dict(resolve(scene).exact(resolve(scene).scene(lowest(scene), params)))
 
 
 def test_every_scene_of_the_catalogue_declares_one_error_with_a_reason():

@@ -43,6 +43,10 @@ from validation.scenes.parts import (
 AFTERMATH = 0.35
 
 
+#: Time until contact [s] that is a hair more than 12 steps of 1/240 s: found as late, and as deep, as it can be.
+LATEST = 0.0500001
+
+
 def make(dimension: int, params: Params) -> Scene:
     """Build the scene: the plate's near face is at 0, and the ball meets its middle after ``delay`` seconds."""
     p = params
@@ -122,7 +126,7 @@ SCENE = CanonicalScene(
     track=track,
     quick=(Variation({}), Variation({"v": 200.0})),
     full=tuple(Variation({"v": v, "thickness": d}) for v in (5.0, 20.0, 50.0, 200.0, 1000.0) for d in (0.02, 0.2)),
-    planted=({},),
+    planted=({}, {"delay": LATEST}),
     primary=Primary(
         "rebound error",
         "1",
