@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.needs import Needs
+from adapters.releases import Releases
 from adapters.scene import Scene
 
 Array = NDArray[np.float64]
@@ -186,6 +187,8 @@ class Engine(ABC):
     facts: EngineFacts
     #: Profile name -> rule that chooses the settings from a scene's needs and the step.
     profiles: Mapping[str, ProfileRule]
+    #: What the adapter knows of other releases; None: nothing, its package is the only distribution.
+    releases: Releases | None = None
 
     @property
     def name(self) -> str:

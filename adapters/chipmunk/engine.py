@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.chipmunk.profiles import PROFILES, checked
+from adapters.chipmunk.releases import RELEASES, installed_version
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
@@ -72,12 +73,11 @@ class ChipmunkEngine(Engine):
         ),
     )
     profiles = PROFILES
+    releases = RELEASES
 
     def version(self) -> str:
-        """Version of pymunk; the string of the bundled C library is stale and says nothing."""
-        import pymunk
-
-        return str(pymunk.version)
+        """Version of pymunk; strings of its own and of the bundled C library are stale in some releases."""
+        return installed_version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Pair tables that no product of two numbers can represent, and masses whose inverse overflows."""

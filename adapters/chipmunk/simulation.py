@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.chipmunk.releases import point_impulses
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.engine import Array, Contacts, EngineError, Simulation
@@ -147,16 +148,10 @@ def _size(shape: Any) -> list[float]:
 
 
 def _contact_rows(arbiter: Any, i: int, j: int) -> list[tuple[int, int, Any, Any, Any, float]]:
-    """Rows of one arbiter seen from body ``i``.
-
-    Impulse on the second body: ``J = n jn + t jt`` with t the normal turned by +90 degrees (cpArbiter.c,
-    cpArbiterTotalImpulse), for each point; the accumulated values are not public, pymunk's own pickling reads them
-    the same way.
-    """
+    """Rows of one arbiter seen from body ``i``, each with the impulse on the second body at its point."""
     points = arbiter.contact_point_set
     (nx, ny), rows = points.normal, []
-    for point, accumulated in zip(points.points, arbiter._arbiter.contacts[0 : len(points.points)], strict=True):
-        jn, jt = accumulated.jnAcc, accumulated.jtAcc
+    for point, impulse in zip(points.points, point_impulses(arbiter, len(points.points)), strict=True):
         middle = (0.5 * (point.point_a.x + point.point_b.x), 0.5 * (point.point_a.y + point.point_b.y))
-        rows.append((i, j, middle, (nx, ny), (nx * jn - ny * jt, ny * jn + nx * jt), point.distance))
+        rows.append((i, j, middle, (nx, ny), impulse, point.distance))
     return rows

@@ -6,6 +6,7 @@ pairs          what a setting means for a pair of materials
 spec           a scene as MuJoCo's own model
 simulation     one model and its data
 engine         the adapter
+releases       what older releases do differently, and how that is handled
 contact_law    one contact, as a scalar recurrence; box_on_face, blows and motions build on it
 """
 

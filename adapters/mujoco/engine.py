@@ -17,6 +17,7 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import PROFILES, check_settings
+from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
@@ -82,6 +83,7 @@ class MujocoEngine(Engine):
         known_bad_versions=KNOWN_BAD,
     )
     profiles = PROFILES
+    releases = RELEASES
 
     def version(self) -> str:
         """Version of `mujoco-core` or `mujoco`, whichever is installed."""

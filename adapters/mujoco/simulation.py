@@ -13,6 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.mujoco.releases import check_state, silence
 from adapters.mujoco.spec import Spec, rotation
 from adapters.scene import Scene
 
@@ -24,9 +25,7 @@ class MujocoSimulation(Simulation):
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         import mujoco
 
-        log = mujoco.MjLogConfig.get()
-        log.logto_file = log.logto_console = False
-        log.set()
+        silence(mujoco)
         self._mujoco, self._scene, self._dt = mujoco, scene, dt
         self._settings = dict(settings)
         self._model = Spec(scene, dt, settings).compile()
@@ -58,6 +57,7 @@ class MujocoSimulation(Simulation):
             If MuJoCo dropped contacts for want of memory.
         """
         self._mujoco.mj_step(self._model, self._data, nstep=steps)
+        check_state(self._mujoco, self._data)
         kinds = self._mujoco.mjtWarning
         for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
             if self._data.warning[kind].number:
@@ -90,7 +90,7 @@ class MujocoSimulation(Simulation):
             frame = contact.frame.reshape(3, 3)
             self._mujoco.mj_contactForce(self._model, self._data, k, force)
             impulse = self._dt * (force[:3] @ frame) if one_solve else np.full(3, np.nan)
-            a, b = (self._body_of_geom[g] for g in contact.geom)
+            a, b = (self._body_of_geom[int(g)] for g in contact.geom)
             rows.append((a, b, contact.pos.copy(), frame[0].copy(), impulse, float(contact.dist)))
         return Contacts.from_rows(rows, 3)
 

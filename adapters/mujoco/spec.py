@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.engine import Array, EngineError
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
+from adapters.mujoco.releases import empty_spec, no_autoreset
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-12 of the free body's,
@@ -50,7 +51,7 @@ class Spec:
         import mujoco
 
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
-        self.spec = mujoco.MjSpec()
+        self.spec = empty_spec(mujoco)
         pairs = list(scene.contact_pairs())
         materials = {(material.restitution, material.friction) for _, _, material in pairs}
         self.shared = materials.pop() if len(materials) == 1 and settings["solreffriction"] is None else None
@@ -72,7 +73,7 @@ class Spec:
         option.cone = getattr(mj.mjtCone, f"mjCONE_{settings['cone'].upper()}")
         for name in ("impratio", "iterations", "tolerance", "noslip_iterations"):
             setattr(option, name, settings[name])
-        option.disableflags = mj.mjtDisableBit.mjDSBL_AUTORESET
+        option.disableflags = no_autoreset(mj)
 
     def _body(self, index: int, body: Body) -> None:
         world = self.spec.worldbody

@@ -1,0 +1,49 @@
+"""pymunk over its releases: what changed in what the adapter reads."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Any
+
+from adapters.releases import Difference, Distribution, Releases
+
+RELEASES = Releases(
+    distributions=(Distribution("pymunk"),),
+    known=">=6.4.0,<8",
+    differences=(
+        Difference("<6.5", "the structure of an arbiter is opaque: impulses of single points cannot be read",
+                   "its public total is given to its points in equal parts; what is summed over a pair is exact",
+                   "measured: 6.4.0 refuses to read fields of cpArbiter, 6.5.2 does not"),
+        Difference("6.6.0 and 7.0.0", "pymunk.version is not the release (6.6.0 says 6.6.2, 7.0.0 says 2.0.0)",
+                   "the version is read from the distribution's metadata, in every release",
+                   "measured"),
+    ),
+)  # fmt: skip
+
+
+def installed_version() -> str:
+    """Version of the installed release, from its metadata.
+
+    Raises
+    ------
+    ImportError
+        If pymunk is not installed.
+    """
+    import pymunk  # noqa: F401  (a release that cannot be imported has no version)
+
+    return version("pymunk")
+
+
+def point_impulses(arbiter: Any, count: int) -> list[tuple[float, float]]:
+    """Impulses [N s] on the second body at each of ``count`` points, world axes.
+
+    ``J = n jn + t jt`` with t the normal turned by +90 degrees (cpArbiter.c, cpArbiterTotalImpulse); the accumulated
+    values are not public, pymunk's own pickling reads them the same way.
+    """
+    try:
+        accumulated = [(each.jnAcc, each.jtAcc) for each in arbiter._arbiter.contacts[0:count]]
+    except AttributeError:  # opaque before 6.5
+        x, y = arbiter.total_impulse
+        return [(-x / count, -y / count)] * count
+    nx, ny = arbiter.contact_point_set.normal
+    return [(nx * jn - ny * jt, ny * jn + nx * jt) for jn, jt in accumulated]

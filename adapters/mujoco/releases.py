@@ -1,0 +1,168 @@
+"""MuJoCo over its releases: what changed in its Python interface, and a writer of MJCF for those without `MjSpec`.
+
+`Mjcf` has the few methods of ``mujoco.MjSpec`` that `adapters.mujoco.spec` calls, and writes the same model as text.
+Numbers are written with all their digits, so that both ways compile to the same model, bit by bit
+(``tests/adapters/test_releases.py``).
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+from adapters.engine import EngineError
+from adapters.releases import Difference, Distribution, Releases, Requirement
+
+RELEASES = Releases(
+    distributions=(Distribution("mujoco", "<4.0.0"), Distribution("mujoco-core", ">=4.0.0")),
+    known=">=3.0.0,<5",
+    requirements=(
+        Requirement("<3.1.3", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
+                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.2)"),
+    ),
+    differences=(
+        Difference("<3.2.4", "MjSpec is missing, or takes no attributes where a body, geom or pair is added",
+                   "the model is written as MJCF by `Mjcf`, which is the same model to the last bit",
+                   "measured: 3.1.6 has none, 3.2.0 to 3.2.3 refuse attributes, 3.2.4 takes them"),
+        Difference("<3.2.4", "there is no flag that disables autoreset: a state that is not finite starts anew",
+                   "the counters of bad states are read after every advance; one that counts ends the run",
+                   "measured: mjtDisableBit.mjDSBL_AUTORESET is there from 3.2.4 on"),
+        Difference("<3.1.3", "contact.geom holds floating-point numbers", "they are turned into integers",
+                   "measured: 3.1.2 float64, 3.1.3 int32"),
+        Difference("<3.10.0", "there is no MjLogConfig: warnings cannot be switched off",
+                   "none is expected; a file MUJOCO_LOG.TXT may be written where an unstable run warns",
+                   "measured: 3.3.7 has none, 3.10.0 has it"),
+        Difference(">=4.0.0", "the bindings moved from the distribution mujoco to mujoco-core",
+                   "both are this engine; mujoco 4.0.0 itself holds no engine, only tools on top of mujoco-core",
+                   "metadata of mujoco 4.0.0"),
+    ),
+)  # fmt: skip
+
+
+def empty_spec(mujoco: Any) -> Any:
+    """An empty ``MjSpec``, or what stands for it in releases whose own cannot be written as the adapter does."""
+    try:
+        spec = mujoco.MjSpec()
+        spec.worldbody.add_body(name="asked")
+    except (AttributeError, TypeError):
+        return Mjcf(mujoco)
+    return mujoco.MjSpec()
+
+
+def no_autoreset(mujoco: Any) -> int:
+    """Bit that disables autoreset; 0 where there is none (see `check_state`)."""
+    return int(getattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET", 0))
+
+
+def check_state(mujoco: Any, data: Any) -> None:
+    """Refuse to go on from a state that was reset because it was not finite.
+
+    Raises
+    ------
+    EngineError
+        If autoreset cannot be disabled in this release, and has acted.
+    """
+    if no_autoreset(mujoco):
+        return
+    kinds = mujoco.mjtWarning
+    for kind in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC):
+        if data.warning[kind].number:
+            raise EngineError(f"state: MuJoCo has reset a state that was not finite ({kind.name})")
+
+
+def silence(mujoco: Any) -> None:
+    """Switch the log off, where a release lets us."""
+    if hasattr(mujoco, "MjLogConfig"):
+        log = mujoco.MjLogConfig.get()
+        log.logto_file = log.logto_console = False
+        log.set()
+
+
+class Mjcf:
+    """Writes MJCF through the part of ``MjSpec``'s interface that the adapter uses."""
+
+    def __init__(self, mujoco: Any) -> None:
+        self._mujoco = mujoco
+        self.option = SimpleNamespace()
+        self._root = ElementTree.Element("mujoco")
+        self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
+        self._contact = ElementTree.Element("contact")
+
+    def add_pair(self, *, geomname1: str, geomname2: str, **attributes: Any) -> None:
+        """Add a pair of geoms by their names."""
+        given = {"geom1": geomname1, "geom2": geomname2, **attributes}
+        if not any(given.get("solreffriction", ())):
+            given.pop("solreffriction", None)  # MuJoCo's own way of saying: as solref
+        ElementTree.SubElement(self._contact, "pair", _text(given))
+
+    def compile(self) -> Any:
+        """Return the compiled ``MjModel``; raises ValueError as MuJoCo does."""
+        ElementTree.SubElement(self._root, "compiler", {"angle": "radian"})
+        said = dict(vars(self.option))
+        said.pop("disableflags", None)  # its only bit is autoreset's, which these releases do not have
+        mj = self._mujoco
+        said["integrator"] = mj.mjtIntegrator(said["integrator"]).name.removeprefix("mjINT_")
+        said["integrator"] = {"EULER": "Euler"}.get(said["integrator"], said["integrator"])
+        if said["integrator"].startswith("IMPLICIT"):
+            said["integrator"] = said["integrator"].lower()
+        said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
+        ElementTree.SubElement(self._root, "option", _text(said))
+        self.worldbody.finish()
+        self._root.append(self.worldbody.element)
+        if len(self._contact):
+            self._root.append(self._contact)
+        return mj.MjModel.from_xml_string(ElementTree.tostring(self._root, encoding="unicode"))
+
+
+class _Body:
+    """A body; its inertial is written when the spec is compiled, from attributes of ``MjsBody``'s names."""
+
+    def __init__(self, mujoco: Any, element: ElementTree.Element) -> None:
+        self._mujoco, self.element = mujoco, element
+        self._children: list[_Body] = []
+        self.explicitinertial = False
+        self.mass, self.gravcomp = 0.0, 0.0
+        self.ipos: Any = (0.0, 0.0, 0.0)
+        self.iquat: Any = (1.0, 0.0, 0.0, 0.0)
+        self.inertia: Any = (0.0, 0.0, 0.0)
+
+    def add_body(self, **attributes: Any) -> _Body:
+        """Add a child body."""
+        made = _Body(self._mujoco, ElementTree.SubElement(self.element, "body", _text(attributes)))
+        self._children.append(made)
+        return made
+
+    def add_freejoint(self) -> None:
+        """Let it move freely."""
+        ElementTree.SubElement(self.element, "freejoint")
+
+    def add_geom(self, *, type: Any, **attributes: Any) -> None:
+        """Add a geom."""
+        kind = self._mujoco.mjtGeom(type).name.removeprefix("mjGEOM_").lower()
+        ElementTree.SubElement(self.element, "geom", {"type": kind, **_text(attributes)})
+
+    def finish(self) -> None:
+        """Write what was set as attributes."""
+        if self.explicitinertial:
+            given = {"pos": self.ipos, "quat": self.iquat, "mass": self.mass, "diaginertia": self.inertia}
+            self.element.insert(0, ElementTree.Element("inertial", _text(given)))
+        if self.gravcomp:
+            self.element.set("gravcomp", repr(float(self.gravcomp)))
+        for child in self._children:
+            child.finish()
+
+
+def _text(attributes: dict[str, Any]) -> dict[str, str]:
+    """Attributes as MJCF writes them, with all digits of every number."""
+    return {name: _written(value) for name, value in attributes.items()}
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    if isinstance(value, float):
+        return repr(value)
+    return " ".join(_written(float(item)) for item in value)

@@ -1,0 +1,132 @@
+"""What adapters know of older releases: one table each, and code that does there what it does on the newest."""
+
+from importlib.metadata import version
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from packaging.specifiers import SpecifierSet
+
+from adapters import registry
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.stepping import posed_for
+from validation.catalogue import CATALOGUE
+
+WITH_RELEASES = ["chipmunk", "bullet", "mujoco"]
+
+
+@pytest.mark.parametrize("name", WITH_RELEASES)
+def test_the_installed_release_is_one_that_the_adapter_knows(name):
+    releases = registry.adapter(name).releases
+    assert SpecifierSet(releases.known).contains(registry.load(name).version())
+    for requirement in releases.requirements:
+        assert SpecifierSet(requirement.versions) and requirement.because
+
+
+@pytest.mark.parametrize("name", WITH_RELEASES)
+def test_each_release_is_carried_by_exactly_one_distribution(name):
+    releases = registry.adapter(name).releases
+    for release in ("3.0.0", "3.2.7", "3.17.0", "4.0.0", "4.0.1", "6.4.0", "7.3.1"):
+        carriers = [d.name for d in releases.distributions if SpecifierSet(d.versions).contains(release)]
+        assert len(carriers) == 1
+
+
+def settings_of(engine, scene):
+    for profile in engine.profiles:
+        yield {setting.name: setting.value for setting in engine.settings(profile, needs(scene), 1.0 / 240.0)}
+
+
+def scenes_of(engine):
+    for canonical in CATALOGUE.values():
+        for dimension in canonical.dimensions:
+            scene = posed_for(engine, canonical.scene(dimension))
+            if not engine.refuses(scene, "default"):
+                yield scene
+
+
+def arrays(model):
+    """Every number of a compiled model by name."""
+    for place in (model, model.opt, model.stat):
+        for name in dir(place):
+            value = getattr(place, name)
+            if not name.startswith("_") and isinstance(value, np.ndarray | float | int):
+                yield f"{type(place).__name__}.{name}", np.asarray(value)
+
+
+def test_a_model_written_as_mjcf_is_the_model_of_mjspec_to_the_last_bit(monkeypatch):
+    pytest.importorskip("mujoco")
+    import mujoco
+
+    from adapters.mujoco import spec as adapter
+    from adapters.mujoco.releases import Mjcf
+
+    engine, compared = registry.load("mujoco"), 0
+    for scene in scenes_of(engine):
+        for settings in settings_of(engine, scene):
+            written = []
+            for make in (lambda mj: mj.MjSpec(), Mjcf):
+                monkeypatch.setattr(adapter, "empty_spec", make)
+                written.append(dict(arrays(adapter.Spec(scene, 1.0 / 240.0, settings).compile())))
+            ours, theirs = written
+            # The only difference: releases that need MJCF have no bit to disable autoreset.
+            differing = [name for name in ours if not np.array_equal(ours[name], theirs[name], equal_nan=True)]
+            assert differing == ["MjOption.disableflags"]
+            assert int(ours["MjOption.disableflags"]) == mujoco.mjtDisableBit.mjDSBL_AUTORESET
+            compared += 1
+    assert compared > 40
+
+
+def older_mujoco(**changed):
+    """The installed MuJoCo as a release without autoreset's flag would show itself."""
+    mujoco = pytest.importorskip("mujoco")
+    names = {"mjtDisableBit": SimpleNamespace(), "mjtWarning": mujoco.mjtWarning, **changed}
+    return SimpleNamespace(**names)
+
+
+def test_a_state_that_was_reset_is_refused_where_resets_cannot_be_disabled():
+    from adapters.mujoco.releases import check_state
+
+    mujoco = older_mujoco()
+    data = SimpleNamespace(warning={kind: SimpleNamespace(number=0) for kind in mujoco.mjtWarning.__members__.values()})
+    check_state(mujoco, data)
+    data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number = 1
+    with pytest.raises(EngineError, match="reset a state that was not finite"):
+        check_state(mujoco, data)
+
+
+def test_an_mjspec_that_takes_no_attributes_is_replaced():
+    from adapters.mujoco.releases import Mjcf, empty_spec
+
+    def refusing(**attributes):
+        raise TypeError("add_body(): incompatible function arguments")
+
+    body = SimpleNamespace(add_body=refusing)
+    assert isinstance(empty_spec(older_mujoco(MjSpec=lambda: SimpleNamespace(worldbody=body))), Mjcf)
+    assert isinstance(empty_spec(older_mujoco()), Mjcf)
+
+
+def test_impulses_of_an_opaque_arbiter_are_equal_parts_of_its_total():
+    pymunk = pytest.importorskip("pymunk")
+    from adapters.chipmunk.releases import point_impulses
+
+    space, found = pymunk.Space(), []
+    space.gravity = (0.0, -10.0)
+    box = pymunk.Body(2.0, 1.0)
+    box.position = (0.0, 0.45)
+    space.add(box, pymunk.Poly.create_box(box, (1.0, 1.0)), pymunk.Segment(space.static_body, (-5, 0), (5, 0), 0.0))
+    space.step(0.1)
+
+    def look(arbiter):
+        opaque = SimpleNamespace(total_impulse=arbiter.total_impulse, _arbiter=SimpleNamespace())
+        found.append((point_impulses(arbiter, 2), point_impulses(opaque, 2)))
+
+    box.each_arbiter(look)
+    ((exact, parts),) = found
+    assert np.sum(parts, axis=0) == pytest.approx(np.sum(exact, axis=0), abs=1e-12)
+    assert parts[0] == parts[1] and parts[0][1] < 0.0  # on the second body: downwards
+
+
+def test_pymunk_s_version_is_that_of_its_distribution():
+    pytest.importorskip("pymunk")
+    assert registry.load("chipmunk").version() == version("pymunk")
