@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from adapters.plain import is_visible, one_line
 from adapters.scene import SceneError
@@ -21,6 +22,8 @@ from validation.catalogue import CATALOGUE, matching
 _FILE = re.compile(r"(?P<path>.+\.(?:toml|json))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
 #: Texts of pinned scene files by pinned name.
 _texts: dict[str, str] = {}
+#: What pinned scene files state, read and checked elsewhere, by pinned name.
+_stated: dict[str, dict[str, Any]] = {}
 
 
 def is_file(argument: str) -> bool:
@@ -37,7 +40,7 @@ def pinned(argument: str) -> str:
         If the file cannot be read, or is no longer the one that a pinned name means.
     """
     found = _FILE.fullmatch(argument)
-    if argument in CATALOGUE or argument in _texts or found is None:
+    if argument in CATALOGUE or argument in _texts or argument in _stated or found is None:
         return argument
     from validation.scene_text import read_text
 
@@ -73,6 +76,24 @@ def remember(texts: Mapping[str, str]) -> None:
         _texts[name] = text
 
 
+def stated_of(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """What those scenes that are files state, as plain data by pinned name: for a process that cannot read files."""
+    from validation.scene_files import stated_from_text
+
+    paths = {name: Path(name.rpartition("@")[0]) for name in texts_of(scenes)}
+    return {name: stated_from_text(_texts[name], path).as_dict() for name, path in paths.items()}
+
+
+def handed(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """What `hand_over` was given here for those scenes, to hand it on."""
+    return {scene: _stated[scene] for scene in dict.fromkeys(scenes) if scene in _stated}
+
+
+def hand_over(stated: Mapping[str, dict[str, Any]]) -> None:
+    """Make scenes known in this process from what `stated_of` gave elsewhere."""
+    _stated.update(stated)
+
+
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
@@ -86,6 +107,10 @@ def resolve(argument: str) -> CanonicalScene:
     SceneError
         If there is no such scene, or the file is not a valid scene.
     """
+    if argument in _stated:
+        from validation.stated import canonical_of, stated_from_dict
+
+        return canonical_of(stated_from_dict(_stated[argument]), "")
     if is_file(argument):
         from validation.scene_files import canonical_from_text
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
+
 import numpy as np
 
 from adapters.engine import Array
@@ -10,7 +12,13 @@ from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
 from validation.metrics import UNAVAILABLE
-from validation.scene_format import parts_of
+
+#: Quantities of one body that a check may name, by dimension; forces are those of all its contacts.
+QUANTITIES = {
+    2: ("x", "y", "angle", "vx", "vy", "omega", "fx", "fy"),
+    3: ("x", "y", "z", "angle", "vx", "vy", "vz", "wx", "wy", "wz", "fx", "fy", "fz"),
+}
+
 
 #: Forces are means over this much time at the end [s], or over the last half of a shorter run.
 WINDOW = 1.0
@@ -87,3 +95,24 @@ def _force(scene: Scene, trajectory: Trajectory, body: int, partner: str | None,
     if np.isnan(total).any():
         return None, UNAVAILABLE
     return float(total.sum() / (len(total) * trajectory.dt)), ""
+
+
+def parts_of(quantity: str, names: Collection[str] = ()) -> tuple[str | None, str, str]:
+    """Return partner (or None), body and quantity of ``floor/box.fy`` or ``ball.y``.
+
+    ``names`` are those of the scene's bodies: a name may hold a slash itself.
+    """
+    bodies, _, what = quantity.rpartition(".")
+    if bodies in names or "/" not in bodies:
+        return None, bodies, what
+    places = [k for k, letter in enumerate(bodies) if letter == "/"]
+    fits = [k for k in places if bodies[:k] in names and bodies[k + 1 :] in names]
+    cut = fits[0] if fits else places[-1]
+    return bodies[:cut], bodies[cut + 1 :], what
+
+
+def shown_quantities(scene: Scene) -> Iterator[str]:
+    """Every quantity of every free body, in the order in which they are shown."""
+    for body in scene.bodies:
+        if body.motion == "free":
+            yield from (f"{body.name}.{what}" for what in QUANTITIES[scene.dimension])

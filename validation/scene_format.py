@@ -8,20 +8,14 @@ the length of a half-space's normal.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from adapters.scene import Pair, Scene, SceneError, Shape, scene_from_dict
 from validation.mass_properties import HOW, moments, volume
-
-#: Quantities of one body that a check may name, by dimension; forces are those of all its contacts.
-QUANTITIES = {
-    2: ("x", "y", "angle", "vx", "vy", "omega", "fx", "fy"),
-    3: ("x", "y", "z", "angle", "vx", "vy", "vz", "wx", "wy", "wz", "fx", "fy", "fz"),
-}
+from validation.quantities import QUANTITIES, parts_of
+from validation.stated import Stated, StatedCheck
 
 
 class _Strict(BaseModel):
@@ -122,15 +116,6 @@ class SceneModel(_Strict):
     checks: tuple[CheckModel, ...] = ()
 
 
-@dataclass(frozen=True)
-class Stated:
-    """What a file states: a scene, notes about what was filled in, and checks with a number."""
-
-    scene: Scene
-    notes: tuple[str, ...]
-    checks: tuple[CheckModel, ...]
-
-
 def stated(model: SceneModel) -> Stated:
     """Make the scene that a file describes.
 
@@ -151,21 +136,8 @@ def stated(model: SceneModel) -> Stated:
     for quantity, at in quantities:
         if quantities.count((quantity, at)) > 1:
             raise SceneError(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
-    return Stated(scene, tuple(notes), model.checks)
-
-
-def parts_of(quantity: str, names: Collection[str] = ()) -> tuple[str | None, str, str]:
-    """Return partner (or None), body and quantity of ``floor/box.fy`` or ``ball.y``.
-
-    ``names`` are those of the scene's bodies: a name may hold a slash itself.
-    """
-    bodies, _, what = quantity.rpartition(".")
-    if bodies in names or "/" not in bodies:
-        return None, bodies, what
-    places = [k for k, letter in enumerate(bodies) if letter == "/"]
-    fits = [k for k in places if bodies[:k] in names and bodies[k + 1 :] in names]
-    cut = fits[0] if fits else places[-1]
-    return bodies[:cut], bodies[cut + 1 :], what
+    checks = tuple(StatedCheck(**check.model_dump()) for check in model.checks)
+    return Stated(scene, tuple(notes), checks)
 
 
 def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
@@ -246,10 +218,3 @@ def _refuse_wrong_check(label: str, check: CheckModel, scene: Scene) -> None:
         raise SceneError(f"{label}.at: a force is a mean over the end of the run, it has no instant")
     if check.at is not None and check.at > scene.duration:
         raise SceneError(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
-
-
-def shown_quantities(scene: Scene) -> Iterator[str]:
-    """Every quantity of every free body, in the order in which they are shown."""
-    for body in scene.bodies:
-        if body.motion == "free":
-            yield from (f"{body.name}.{what}" for what in QUANTITIES[scene.dimension])

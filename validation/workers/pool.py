@@ -179,6 +179,7 @@ def _ask(seat: _Seat, slot: Slot, texts: dict[str, str], timeout: float, keep: P
     job = {
         "slot": slot.as_dict(),
         "scenes": {name: text for name, text in texts.items() if name == slot.scene},
+        "stated": posed.handed([slot.scene]),
         "keep": str(keep) if keep else None,
         "record": record,
         "installed": registry.find(slot.engine).engine is not None,

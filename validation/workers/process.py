@@ -39,6 +39,7 @@ def _answer(job: Mapping[str, Any]) -> dict[str, Any]:
     slot, recording, changed, unwritten = slot_from_dict(job["slot"]), None, "", None
     try:
         posed.remember(job["scenes"])
+        posed.hand_over(job["stated"])
         found = registry.find(slot.engine)
         before = state.taken()
         try:

@@ -1,0 +1,107 @@
+"""A scene that somebody states, in a file: what it is once its file has been read and checked.
+
+It has no closed form: its final places, angles, velocities and forces are shown without a truth, unless its author
+states a number for one; what must hold in any scene (`validation.invariants`) is judged. Nothing here reads files, so
+that a scene can be handed as plain data (`Stated.as_dict`) to where nothing is installed that checks them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from adapters.scene import Scene, scene_from_dict
+from adapters.trajectory import Sampling, Trajectory
+from validation import invariants
+from validation.canonical import CanonicalScene, Check, Measured
+from validation.quantities import force_window, quantity, shown_quantities, unit
+
+
+@dataclass(frozen=True)
+class StatedCheck:
+    """A number that the author of a scene knows; see `validation.scene_format.CheckModel`."""
+
+    quantity: str
+    value: float
+    tolerance: float
+    at: float | None
+    because: str
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What a file states: a scene, notes about what was filled in, and checks with a number."""
+
+    scene: Scene
+    notes: tuple[str, ...]
+    checks: tuple[StatedCheck, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready) that `stated_from_dict` reads back."""
+        checks = [asdict(check) for check in self.checks]
+        return {"scene": self.scene.as_dict(), "notes": list(self.notes), "checks": checks}
+
+
+def stated_from_dict(data: Mapping[str, Any]) -> Stated:
+    """Inverse of `Stated.as_dict`."""
+    checks = tuple(StatedCheck(**check) for check in data["checks"])
+    return Stated(scene_from_dict(data["scene"]), tuple(data["notes"]), checks)
+
+
+def canonical_of(read: Stated, title: str) -> CanonicalScene:
+    """Wrap a stated scene so that it runs like a scene of the catalogue."""
+    scene = read.scene
+    return CanonicalScene(
+        name=scene.name,
+        version=scene.version,
+        title=title,
+        figure="",
+        law="no closed form; energy never grows, bodies do not pass into each other",
+        dimensions=(scene.dimension,),
+        parameters=(),
+        make=lambda dimension, params: scene,
+        exact=lambda scene: _exact(read),
+        measure=lambda scene, trajectory: _measure(read, trajectory),
+        rule=lambda scene, dt, truth: _checks(read, dt),
+        sampling=lambda scene: Sampling(1, scene.duration - force_window(scene)),
+        notes=read.notes,
+    )
+
+
+def _exact(read: Stated) -> dict[str, float]:
+    told = {_metric(check.quantity, check.at): check.value for check in read.checks}
+    return {"energy_growth": 0.0, "penetration": 0.0, **told}
+
+
+def _metric(name: str, at: float | None = None) -> str:
+    """Name of a quantity's metric: ``final[ball.y]``, or ``at[0.25 s][ball.y]``."""
+    return f"final[{name}]" if at is None else f"at[{at:.12g} s][{name}]"
+
+
+def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
+    beyond, depth = invariants.deepest(read.scene, trajectory)
+    measured: dict[str, Measured] = {
+        "energy_growth": invariants.energy_growth(read.scene, trajectory),
+        "penetration": beyond,
+        "deepest_overlap": depth,
+    }
+    shown = [(name, None) for name in shown_quantities(read.scene)]
+    for name, at in [*shown, *((check.quantity, check.at) for check in read.checks)]:
+        measured[_metric(name, at)] = quantity(read.scene, trajectory, name, at)
+    return measured
+
+
+def _checks(read: Stated, dt: float) -> list[Check]:
+    told = {_metric(check.quantity, check.at): check for check in read.checks}
+    final = "shown for comparison between engines: the file states no number for it"
+    names = {_metric(name): name for name in shown_quantities(read.scene)}
+    shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
+    depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
+    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c) for m, c in told.items()), depth, *shown]
+
+
+def _stated_check(metric: str, check: StatedCheck) -> Check:
+    return Check(
+        metric, unit(check.quantity), check.value, check.tolerance, check.because, "the scene file's [[checks]]"
+    )
