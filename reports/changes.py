@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,8 +14,13 @@ from reports.wording import markdown, number, reproduce
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.comparison import Change, Kind, families
+from validation.releases.history import told as told_by_releases
+from validation.releases.history import versions
 from validation.rows import rows_of
-from validation.store import MissingError, Store
+from validation.store import RELEASE_TITLE, MissingError, Store
+
+#: A release of an engine as a side of a comparison: ``mujoco==3.2.7``.
+_RELEASE = re.compile(r"[^=/]+==[^=/]+")
 
 
 @dataclass(frozen=True)
@@ -40,13 +46,15 @@ class Side:
 
 
 def load_side(argument: str, out: Path) -> Side:
-    """One side: a run id in ``out``, a results folder (``FOLDER`` or ``FOLDER:RUN``), or a .jsonl file.
+    """One side: a run id in ``out``, a release, a results folder (``FOLDER`` or ``FOLDER:RUN``), or a .jsonl file.
 
     Raises
     ------
     MissingError
         If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
     """
+    if _RELEASE.fullmatch(argument):
+        return _load_release(out, *argument.split("=="))
     path = Path(argument)
     if path.suffix == ".jsonl":
         return _load_lines(path)
@@ -56,12 +64,27 @@ def load_side(argument: str, out: Path) -> Side:
     return _load_run(out, argument)
 
 
+def _load_release(out: Path, engine: str, version: str) -> Side:
+    """All that a release was asked, whichever runs asked it."""
+    store = Store(out, create=False)
+    try:
+        runs = store.release_runs(engine, version)
+        if not runs:
+            known = ", ".join(versions(store, engine)) or "none"
+            raise MissingError(f"run: {store.path} has no release {engine}=={version}; it has {known}")
+        (told,) = told_by_releases(store, engine, [version])
+        return Side([row.as_dict() for row in told.rows], [], told.name, runs[-1].date, runs[-1].commit)
+    finally:
+        store.close()
+
+
 def _load_run(folder: Path, run_id: str) -> Side:
     """Rows of the run; ratios of the run itself, or of the last bench run where no run was named."""
     store = Store(folder, create=False)
     try:
         timed = bench_runs(store)
-        judged = [run for run in store.runs() if run.id not in {bench.id for bench in timed}]
+        benches = {bench.id for bench in timed}
+        judged = [run for run in store.runs() if run.id not in benches and not run.title.startswith(RELEASE_TITLE)]
         run = store.run(run_id) if run_id != "latest" or not judged else judged[-1]
         source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
         tables = [ratios(store, bench) for bench in source]

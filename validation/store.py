@@ -30,6 +30,8 @@ VERSION = 1
 PATIENCE = 30.0
 #: Runs from moved starts, for the scatter of what another run found; never the latest run.
 SCATTER_TITLE = "scatter of "
+#: Runs of cells on another release of an engine (``release mujoco==3.2.7: bounce``); never the latest run.
+RELEASE_TITLE = "release "
 _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS runs (
     id TEXT PRIMARY KEY, date TEXT NOT NULL, commit_hash TEXT NOT NULL, machine TEXT NOT NULL,
@@ -145,19 +147,19 @@ class Store:
         """Close the file."""
         self._db.close()
 
-    def start(self, title: str, slots: Sequence[Slot], fresh: bool = False) -> tuple[Run, set[str]]:
+    def start(self, title: str, slots: Sequence[Slot], fresh: bool = False, apart: str = "") -> tuple[Run, set[str]]:
         """Resume the unfinished run of the same plan and code, or start a new one.
 
-        The plan names scene files with the hash of their text, and keeps the text.
+        The plan names scene files with the hash of their text, and keeps the text. Runs with another ``apart`` are
+        never the same: they ask the same of something else.
 
         Returns
         -------
         The run, and the keys of the slots it already has.
         """
         plan = [slot.key() for slot in slots]
-        plan_hash = hashlib.sha256(
-            json.dumps([sorted(plan), code_hash((s.scene, s.engine) for s in slots)]).encode()
-        ).hexdigest()[:16]
+        asked = [sorted(plan), code_hash((s.scene, s.engine) for s in slots), *([apart] if apart else [])]
+        plan_hash = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:16]
         made = json.dumps(machine()), title, json.dumps(plan), plan_hash
         here = commit()
         query = "SELECT id FROM runs WHERE plan_hash = ? AND finished = 0 ORDER BY rowid DESC LIMIT 1"
@@ -207,11 +209,12 @@ class Store:
         MissingError
             If there is none of that name.
         """
-        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ?, rowid DESC LIMIT 1"
-        where, args = ("id = ?", run_id) if run_id != "latest" else (last, f"{SCATTER_TITLE}%")
+        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC LIMIT 1"
+        apart = (f"{SCATTER_TITLE}%", f"{RELEASE_TITLE}%")
+        where, args = ("id = ?", (run_id,)) if run_id != "latest" else (last, apart)
         columns = "id, date, commit_hash, machine, title, plan, finished"
         with self._guarded("read"):
-            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", (args,)).fetchone()
+            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
             known = [str(r[0]) for r in self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20")]
             if row is None:
                 said = one_line(", ".join(known) or "none")
@@ -220,6 +223,11 @@ class Store:
                 raise ValueError(f"{one_line(str(row[0]), 80)!r} is not the id of a run")
             texts = (one_line(row[1]), one_line(row[2]), dict(json.loads(row[3])), one_line(row[4]))
             return Run(row[0], *texts, tuple(json.loads(row[5])), bool(row[6]))
+
+    def release_runs(self, engine: str, version: str = "") -> list[Run]:
+        """Runs on other releases of an engine (or on one of them), oldest first."""
+        name = f"{RELEASE_TITLE}{engine}=={version}" + (":" if version else "")
+        return [run for run in self.runs() if run.title.startswith(name)]
 
     def observations(self, run: Run) -> list[Observation]:
         """Observations of a run, in the order of its plan; its scene files need not be there any more."""

@@ -3,7 +3,18 @@
 One module per group of subcommands; importing it registers them.
 """
 
-from reports.command import accepting, benching, certifying, comparing, inspecting, reporting, running, showing, tuning
+from reports.command import (
+    accepting,
+    benching,
+    certifying,
+    comparing,
+    inspecting,
+    releasing,
+    reporting,
+    running,
+    showing,
+    tuning,
+)
 from reports.command.group import main
 
 __all__ = [
@@ -13,6 +24,7 @@ __all__ = [
     "comparing",
     "inspecting",
     "main",
+    "releasing",
     "reporting",
     "running",
     "showing",

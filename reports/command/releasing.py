@@ -1,0 +1,224 @@
+"""``releases`` and ``bisect``: since when an engine answers as it does."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from adapters.scene import SceneError
+from reports import releases as rendering
+from reports.command import statuses
+from reports.command.completion import engine_names, scene_names
+from reports.command.files import folder
+from reports.command.group import AS_JSON, OUT, main
+from reports.command.selection import JOBS, SECONDS, request_from
+from reports.stages import say
+from reports.terminal import terminal
+from validation.cells import Observation, Slot, format_dt, slot_from_dict
+from validation.releases import environments, history
+from validation.releases.bisection import Unchanged, bisect
+from validation.releases.choosing import Release, chosen
+from validation.releases.driving import Effort, drive, planned
+from validation.store import Store
+from validation.workers import TIMEOUT
+
+Command = Callable[..., None]
+
+
+def _cells(command: Command) -> Command:
+    """Options that choose cells and say how they are run; shared by both commands."""
+    options = (
+        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
+        click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
+        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
+        click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
+        click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core."),
+        click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s]."),
+        click.option("--fresh", is_flag=True, help="Ask again what the store has already."),
+        click.option("--try", "anyway", is_flag=True, help="Also releases outside of what the adapter knows."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@main.command()
+@click.argument("engine", required=False, shell_complete=engine_names)
+@click.argument("which", metavar="A..B|LIST|latest", required=False)
+@click.argument("scenes", nargs=-1, shell_complete=scene_names)
+@_cells
+@click.option("--environments", "listed", is_flag=True, help="List the environments that are kept, and check each.")
+@click.option("--remove", metavar="NAME", help="With --environments: remove this one, or 'all'.")
+@click.option("--markdown", is_flag=True, help="Print Markdown on stdout.")
+@AS_JSON
+@OUT
+def releases(
+    engine: str | None,
+    which: str | None,
+    listed: bool,
+    remove: str | None,
+    markdown: bool,
+    as_json: bool,
+    out: Path,
+    **options: Any,
+) -> None:
+    """Run SCENES on releases A..B (or a LIST such as 3.0.0,3.1.6, or latest) of ENGINE, say what moved and when.
+
+    Each release gets an environment of its own, made once; what is stored in OUT is not run again. Exits with 4 if a
+    release did not answer: it cannot be installed, imported or driven here, and its rows say why.
+    """
+    if listed or remove:
+        _environments(remove, as_json)
+        return
+    if engine is None or which is None:
+        raise SceneError("releases: name an engine and its releases, such as: crosscheck releases mujoco 3.0.0..3.2.7")
+    asked, wanted, effort, console = _prepared(engine, which, options, out)
+    store = Store(out)
+    told = [_drive(store, release, wanted, effort, console) for release in asked]
+    store.close()
+    moved = history.steps(told)
+    if as_json:
+        click.echo(rendering.as_json(told, moved))
+    elif markdown:
+        click.echo(rendering.as_markdown(told, moved), nl=False)
+    else:
+        rendering.as_text(told, moved, terminal())
+    sys.exit(statuses.INCOMPLETE if any(each.reason for each in told) else statuses.FINE)
+
+
+def _prepared(
+    engine: str, which: str, options: dict[str, Any], out: Path
+) -> tuple[list[Release], list[Slot], Effort, Console]:
+    """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
+    console = terminal(stderr=True)
+    request = request_from({**options, "engine": [engine], "iterations": (), "ulp": (), "full": False})
+    effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
+    folder(out)
+    asked = chosen(engine, which)
+    wanted = planned(asked, request, effort, lambda line: say(console, line))
+    if not wanted:
+        raise SceneError("scenes: no cell fits this selection")
+    return asked, wanted, effort, console
+
+
+def _drive(store: Store, release: Release, wanted: Sequence[Slot], effort: Effort, console: Console) -> history.Told:
+    """Ask one release with a line of progress, and judge what it says."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(release.name, total=len(wanted))
+
+        def seen(observation: Observation) -> None:
+            progress.update(task, advance=1, description=f"{release.name} {observation.slot.scene}")
+
+        try:
+            found = drive(store, release, wanted, effort, lambda line: say(console, line), seen)
+        except KeyboardInterrupt:
+            say(console, "interrupted: what finished is kept, the same command goes on")
+            raise
+    told = history.told_by(release.engine, release.version, found)
+    say(console, f"{release.name}: {told.reason or f'{len(found)} cells'}")
+    return told
+
+
+@main.command("bisect")
+@click.argument("engine", shell_complete=engine_names)
+@click.argument("which", metavar="A..B")
+@click.argument("scene", shell_complete=scene_names)
+@click.option("--check", required=True, metavar="CHECK", help="Metric: apex[1], or apex for all.")
+@click.option("--all", "every", is_flag=True, help="Ask every release: is it the only change?")
+@_cells
+@AS_JSON
+@OUT
+def bisect_(
+    engine: str, which: str, scene: str, check: str, every: bool, as_json: bool, out: Path, **options: Any
+) -> None:
+    """Find the release between A and B of ENGINE in which CHECK of SCENE flips, or moves beyond its noise floor.
+
+    Of the cells that differ between A and B the most serious one is followed; log2(n) releases are asked, and those
+    that are stored need not run. Exits with 4 if A or B does not answer.
+    """
+    asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out)
+    if len(asked) < 2:
+        raise SceneError(f"releases: {which} is one release; a change lies between two")
+    store = Store(out)
+    try:
+        found = bisect(
+            len(asked), wanted, check, lambda i, cells: _drive(store, asked[i], cells, effort, console), every
+        )
+    finally:
+        store.close()
+    versions = [release.version for release in asked]
+    if isinstance(found, Unchanged):
+        _say_unchanged(found, versions, check, scene, as_json)
+    commands = _commands(engine, versions[found.before], versions[found.after], slot_from_dict(found.change.slot), out)
+    plain = rendering.found_as_plain(found, engine, versions, commands)
+    click.echo(json.dumps(plain, indent=1) if as_json else rendering.found_as_text(plain))
+
+
+def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene: str, as_json: bool) -> NoReturn:
+    """Say that nothing was found, and leave."""
+    same = f"{check} of {scene} is the same in {versions[0]} and {versions[-1]}: no verdict flips, no value moves"
+    said = found.reason.replace("release 0 ", f"{versions[0]} ").replace(
+        f"release {len(versions) - 1} ", f"{versions[-1]} "
+    )
+    click.echo(json.dumps({"found": None, "reason": said or same}) if as_json else said or same)
+    sys.exit(statuses.INCOMPLETE if found.reason else statuses.FINE)
+
+
+def _commands(engine: str, before: str, after: str, slot: Slot, out: Path) -> list[str]:
+    """What reproduces the two cells: run both, compare both."""
+    name, _, _ = slot.scene.rpartition("@")
+    parts = ["crosscheck", "releases", engine, f"{before},{after}", name or slot.scene, "--profile", slot.profile]
+    parts += ["--dim", str(slot.dimension), "--dt", format_dt(slot.dt)]
+    for key, value in slot.params:
+        parts += ["--param", f"{key}={value!r}"]
+    where = [] if out == Path("crosscheck-out") else ["--out", str(out)]
+    compare = ["crosscheck", "compare", f"{engine}=={before}", f"{engine}=={after}"]
+    return [shlex.join([*parts, "--fresh", *where]), shlex.join([*compare, *where])]
+
+
+def _environments(remove: str | None, as_json: bool) -> None:
+    """List, check and remove environments."""
+    found = environments.found()
+    if remove:
+        going = [each for each in found if remove in ("all", each.name)]
+        if not going and remove != "all":
+            raise SceneError(f"remove: there is no environment {remove!r}; releases --environments lists them")
+        for each in going:
+            environments.remove(each)
+            click.echo(f"removed {each.name}", err=True)
+        found = environments.found()
+    data = [
+        {
+            "name": each.name,
+            "python": each.receipt.get("python", ""),
+            "packages": each.receipt.get("packages", {}),
+            "files": each.receipt.get("files", ""),
+            "bytes": environments.size(each),
+            "wrong": environments.check(each),
+        }
+        for each in found
+    ]
+    if as_json:
+        click.echo(json.dumps(data, indent=1))
+    else:
+        for row in data:
+            state = row["wrong"] or "as installed"
+            click.echo(f"{row['name']}  Python {row['python']}  {row['bytes'] / 2**20:.0f} MiB  {state}")
+        click.echo(f"{len(data)} environments in {environments.folder()}")
+    sys.exit(statuses.ALARM if any(row["wrong"] for row in data) else statuses.FINE)

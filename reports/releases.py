@@ -1,0 +1,131 @@
+"""What releases of an engine answered, as text and Markdown: a line per release, then what moved in which."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from reports.wording import markdown, number
+from validation.comparison import Change, Kind
+from validation.releases.bisection import Found
+from validation.releases.history import Step, Told, mended, sentence
+from validation.verdicts import Physics
+
+#: Most families of changes that the terminal shows of one release; --json and --markdown have all.
+SHOWN = 6
+
+
+def _line(told: Told, steps: Sequence[Step]) -> tuple[str, ...]:
+    """Version, rows that fail, rows that pass although they are listed for other releases, what moved."""
+    if told.reason:
+        return (told.version, "-", "-", "-", told.reason)
+    moved = sum(len(step.family.changes) for step in steps if step.after == told.version)
+    better = sum(mended(row) for row in told.rows)
+    note = "; ".join(f"no verdicts of {said}" for said in told.doubted)
+    return (told.version, str(told.count(Physics.FAIL)), str(better or "-"), str(moved or "-"), note)
+
+
+def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console) -> None:
+    """A line per release, then what moved in each: its families of changes, the most serious first."""
+    rows = max((len(told.rows) for told in releases), default=0)
+    console.print(Text(f"{releases[0].engine}: {len(releases)} releases, {rows} rows each", style="bold"))
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading, side in (("release", "left"), ("fails", "right"), ("mended", "right"), ("moved", "right")):
+        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("", overflow="fold")
+    for told in releases:
+        table.add_row(*_line(told, steps))
+    console.print(table, highlight=False)
+    for version in dict.fromkeys(step.after for step in steps):
+        own = [step for step in steps if step.after == version]
+        console.print()
+        console.print(Text(f"moved in {version}, after {own[0].before}", style="bold"))
+        moved = Table(box=None, pad_edge=False, padding=(0, 1, 0, 1), show_header=False)
+        moved.add_column(no_wrap=True)
+        moved.add_column(overflow="fold")
+        for step in own[:SHOWN]:
+            more = len(step.family.changes) - 1
+            rest = f", and {more} like it" if more else ""
+            moved.add_row(mark(step.family.first), sentence(step.family.first) + rest)
+        console.print(moved, highlight=False)
+        if len(own) > SHOWN:
+            console.print(Text(f"  ... and {len(own) - SHOWN} more kinds of rows", style="dim"))
+        name = releases[0].engine
+        console.print(Text(f"  crosscheck compare {name}=={own[0].before} {name}=={version}", style="dim"))
+
+
+def mark(change: Change) -> str:
+    """``flip``, ``moved`` or what else it is, in one word."""
+    return {Kind.FLIP: "flip", Kind.OUTCOME: "ended", Kind.ERROR: "moved"}.get(change.kind, "other")
+
+
+def as_markdown(releases: Sequence[Told], steps: Sequence[Step]) -> str:
+    """Two tables: releases, and what moved."""
+    out = ["| release | fails | mended | moved | |", "|---|---|---|---|---|"]
+    out += ["| " + " | ".join(markdown(cell) for cell in _line(told, steps)) + " |" for told in releases]
+    if steps:
+        out += ["", "| in | after | rows | what moved | by |", "|---|---|---|---|---|"]
+    for step in steps:
+        first = step.family.first
+        size = f"{number(first.size, 3)} tol" if first.size else ""
+        cells = (step.after, step.before, str(len(step.family.changes)), sentence(first), size)
+        out.append("| " + " | ".join(markdown(cell) for cell in cells) + " |")
+    return "\n".join(out) + "\n"
+
+
+def as_json(releases: Sequence[Told], steps: Sequence[Step]) -> str:
+    """Releases with their counts, and all steps."""
+    listed = [
+        {
+            "release": told.name,
+            "rows": len(told.rows),
+            "fails": told.count(Physics.FAIL),
+            "mended": sum(mended(row) for row in told.rows),
+            "reason": told.reason,
+            "without_verdicts": list(told.doubted),
+        }
+        for told in releases
+    ]
+    return json.dumps({"releases": listed, "steps": [step.as_dict() for step in steps]}, indent=1)
+
+
+def found_as_plain(found: Found, engine: str, versions: Sequence[str], commands: Sequence[str]) -> dict[str, Any]:
+    """What a bisection found, as plain data."""
+    return {
+        "engine": engine,
+        "before": versions[found.before],
+        "after": versions[found.after],
+        "not_asked_between": [versions[index] for index in found.unknown],
+        "asked": [versions[index] for index in found.asked],
+        "silent": {versions[index]: reason for index, reason in found.silent.items()},
+        "change": found.change.as_dict(),
+        "others": None if found.others is None else [[versions[i], versions[j]] for i, j in found.others],
+        "commands": list(commands),
+    }
+
+
+def found_as_text(plain: dict[str, Any]) -> str:
+    """What a bisection found, in sentences."""
+    change = plain["change"]
+    where = f"{change['profile']} {change['scene']} {change['dimension']}-D {change['params']}".strip()
+    lines = [
+        f"{change['kind']} in {plain['engine']} {plain['after']}: {where} {change['metric']}",
+        f"  {plain['engine']} {plain['before']}: {change['before']}",
+        f"  {plain['engine']} {plain['after']}: {change['after']}",
+    ]
+    for version in plain["not_asked_between"]:
+        lines.append(f"  {version} lies between and did not answer: {plain['silent'][version]}")
+    lines.append(f"asked {len(plain['asked'])} releases: {', '.join(plain['asked'])}")
+    if plain["others"] is None:
+        lines.append("the only change? --all asks every release")
+    elif plain["others"]:
+        others = ", ".join(f"{a} -> {b}" for a, b in plain["others"])
+        lines.append(f"not the only change of this row: also {others}")
+    else:
+        lines.append("the only change of this row: every release was asked")
+    return "\n".join([*lines, "to see it again:", *(f"  {command}" for command in plain["commands"])])

@@ -1,0 +1,161 @@
+"""In which release did it change? Asks as few as possible, and says what it does not know.
+
+    known    like the first                    like the last
+             [A] . . . . . . ? . . . . . . . . [B]        ask the middle: log2(n) releases for one change
+
+A release that cannot be asked is passed over for its neighbour. What lies between the two releases that are found is
+then named: the change is in one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+from validation.cells import Slot, slot_from_dict
+from validation.comparison import Change, Kind, by_seriousness, compare_rows
+from validation.releases.history import ANSWERS, Told
+
+#: What a release says of the rows in question; None if it cannot be asked.
+Ask = Callable[[int, Sequence[Slot]], Told]
+#: Moves of the start, in units in the last place, that give a row its noise floor.
+MOVES = (1, 2)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a change lies.
+
+    Parameters
+    ----------
+    before, after
+        Indices of two releases between which it lies; no release that could be asked lies between them.
+    asked
+        Indices of the releases that were asked for it, in this order; with those that did not answer.
+    silent
+        Index -> reason of those that did not answer.
+    change
+        The row on both sides.
+    others
+        Further pairs of neighbours between which the row changes; None if not all were asked.
+    """
+
+    before: int
+    after: int
+    asked: tuple[int, ...]
+    silent: dict[int, str]
+    change: Change
+    others: tuple[tuple[int, int], ...] | None
+
+    @property
+    def unknown(self) -> list[int]:
+        """Releases between the two sides that did not answer: the change may be in one of them."""
+        return [index for index in sorted(self.silent) if self.before < index < self.after]
+
+
+@dataclass(frozen=True)
+class Unchanged:
+    """Nothing changed between the ends, or an end does not answer."""
+
+    reason: str
+
+
+class _Questions:
+    """Asks each release once, and keeps what it said."""
+
+    def __init__(self, ask: Ask, metric: str) -> None:
+        self._ask, self._metric = ask, metric
+        self.rows: dict[int, dict[str, dict[str, Any]]] = {}
+        self.silent: dict[int, str] = {}
+        self.asked: list[int] = []
+
+    def at(self, index: int, cells: Sequence[Slot]) -> dict[str, dict[str, Any]]:
+        """Rows of the metric by slot; empty where a release does not answer."""
+        if index not in self.asked:
+            self.asked.append(index)
+            told = self._ask(index, cells)
+            found = [row.as_dict() for row in told.rows if _meant(row.metric, self._metric)]
+            self.rows[index] = {_key(row): row for row in found if row["outcome"] in ANSWERS}
+            if not self.rows[index]:
+                self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such row")
+        return self.rows[index]
+
+
+def _key(row: dict[str, Any]) -> str:
+    return f"{slot_from_dict(row['slot']).key()} {row['metric']}"
+
+
+def _meant(metric: str, asked: str) -> bool:
+    """``apex`` means all of a series, ``apex[1]`` one of it, ``bounce/apex[1]`` the same."""
+    asked = asked.rpartition("/")[2]
+    return metric == asked or metric.partition("[")[0] == asked
+
+
+def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool = False) -> Found | Unchanged:
+    """Find between which of ``count`` releases a row of ``metric`` changes.
+
+    The ends are asked for all ``cells``; of the rows that differ there the most serious is followed, with its noise
+    floor. With ``every`` all releases are asked, and the other changes of that row are named.
+    """
+    moved = [replace(slot, ulp=ulp) for slot in cells for ulp in MOVES]
+    questions = _Questions(ask, metric)
+    first, last = (questions.at(index, [*cells, *moved]) for index in (0, count - 1))
+    for index, rows in ((0, first), (count - 1, last)):
+        if not rows:
+            return Unchanged(f"release {index} cannot be asked: {questions.silent[index]}")
+    changes = sorted(_changes(first.values(), last.values()), key=by_seriousness)
+    if not changes:
+        return Unchanged("")
+    key = next(k for k, row in last.items() if row["slot"] == changes[0].slot and row["metric"] == changes[0].metric)
+    slot = slot_from_dict(last[key]["slot"])
+    own = [slot, *(replace(slot, ulp=ulp) for ulp in MOVES)]
+
+    def like_first(index: int) -> bool | None:
+        row = questions.at(index, own).get(key)
+        return None if row is None else not _differs(first[key], row, changes[0].kind)
+
+    before, after = search(count, like_first)
+    others = None
+    if every:
+        others = _others(count, lambda index: questions.at(index, own).get(key), (before, after))
+    (change,) = _changes([questions.rows[before][key]], [questions.rows[after][key]]) or changes[:1]
+    return Found(before, after, tuple(questions.asked), questions.silent, change, others)
+
+
+def search(count: int, like_first: Callable[[int], bool | None]) -> tuple[int, int]:
+    """Neighbours (among those that answer) of which the first is like release 0 and the second is not."""
+    before, after = 0, count - 1
+    silent: set[int] = set()
+    while True:
+        left = [index for index in range(before + 1, after) if index not in silent]
+        if not left:
+            return before, after
+        middle = min(left, key=lambda index: (abs(2 * index - before - after), index))
+        answer = like_first(middle)
+        if answer is None:
+            silent.add(middle)
+        elif answer:
+            before = middle
+        else:
+            after = middle
+
+
+def _differs(a: dict[str, Any], b: dict[str, Any], kind: Kind) -> bool:
+    """Whether two rows differ in what is searched for: the verdict where it flips, else the value beyond its floor."""
+    if kind in (Kind.FLIP, Kind.OUTCOME):
+        return (a["outcome"], a["physics"]) != (b["outcome"], b["physics"])
+    return bool(_changes([a], [b]))
+
+
+def _changes(before: Any, after: Any) -> list[Change]:
+    return [c for c in compare_rows(before, after) if c.kind not in (Kind.ADDED, Kind.REMOVED)]
+
+
+def _others(
+    count: int, row_of: Callable[[int], dict[str, Any] | None], known: tuple[int, int]
+) -> tuple[tuple[int, int], ...]:
+    answered = [(index, row) for index in range(count) if (row := row_of(index)) is not None]
+    pairs = pairwise(answered)
+    return tuple((i, j) for (i, a), (j, b) in pairs if (i, j) != known and _changes([a], [b]))

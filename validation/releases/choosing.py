@@ -1,0 +1,165 @@
+"""Which releases are meant: ``3.0.0..4.0.1``, ``3.0.0,3.1.6`` or ``latest``, looked up where pip looks."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cache
+
+from packaging.specifiers import SpecifierSet
+from packaging.version import InvalidVersion, Version
+
+from adapters import registry
+from adapters.engine import EngineError
+from adapters.plain import one_line
+from adapters.releases import Distribution, Releases
+
+#: Seconds for the registry to list what it has; it answers within two.
+PATIENCE = 60.0
+#: What a release is, as a user writes it.
+_VERSION = re.compile(r"[0-9][0-9A-Za-z.+!-]{0,40}")
+
+
+class RegistryError(EngineError):
+    """The package registry does not answer, or does not have what was asked for; one line."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """One release of an engine, and what pip is asked for it.
+
+    Parameters
+    ----------
+    distribution
+        Name of the package that carries this release.
+    needs
+        Further requirements, as pip reads them; numpy is always one.
+    unknown
+        Why the adapter does not know this release; empty if it does.
+    """
+
+    engine: str
+    version: str
+    distribution: str
+    needs: tuple[str, ...]
+    unknown: str = ""
+
+    @property
+    def name(self) -> str:
+        """``mujoco==3.2.7``, with the engine's name, whatever its distribution is called."""
+        return f"{self.engine}=={self.version}"
+
+    @property
+    def requirements(self) -> tuple[str, ...]:
+        """What pip is asked to install."""
+        return (f"{self.distribution}=={self.version}", *self.needs)
+
+
+def known_releases(engine: str) -> Releases:
+    """What the adapter of an engine says of its releases; of one that says nothing, its package is the distribution.
+
+    Raises
+    ------
+    EngineError
+        If there is no such engine, or it has no releases of its own.
+    """
+    registry.find(engine)
+    adapter = registry.adapter(engine)
+    if adapter is not None and adapter.releases is not None:
+        return adapter.releases
+    facts = registry.facts(engine)
+    if facts is None or adapter is not None:
+        raise EngineError(f"engine: {engine} has no releases of its own to choose from")
+    return Releases((Distribution(facts.package),))
+
+
+def chosen(engine: str, text: str) -> list[Release]:
+    """Releases that ``text`` means, oldest first.
+
+    Raises
+    ------
+    EngineError
+        If the engine has none, a version is none, or nothing lies in the range.
+    RegistryError
+        If a range or ``latest`` is asked for and the registry does not answer.
+    """
+    known = known_releases(engine)
+    if text == "latest":
+        return [offered(engine)[-1]]
+    first, dots, last = text.partition("..")
+    if not dots:
+        versions = sorted({_version(word) for word in text.split(",") if word.strip()})
+        if not versions:
+            raise EngineError("releases: none is named; write A..B, a list such as 3.0.0,3.1.6, or latest")
+        return [release(engine, known, str(version)) for version in versions]
+    low, high = (_version(word) if word else None for word in (first, last))
+    found = [r for r in offered(engine) if _within(Version(r.version), low, high)]
+    if not found:
+        raise EngineError(f"releases: {engine} has no release in {text}; it has {_ends(offered(engine))}")
+    return found
+
+
+def _ends(found: list[Release]) -> str:
+    return f"{found[0].version} to {found[-1].version}" if found else "none"
+
+
+def _version(word: str) -> Version:
+    try:
+        if not _VERSION.fullmatch(word.strip()):
+            raise InvalidVersion(word)
+        return Version(word.strip())
+    except InvalidVersion:
+        raise EngineError(f"releases: {one_line(word, 40)!r} is not a version such as 3.2.7") from None
+
+
+def _within(version: Version, low: Version | None, high: Version | None) -> bool:
+    return (low is None or version >= low) and (high is None or version <= high)
+
+
+def release(engine: str, known: Releases, version: str) -> Release:
+    """Return the release ``version`` with the distribution that carries it and what it needs."""
+    carriers = [d for d in known.distributions if SpecifierSet(d.versions).contains(version, prereleases=True)]
+    if not carriers:
+        raise EngineError(f"releases: no distribution of {engine} carries {version}")
+    needs = [r.needs for r in known.requirements if SpecifierSet(r.versions).contains(version, prereleases=True)]
+    if not any(re.match(r"numpy\b", each) for each in needs):
+        needs.append("numpy")  # the adapter's own need: not every engine brings it
+    unknown = known.withheld.get(version, "")
+    if not unknown and not SpecifierSet(known.known).contains(version, prereleases=True):
+        unknown = f"its adapter knows {known.known}; --try asks it all the same"
+    return Release(engine, version, carriers[0].name, tuple(needs), unknown)
+
+
+@cache
+def offered(engine: str) -> list[Release]:
+    """All releases that the registry offers for this interpreter, oldest first; raises as `chosen`."""
+    known = known_releases(engine)
+    found: dict[Version, Release] = {}
+    for distribution in known.distributions:
+        for version in _listed(distribution.name):
+            if SpecifierSet(distribution.versions).contains(version):
+                found[version] = release(engine, known, str(version))
+    return [found[version] for version in sorted(found)]
+
+
+def _listed(distribution: str) -> list[Version]:
+    """Versions of a package in the registry that pip is set up for."""
+    command = [sys.executable, "-m", "pip", "index", "versions", distribution, "--disable-pip-version-check"]
+    try:
+        asked = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    except (OSError, subprocess.TimeoutExpired):
+        raise RegistryError(f"releases: the package registry does not answer for {distribution}") from None
+    listed = re.search(r"^Available versions: (.*)$", asked.stdout, re.MULTILINE)
+    if asked.returncode or listed is None:
+        said = [line for line in asked.stderr.splitlines() if line.startswith("ERROR")]
+        why = one_line(said[-1].removeprefix("ERROR: ")) if said else "pip gave no list"
+        raise RegistryError(f"releases: the package registry has no list of {distribution}: {why}")
+    versions = []
+    for word in listed[1].split(","):
+        try:
+            versions.append(Version(word.strip()))
+        except InvalidVersion:
+            continue  # of times before versions had rules
+    return [version for version in versions if not version.is_prerelease]

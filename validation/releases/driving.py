@@ -1,0 +1,263 @@
+"""Runs cells on releases: each in its environment, one run per release in the same store, what is stored asked once."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import subprocess
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from adapters import registry
+from adapters.isolation import LOG_LINES
+from adapters.plain import lines, one_line
+from validation import posed
+from validation.cells import Observation, Outcome, Slot, observation_from_dict, slot_from_dict
+from validation.identity import adapter_hash, scene_code
+from validation.plan import Request, slots
+from validation.releases.carried import code
+from validation.releases.choosing import Release
+from validation.releases.environments import BuildError, Environment, build
+from validation.store import RELEASE_TITLE, Run, Store
+from validation.workers import TIMEOUT
+
+#: Seconds beyond a cell's own limit after which an environment that says nothing is given up: it starts a worker.
+SILENCE = 180.0
+#: Outcomes that may be different next time: what was missing may be there, what was slow may be fast.
+ASKED_AGAIN = (Outcome.NOT_INSTALLED, Outcome.UNSUPPORTED, Outcome.TIMED_OUT)
+Say = Callable[[str], None]
+
+
+class Unasked(Exception):
+    """A release that cannot be asked at all; the message is the reason of its rows."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How cells are run: workers (0: one per core), seconds per cell, and whether what is stored counts."""
+
+    jobs: int = 0
+    timeout: float = TIMEOUT
+    fresh: bool = False
+    #: Ask releases as well that the adapter does not know.
+    anyway: bool = False
+
+
+def planned(releases: Sequence[Release], request: Request, effort: Effort, say: Say) -> list[Slot]:
+    """Cells of a request: those of the engine that is installed here, else of the newest release that answers.
+
+    All releases are asked the same, so that their rows can be compared.
+    """
+    engine = releases[-1].engine
+    request = replace(request, engines=[engine])
+    if registry.find(engine).engine is not None:
+        return slots(request)
+    for release in reversed(releases):
+        with suppress(Unasked, BuildError):
+            told = next(_answers(release, effort, request, [], say))["told"]
+            return [slot_from_dict(data) for data in told["slots"]]
+    return slots(request)
+
+
+def drive(
+    store: Store,
+    release: Release,
+    wanted: Sequence[Slot],
+    effort: Effort,
+    say: Say = lambda line: None,
+    progress: Callable[[Observation], None] = lambda observation: None,
+) -> list[Observation]:
+    """Observations of all ``wanted`` cells on one release; what the store does not have is run and kept in it.
+
+    A release that cannot be installed, imported or driven leaves an observation per cell with the reason.
+
+    Raises
+    ------
+    RegistryError
+        If the package registry does not answer while the release must be installed.
+    """
+    have = {} if effort.fresh else answered(store, release, wanted)
+    todo = [slot for slot in wanted if slot not in have]
+    if todo:
+        scenes = " ".join(dict.fromkeys(slot.scene for slot in todo))
+        run, _ = store.start(f"{RELEASE_TITLE}{release.name}: {scenes}", todo, fresh=True, apart=release.name)
+        found: dict[Slot, Observation] = {}
+        try:
+            for observation in _asked(store, run, release, todo, effort, say):
+                found[observation.slot] = observation
+                store.add(run, observation)
+                progress(observation)
+        except Unasked as why:
+            outcome = Outcome.UNSUPPORTED if release.unknown and not effort.anyway else Outcome.NOT_INSTALLED
+            for slot in todo:
+                if slot not in found:
+                    lost = Observation(slot, "", 0, release.version, outcome, one_line(why))
+                    found[slot] = lost
+                    store.add(run, lost)
+                    progress(lost)
+        store.finish(run)
+        have |= found
+    return [have[slot] for slot in wanted if slot in have]
+
+
+def _asked(
+    store: Store, run: Run, release: Release, todo: Sequence[Slot], effort: Effort, say: Say
+) -> Iterator[Observation]:
+    answers = _answers(release, effort, None, todo, say)
+    told = next(answers)["told"]
+    store.set_protocol(run, _protocol(release, todo, told))
+    for answer in answers:
+        if "left" in answer:
+            slot = slot_from_dict(answer["left"])
+            yield Observation(slot, "", 0, release.version, Outcome.TIMED_OUT, one_line(answer["reason"]))
+            continue
+        yield replace(observation_from_dict(answer), engine_version=release.version)
+
+
+def _protocol(release: Release, todo: Sequence[Slot], told: dict[str, Any]) -> dict[str, Any]:
+    """What a run on a release was made with; what is stored answers for another one only if this is equal."""
+    scenes = dict.fromkeys(slot.scene for slot in todo)
+    code_of = {"adapter": adapter_hash(release.engine), "scenes": {scene: scene_code(scene) for scene in scenes}}
+    return {"release": {"engine": release.engine, "version": release.version}, "told": told, "code": code_of}
+
+
+def _answers(
+    release: Release, effort: Effort, request: Request | None, todo: Sequence[Slot], say: Say
+) -> Iterator[dict[str, Any]]:
+    """What the environment of a release says, line by line: first what it is, then an answer per cell.
+
+    Raises
+    ------
+    Unasked
+        If the release cannot be installed, imported, or is not what was asked for.
+    """
+    if release.unknown and not effort.anyway:
+        raise Unasked(release.unknown)
+    try:
+        environment = build(release, say)
+    except BuildError as error:
+        raise Unasked(str(error)) from None
+    scenes = list(dict.fromkeys([*(slot.scene for slot in todo), *(request.scenes if request else ())]))
+    question = {
+        "engine": release.engine,
+        "distribution": release.distribution,
+        "request": asdict(request) if request else None,
+        "slots": [slot.as_dict() for slot in todo],
+        "stated": posed.stated_of(scenes),
+        "jobs": effort.jobs,
+        "timeout": effort.timeout,
+    }
+    with_code = code(release.engine, scenes)
+    talk = _talk(environment, str(with_code), question, effort.timeout + SILENCE)
+    told = next(talk)
+    if told["told"]["distribution_version"] != release.version and not _same(told, release):
+        held = told["told"]["distribution_version"] or "none"
+        raise Unasked(f"its environment holds {release.distribution} {held}")
+    if told["told"]["reason"]:
+        raise Unasked(f"cannot be imported: {told['told']['reason'].partition('; pip install')[0]}")
+    yield told
+    yield from talk
+
+
+def _same(told: dict[str, Any], release: Release) -> bool:
+    from packaging.version import InvalidVersion, Version
+
+    try:
+        return Version(told["told"]["distribution_version"]) == Version(release.version)
+    except InvalidVersion:
+        return False
+
+
+def _talk(environment: Environment, path: str, question: dict[str, Any], patience: float) -> Iterator[dict[str, Any]]:
+    """Ask the process in an environment; it ends with this generator.
+
+    Raises
+    ------
+    Unasked
+        If it ends without having said what it is, or falls silent.
+    """
+    kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONSTARTUP", "VIRTUAL_ENV")}
+    # Safe path: the working folder may hold packages of our names, this checkout among them.
+    own = kept | {"PYTHONPATH": path, "PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"}
+    process = subprocess.Popen(
+        [str(environment.python), "-m", "validation.releases.driven"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=own,
+        start_new_session=True,  # Ctrl-C is this process's business; the other one ends when its stdin closes
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+    )
+    assert process.stdin and process.stdout and process.stderr
+    said: queue.Queue[str | None] = queue.Queue()
+    written: list[str] = []
+    readers = (_reader(process.stdout, said.put), _reader(process.stderr, lambda line: _keep(written, line)))
+    first = True
+    try:
+        with suppress(BrokenPipeError):
+            process.stdin.write(json.dumps(question) + "\n")
+            process.stdin.flush()
+        while True:
+            try:
+                line = said.get(timeout=patience)
+            except queue.Empty:
+                raise Unasked(f"its environment has said nothing for {patience:g} s") from None
+            if line is None:
+                break
+            yield json.loads(line)
+            first = False
+        readers[1].join(5.0)
+        if process.wait(10.0) or first:
+            tail = one_line(lines("".join(written), LOG_LINES).rpartition("\n")[2])
+            raise Unasked(
+                f"cannot be driven: its process ended with {process.returncode}" + (f": {tail}" if tail else "")
+            )
+    except subprocess.TimeoutExpired:
+        raise Unasked("cannot be driven: its process does not end") from None
+    finally:
+        with suppress(OSError):
+            process.stdin.close()
+        try:
+            process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _reader(stream: Any, put: Callable[[str | None], None]) -> threading.Thread:
+    def read() -> None:
+        for line in stream:
+            put(line)
+        put(None)
+
+    thread = threading.Thread(target=read, daemon=True)
+    thread.start()
+    return thread
+
+
+def _keep(written: list[str], line: str | None) -> None:
+    if line is not None:
+        written.append(line)
+        del written[:-200]
+
+
+def answered(store: Store, release: Release, wanted: Sequence[Slot]) -> dict[Slot, Observation]:
+    """Observations of these cells that the store has of a release, made by the code that runs now; the newest ones."""
+    asked, found = set(wanted), {}
+    adapter = adapter_hash(release.engine)
+    for run in store.release_runs(release.engine, release.version):
+        made = (store.protocol(run) or {}).get("code", {})
+        if made.get("adapter") != adapter:
+            continue
+        for observation in store.observations(run):
+            slot = observation.slot
+            same = slot in asked and made["scenes"].get(slot.scene) == scene_code(slot.scene)
+            if same and observation.outcome not in ASKED_AGAIN:
+                found[slot] = observation
+    return found

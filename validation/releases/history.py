@@ -1,0 +1,156 @@
+"""Rows over releases: what each release answered, and what moved from one to the next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from packaging.version import Version
+
+from validation.cells import Observation, Outcome, Slot, slot_from_dict
+from validation.comparison import Change, Family, Kind, compare_rows, families
+from validation.findings import row_key
+from validation.findings.files import findings_of
+from validation.rows import Row, rows_of
+from validation.store import RELEASE_TITLE, Store
+from validation.verdicts import Physics
+
+#: Outcomes that are an answer of the engine; the others are the reason why there is none.
+ANSWERS = (Outcome.OK.value, Outcome.DIVERGED.value, Outcome.CRASHED.value, Outcome.TIMED_OUT.value)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What one release answered.
+
+    Parameters
+    ----------
+    reason
+        Why it answered nothing; empty if it did.
+    doubted
+        Profiles without verdicts on this release, with the receipt that fails there.
+    """
+
+    engine: str
+    version: str
+    rows: tuple[Row, ...]
+    reason: str = ""
+    doubted: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """``mujoco==3.2.7``."""
+        return f"{self.engine}=={self.version}"
+
+    def count(self, physics: Physics) -> int:
+        """How many rows have this verdict."""
+        return sum(row.physics == physics.value for row in self.rows)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Rows of one kind that moved together, between two releases that follow each other among those that answered."""
+
+    before: str
+    after: str
+    family: Family
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data: the largest change, and how many moved with it."""
+        return {"before": self.before, "after": self.after, "rows": len(self.family.changes)} | {
+            "change": self.family.first.as_dict()
+        }
+
+
+def versions(store: Store, engine: str) -> list[str]:
+    """Releases of an engine that the store has rows of, oldest first."""
+    titles = (run.title.removeprefix(f"{RELEASE_TITLE}{engine}==") for run in store.release_runs(engine))
+    return [str(version) for version in sorted({Version(title.partition(":")[0]) for title in titles})]
+
+
+def engines(store: Store) -> list[str]:
+    """Engines that the store has releases of."""
+    titles = [run.title.removeprefix(RELEASE_TITLE) for run in store.runs() if run.title.startswith(RELEASE_TITLE)]
+    return list(dict.fromkeys(title.partition("==")[0] for title in titles))
+
+
+def observations(store: Store, engine: str, version: str) -> list[Observation]:
+    """The newest answer of a release to every cell that it was ever asked; a missing answer never replaces one."""
+    found: dict[Slot, Observation] = {}
+    for run in store.release_runs(engine, version):
+        for observation in store.observations(run):
+            kept = found.get(observation.slot)
+            answers = observation.outcome.value in ANSWERS or observation.outcome is Outcome.INVALID
+            if kept is None or answers or kept.outcome.value not in ANSWERS:
+                found[observation.slot] = observation
+    return list(found.values())
+
+
+def told_by(engine: str, version: str, found: Iterable[Observation]) -> Told:
+    """Judge what a release answered; a profile of which a receipt fails there has no verdicts."""
+    found = list(found)
+    doubts: dict[str, str] = {}
+    for observation in found:
+        broken = [slip for slip in observation.receipts if not slip["holds"]]
+        if broken and observation.slot.profile not in doubts:
+            doubts[observation.slot.profile] = f"receipt {broken[0]['quantity']} fails in {observation.slot.scene}"
+    rows = tuple(_doubted(row, doubts) for row in rows_of(f"{engine}=={version}", found))
+    answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)
+    reason = "" if answered else next((row.reason for row in rows), "it was not asked")
+    said = tuple(f"{profile}: {why}" for profile, why in doubts.items())
+    return Told(engine, version, rows, reason, said)
+
+
+def _doubted(row: Row, doubts: dict[str, str]) -> Row:
+    """A row without its verdict where its profile is not driven as declared: right by chance is not right."""
+    why = doubts.get(row.profile)
+    if why is None or row.outcome == Outcome.INVALID.value:
+        return row
+    return replace(row, outcome=Outcome.INVALID.value, physics=None, standing=None, reason=f"no verdict: {why}")
+
+
+def told(store: Store, engine: str, wanted: Sequence[str] = (), cells: Sequence[Slot] = ()) -> list[Told]:
+    """What releases of an engine answered, oldest first; of all that are stored and to all cells, if none is named."""
+    asked = set(cells)
+    out = []
+    for version in wanted or versions(store, engine):
+        found = observations(store, engine, version)
+        out.append(told_by(engine, version, [o for o in found if not asked or o.slot in asked]))
+    return out
+
+
+def steps(releases: Sequence[Told]) -> list[Step]:
+    """What moved from each release to the next one that answered the same, the most serious first within a release."""
+    last: dict[tuple[str, str], tuple[str, dict[str, Any]]] = {}
+    found: list[Step] = []
+    for release in releases:
+        plain = [row.as_dict() for row in release.rows if row.outcome in ANSWERS]
+        before = {identity(row): last[identity(row)] for row in plain if identity(row) in last}
+        for name in dict.fromkeys(name for name, _ in before.values()):
+            olds = [row for other, row in before.values() if other == name]
+            changes = [c for c in compare_rows(olds, plain) if c.kind not in (Kind.ADDED, Kind.REMOVED)]
+            found += [Step(name, release.version, family) for family in families(changes)]
+        last |= {identity(row): (release.version, row) for row in plain}
+    return found
+
+
+def identity(row: dict[str, Any]) -> tuple[str, str]:
+    """What a row asks: slot and metric."""
+    return json.dumps(row["slot"], sort_keys=True), str(row["metric"])
+
+
+def mended(row: Row) -> bool:
+    """Whether a row passes on a release for which its finding is not listed: a finding of others that is none here."""
+    findings = findings_of(row.engine)
+    if findings is None or row.physics != Physics.PASS.value:
+        return False
+    finding = findings.members.get(row_key(slot_from_dict(row.slot), row.metric))
+    return finding is not None and not finding.family.holds_for(row.engine_version)
+
+
+def sentence(change: Change) -> str:
+    """``default bounce 3-D e=0.8 apex[1]: 0.1 m (fail) -> 0.2 m (fail)``."""
+    where = f"{change.profile} {change.scene} {change.dimension}-D {change.params}".strip()
+    return f"{where} {change.metric}: {change.before} -> {change.after}"
