@@ -30,7 +30,7 @@ VERSION = 1
 PATIENCE = 30.0
 #: Runs from moved starts, for the scatter of what another run found; never the latest run.
 SCATTER_TITLE = "scatter of "
-#: Runs of cells on another release of an engine (``release mujoco==3.2.7: bounce``); never the latest run.
+#: Runs of cells on another release of an engine (``release myengine==3.2.7: bounce``); never the latest run.
 RELEASE_TITLE = "release "
 _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS runs (

@@ -95,7 +95,7 @@ def releases(
 
 
 def _prepared(
-    engine: str, which: str, options: dict[str, Any], out: Path
+    engine: str, which: str, options: dict[str, Any], out: Path, least: int = 1
 ) -> tuple[list[Release], list[Slot], Effort, Console]:
     """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
     console = terminal(stderr=True)
@@ -103,6 +103,8 @@ def _prepared(
     effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
     folder(out)
     asked = chosen(engine, which)
+    if len(asked) < least:
+        raise SceneError(f"releases: {which} is one release; a change lies between two")
     wanted = planned(asked, request, effort, lambda line: say(console, line))
     if not wanted:
         raise SceneError("scenes: no cell fits this selection")
@@ -152,9 +154,7 @@ def bisect_(
     Of the cells that differ between A and B the most serious one is followed; log2(n) releases are asked, and those
     that are stored need not run. Exits with 4 if A or B does not answer.
     """
-    asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out)
-    if len(asked) < 2:
-        raise SceneError(f"releases: {which} is one release; a change lies between two")
+    asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     store = Store(out)
     try:
         found = bisect(

@@ -48,7 +48,7 @@ class Release:
 
     @property
     def name(self) -> str:
-        """``mujoco==3.2.7``, with the engine's name, whatever its distribution is called."""
+        """``myengine==3.2.7``, with the engine's name, whatever its distribution is called."""
         return f"{self.engine}=={self.version}"
 
     @property

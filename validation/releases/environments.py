@@ -1,6 +1,6 @@
 """Environments: one per release of an engine, built once under the user's cache folder.
 
-    <cache>/contact-crosscheck/environments/mujoco-3.2.7-cp311-1a2b3c4d/     a virtual environment
+    <cache>/contact-crosscheck/environments/myengine-3.2.7-cp311-1a2b3c4d/     a virtual environment
         receipt.json    written last: interpreter, packages with versions, hash of all files
 
 An environment is made under a temporary name and renamed when it is complete, so what was interrupted never counts,

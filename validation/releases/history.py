@@ -41,7 +41,7 @@ class Told:
 
     @property
     def name(self) -> str:
-        """``mujoco==3.2.7``."""
+        """``myengine==3.2.7``."""
         return f"{self.engine}=={self.version}"
 
     def count(self, physics: Physics) -> int:

@@ -1,0 +1,127 @@
+"""Tiny releases of an engine as local wheels, an environment cache of their own, and pip that knows nothing else."""
+
+import shutil
+import sys
+import zipfile
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+
+from adapters import registry
+from validation import identity
+from validation.releases import choosing
+
+HERE = Path(__file__).parent
+#: The engine itself; what a release does differently replaces the lines of `CHANGES`.
+ENGINE = '''
+"""One disc above a floor: velocity first, then position."""
+
+__version__ = "VERSION"
+KEEPS = 1.0
+FASTEST = float("inf")
+
+
+class Disc:
+    def __init__(self, pose, twist, mass, inertia, radius, floor, bounce, gravity, load):
+        self.pose, self.twist, self.mass, self.radius = list(pose), list(twist), mass, radius
+        self.floor, self.bounce, self.impulse = floor, bounce, 0.0
+        self.gain = [g + f / mass for g, f in zip(gravity, load)] + [load[2] / inertia]
+
+    def step(self, dt):
+        approach = self.twist[1]
+        self.twist = [v + a * dt for v, a in zip(self.twist, self.gain)]
+        self.impulse = 0.0
+        if self.floor is not None and self.pose[1] - self.radius - self.floor <= 1e-12:
+            least = min(-min(approach, 0.0) * self.bounce * KEEPS, FASTEST)
+            if self.twist[1] < least:
+                self.impulse = self.mass * (least - self.twist[1])
+                self.twist[1] = least
+        self.pose = [x + v * dt for x, v in zip(self.pose, self.twist)]
+'''
+#: Release -> what is different there.
+CHANGES = {
+    "1.0.0": (),
+    "1.1.0": (("KEEPS = 1.0", 'raise ImportError("libtoy.so.1: cannot open shared object file")'),),
+    "1.2.0": (('FASTEST = float("inf")', "FASTEST = 3.0"),),
+    "2.0.0": (("KEEPS = 1.0", "KEEPS = 0.9"),),
+}
+
+
+def write_wheel(folder, name, version, files, requires=()):
+    """A wheel of pure Python, or of anything that is there."""
+    info = f"{name}-{version}.dist-info"
+    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
+    metadata += "".join(f"Requires-Dist: {each}\n" for each in requires)
+    wheel = "Wheel-Version: 1.0\nGenerator: tests\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    contents = {**files, f"{info}/METADATA": metadata, f"{info}/WHEEL": wheel}
+    contents[f"{info}/RECORD"] = "".join(f"{path},,\n" for path in (*contents, f"{info}/RECORD"))
+    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as archive:
+        for path, content in contents.items():
+            archive.writestr(path, content)
+
+
+@pytest.fixture(scope="session")
+def wheels(tmp_path_factory):
+    """Folder with all releases of `toyphysics`, and the numpy that is installed here."""
+    folder = tmp_path_factory.mktemp("wheels")
+    for version, changes in CHANGES.items():
+        source = ENGINE.replace("VERSION", version)
+        for old, new in changes:
+            assert old in source
+            source = source.replace(old, new)
+        write_wheel(folder, "toyphysics", version, {"toyphysics.py": source})
+    numpy = distribution("numpy")
+    kept = [
+        f for f in numpy.files if "dist-info" not in str(f) and "tests" not in f.parts and not str(f).startswith("..")
+    ]
+    files = {str(f): f.locate().read_bytes() for f in kept if "__pycache__" not in f.parts}
+    write_wheel(folder, "numpy", numpy.version, files)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory):
+    """Cache folder that tests share which only use environments."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def local(wheels, shared_cache, monkeypatch):
+    """Pip finds the local wheels and nothing else; caches lie in a folder of the tests."""
+    for name, value in {
+        "PIP_NO_INDEX": "1",
+        "PIP_FIND_LINKS": str(wheels),
+        "PIP_CONFIG_FILE": "/dev/null",
+        "XDG_CACHE_HOME": str(shared_cache),
+    }.items():
+        monkeypatch.setenv(name, value)
+    choosing.offered.cache_clear()
+    yield shared_cache
+    choosing.offered.cache_clear()
+
+
+@pytest.fixture
+def own_cache(local, tmp_path, monkeypatch):
+    """A cache folder of this test alone, for those that damage or count."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def toy(local, tmp_path_factory, monkeypatch):
+    """The adapter `toy` is installed here; its engine is not."""
+    folder = tmp_path_factory.mktemp("plugin")
+    shutil.copy(HERE / "toy_plugin.py", folder)
+    info = folder / "toy_plugin-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toy-plugin\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\ntoy = toy_plugin:ToyEngine\n")
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    for cached in (registry.find, identity.adapter_hash):
+        cached.cache_clear()
+    yield folder
+    for cached in (registry.find, identity.adapter_hash):
+        cached.cache_clear()
+    sys.modules.pop("toy_plugin", None)

@@ -1,0 +1,101 @@
+"""Bisection: few questions, silent releases passed over, and nothing claimed that was not asked."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from validation.cells import Observation, Outcome, Slot
+from validation.comparison import Kind
+from validation.releases.bisection import Found, Unchanged, bisect, search
+from validation.releases.history import told_by
+
+SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7, 16, 41, 100])
+def test_a_change_is_found_in_log2_questions_wherever_it_is(count):
+    for first_bad in range(1, count):
+        asked = []
+
+        def like_first(index, asked=asked, first_bad=first_bad):
+            asked.append(index)
+            return index < first_bad
+
+        assert search(count, like_first) == (first_bad - 1, first_bad)
+        assert len(asked) <= math.ceil(math.log2(count)) and len(set(asked)) == len(asked)
+
+
+def test_silent_releases_are_passed_over():
+    answers = [True, None, True, None, None, False, None, False]
+    before, after = search(8, lambda index: answers[index])
+    assert (before, after) == (2, 5)
+    assert search(3, lambda index: None) == (0, 2)
+
+
+class Engine:
+    """Rebound ratio per release; None where a release does not answer. Cells moved by ulps scatter by ``noise``."""
+
+    metric = "rebound_ratio"
+
+    def __init__(self, ratios, noise=0.0):
+        self.ratios, self.noise, self.asked = ratios, noise, []
+
+    def __call__(self, index, cells):
+        self.asked.append(index)
+        ratio = self.ratios[index]
+        if ratio is None:
+            lost = [Observation(slot, "", 0, str(index), Outcome.NOT_INSTALLED, "no wheel") for slot in cells]
+            return told_by("toy", str(index), lost)
+        found = []
+        for slot in cells:
+            metrics = {self.metric: (ratio + slot.ulp * self.noise, "")}
+            found.append(Observation(slot, "c", 1, str(index), Outcome.OK, metrics=metrics))
+        return told_by("toy", str(index), found)
+
+
+def test_a_flip_is_found_and_both_sides_are_shown():
+    engine = Engine([0.5] * 6 + [0.4] * 3)
+    found = bisect(9, [SLOT], "rebound_ratio", engine)
+    assert isinstance(found, Found) and (found.before, found.after) == (5, 6)
+    assert found.change.kind is Kind.FLIP and found.change.regressed
+    assert "0.5" in found.change.before and "0.4" in found.change.after
+    assert len(engine.asked) == len(set(engine.asked)) <= 2 + math.ceil(math.log2(9))
+    assert found.others is None
+
+
+@pytest.mark.parametrize("name", ["rebound_ratio", "impact/rebound_ratio"])
+def test_three_releases_one_silent_need_two_answers(name):
+    engine = Engine([0.5, None, 0.4])
+    found = bisect(3, [SLOT], name, engine)
+    assert (found.before, found.after, found.unknown) == (0, 2, [1])
+    assert found.silent == {1: "no wheel"}
+
+
+def test_a_value_that_moves_within_its_floor_has_not_changed():
+    assert isinstance(bisect(3, [SLOT], "rebound_ratio", Engine([0.4, 0.401, 0.402], noise=0.01)), Unchanged)
+    found = bisect(3, [SLOT], "rebound_ratio", Engine([0.4, 0.4, 0.402], noise=1e-5))
+    assert (found.before, found.after) == (1, 2) and found.change.kind is Kind.ERROR
+
+
+def test_an_end_that_does_not_answer_is_said():
+    found = bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.5, None]))
+    assert isinstance(found, Unchanged) and "no wheel" in found.reason
+
+
+def test_all_names_the_other_changes_of_the_row():
+    ratios = [0.5, 0.4, 0.5, 0.5, 0.4, 0.4]
+    assert bisect(6, [SLOT], "rebound_ratio", Engine(ratios), every=True).others == ((0, 1), (1, 2))
+    assert bisect(4, [SLOT], "rebound_ratio", Engine([0.5, 0.5, 0.4, 0.4]), every=True).others == ()
+
+
+def test_the_most_serious_cell_is_followed():
+    """Both cells fail on both sides or move; only that with e = 0.5 loses its verdict."""
+    other = replace(SLOT, params=(("e", 0.7), ("v", 4.0)))
+    found = bisect(2, [other, SLOT], "rebound_ratio", Engine([0.5, 0.4]))
+    assert found.change.kind is Kind.FLIP and "e=0.5" in found.change.params
+
+
+def test_a_check_that_no_row_has_is_said():
+    found = bisect(2, [SLOT], "rebound", Engine([0.5, 0.4]))
+    assert isinstance(found, Unchanged) and "no such row" in found.reason

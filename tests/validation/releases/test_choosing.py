@@ -1,0 +1,79 @@
+"""Which releases are meant, and what pip is asked for each."""
+
+import pytest
+
+from adapters.engine import EngineError
+from adapters.releases import Distribution, Releases, Requirement
+from validation.releases import choosing
+from validation.releases.choosing import RegistryError, chosen, offered, release
+
+TWO = Releases(
+    (Distribution("old-name", "<4"), Distribution("new-name", ">=4")),
+    ">=3,<5",
+    (Requirement("<3.1", "numpy<2", "built for it"), Requirement(">=4", "helper==1", "it asks for it")),
+    withheld={"4.5": "it erases the disk"},
+)
+
+
+def test_renamed_distributions_are_one_engine():
+    assert [release("e", TWO, v).distribution for v in ("3.0", "3.9", "4.0", "4.1")] == [
+        *["old-name"] * 2,
+        *["new-name"] * 2,
+    ]
+
+
+def test_numpy_is_always_asked_for_once():
+    assert release("e", TWO, "3.0").requirements == ("old-name==3.0", "numpy<2")
+    assert release("e", TWO, "3.2").requirements == ("old-name==3.2", "numpy")
+    assert release("e", TWO, "4.0").requirements == ("new-name==4.0", "helper==1", "numpy")
+
+
+def test_what_the_adapter_does_not_know_is_said_with_the_range():
+    assert release("e", TWO, "3.5").unknown == ""
+    assert ">=3,<5" in release("e", TWO, "2.9").unknown and "--try" in release("e", TWO, "5.0").unknown
+    assert release("e", TWO, "4.5").unknown == "it erases the disk"
+
+
+def test_mujoco_has_two_distributions_and_4_0_0_is_the_one_with_the_engine():
+    assert [r.distribution for r in chosen("mujoco", "3.17.0,4.0.0")] == ["mujoco", "mujoco-core"]
+
+
+def test_a_range_is_all_that_the_registry_has_in_it(toy):
+    assert [r.version for r in chosen("toy", "1.0.0..1.2.0")] == ["1.0.0", "1.1.0", "1.2.0"]
+    assert [r.version for r in chosen("toy", "1.1.0..")] == ["1.1.0", "1.2.0", "2.0.0"]
+    assert [r.version for r in chosen("toy", "..1.1")] == ["1.0.0", "1.1.0"]
+    assert [r.version for r in chosen("toy", "latest")] == ["2.0.0"]
+    assert [r.name for r in chosen("toy", "2.0.0, 1.0.0")] == ["toy==1.0.0", "toy==2.0.0"]
+
+
+@pytest.mark.parametrize("text", ["", ",", "3.0;rm", "a..b", "1.0.0..--pre", "1.0 2.0", "@x", "1.0..2.0..3.0"])
+def test_what_is_no_version_is_one_line(toy, text):
+    with pytest.raises(EngineError, match=r"^releases: [^\n]*$"):
+        chosen("toy", text)
+
+
+def test_a_range_without_releases_says_what_there_is(toy):
+    with pytest.raises(EngineError, match=r"has no release in 7\.\.8; it has 1\.0\.0 to 2\.0\.0"):
+        chosen("toy", "7..8")
+
+
+def test_an_engine_of_this_project_has_commits_and_no_releases():
+    with pytest.raises(EngineError, match="reference has no releases"):
+        chosen("reference", "latest")
+
+
+def test_a_registry_that_does_not_answer_is_one_line(toy, monkeypatch, tmp_path):
+    monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path))
+    offered.cache_clear()
+    with pytest.raises(RegistryError, match=r"^releases: [^\n]*toyphysics[^\n]*$"):
+        chosen("toy", "1.0.0..2.0.0")
+    assert [r.version for r in chosen("toy", "1.0.0")] == ["1.0.0"]  # a list needs no registry
+
+
+def test_prereleases_are_not_in_a_range(monkeypatch):
+    class Asked:
+        returncode, stderr = 0, ""
+        stdout = "x (1)\nAvailable versions: 2.0.0rc1, 1.1, dead-beef, 1.0\n"
+
+    monkeypatch.setattr(choosing.subprocess, "run", lambda *args, **kwargs: Asked)
+    assert [str(version) for version in choosing._listed("x")] == ["1.1", "1.0"]
