@@ -1,4 +1,4 @@
-"""``report`` and ``bundle``: one self-contained page about a run, and everything about it as one archive."""
+"""``report``, ``dashboard``, ``bundle``: a page about a run, a page about all, and everything as one archive."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import click
 from adapters.engine import EngineError
 from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
-from reports.stages import stage
+from reports.stages import say, stage
 from reports.terminal import terminal
 from reports.wording import missing_text
-from validation.store import Store
+from validation.store import MissingError, Store
 
 
 @main.command()
@@ -45,6 +45,36 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
     )
     if show and not webbrowser.open(path.resolve().as_uri()):
         click.echo(f"crosscheck: open: no browser was found; the report is {path}", err=True)
+
+
+@main.command()
+@click.option("-o", "--output", type=FILE, help="File to write; OUT/dashboard.html by default.")
+@click.option("--open", "show", is_flag=True, help="Also open it in the browser.")
+@AS_JSON
+@OUT
+def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None:
+    """Write one HTML file over all runs and releases in OUT: errors, times, and where they moved.
+
+    Runs are judged once; what was judged is kept beside the results.
+    """
+    path = writable(output or out / "dashboard.html", "output")
+    with _extra("dashboard"):
+        from reports.dashboard import events, render
+        from reports.dashboard.series import panels
+    store, console = Store(out, create=False), terminal(stderr=True)
+    with stage(console, "dashboard"):
+        found = panels(store, out, lambda line: say(console, line))
+        reports = {run.id: f"report-{run.id}.html" for run in store.runs() if (out / f"report-{run.id}.html").is_file()}
+        store.close()
+        if not found:
+            raise MissingError(f"out: {out} has no finished run of a scene to show")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(render(found, f"{len(found)} panels", reports), encoding="utf-8")
+    moved = sum(len(events(panel)) for panel in found)
+    told = {"path": str(path), "panels": len(found), "moved": moved}
+    click.echo(json.dumps(told) if as_json else str(path))
+    if show and not webbrowser.open(path.resolve().as_uri()):
+        click.echo(f"crosscheck: open: no browser was found; the dashboard is {path}", err=True)
 
 
 @main.command()

@@ -1,0 +1,142 @@
+"""A run in brief: of each cell its primary error and how many of its checks fail. Kept beside the store.
+
+Judging a run of the quick suite takes seconds and a dashboard shows hundreds, so each is judged once: a summary is kept
+in ``OUT/dashboard.sqlite`` under the run and the hash of the code that judged it. The file may be deleted at any time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import validation
+from validation.canonical import Primary
+from validation.cells import Observation, Slot
+from validation.plan import QUICK_DT
+from validation.posed import is_file, resolve
+from validation.rows import ALARMING_OUTCOMES, Row, rows_of
+
+FILE = "dashboard.sqlite"
+#: Outcomes that say something of an engine's physics.
+ANSWERED = ("ok", "diverged")
+#: Brief of one cell: error or None, checks that fail, checks that are judged.
+Brief = tuple[float | None, int, int]
+#: What a panel is about.
+Key = tuple[str, str, str, int]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Cells of a run by panel, each under a key that is equal in every run that asked the same."""
+
+    cells: Mapping[Key, Mapping[str, Brief]]
+    versions: Mapping[str, str]
+
+    def as_text(self) -> str:
+        """JSON that `from_text` reads back."""
+        cells = [[list(key), dict(briefs)] for key, briefs in self.cells.items()]
+        return json.dumps({"cells": cells, "versions": dict(self.versions)}, separators=(",", ":"))
+
+
+def from_text(text: str) -> Summary:
+    """Inverse of `Summary.as_text`."""
+    data = json.loads(text)
+    cells = {
+        (str(key[0]), str(key[1]), str(key[2]), int(key[3])): {slot: tuple(brief) for slot, brief in briefs.items()}
+        for key, briefs in data["cells"]
+    }
+    return Summary(cells, data["versions"])
+
+
+def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = None) -> Summary:
+    """Judge observations and keep what a dashboard shows: cells at the quick step with a profile's own settings.
+
+    ``rows`` are theirs, where they were judged already.
+    """
+    observations = [o for o in observations if _shown(o.slot)]
+    judged = list(rows) if rows is not None else rows_of("", observations)
+    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
+    for row in judged:
+        if row.cells and len(row.cells) == 1 and row.outcome not in ALARMING_OUTCOMES and row.physics:
+            count = counts[json.dumps(row.slot, sort_keys=True)]
+            count[0] += row.physics == "fail"
+            count[1] += 1
+    cells: dict[Key, dict[str, Brief]] = defaultdict(dict)
+    versions = {}
+    for observation in observations:
+        slot = observation.slot
+        fails, all_of_them = counts[json.dumps(slot.as_dict(), sort_keys=True)]
+        brief = (_error(observation), fails, all_of_them)
+        if all_of_them or brief[0] is not None:
+            cells[slot.engine, slot.profile, slot.scene, slot.dimension][slot.key()] = brief
+        versions[slot.engine] = observation.engine_version
+    return Summary(cells, versions)
+
+
+def _shown(slot: Slot) -> bool:
+    own = slot.iterations is None and not slot.ulp and not slot.switched
+    return own and slot.dt == QUICK_DT and not is_file(slot.scene)
+
+
+def _error(observation: Observation) -> float | None:
+    """Primary error of one cell [unit of the primary], where its scene declares one and it can be taken there."""
+    if observation.outcome.value not in ANSWERED or not observation.metrics:
+        return None
+    canonical = resolve(observation.slot.scene)
+    primary: Primary | None = canonical.primary
+    if primary is None:
+        return None
+    scene = canonical.scene(observation.slot.dimension, dict(observation.slot.params))
+    with suppress(KeyError, ArithmeticError, ValueError):  # a cell of another kind than the primary's
+        return primary.error(scene, observation.slot.dt, observation.metrics)[0]
+    return None
+
+
+@cache
+def judging_code() -> str:
+    """Hash of all code that judges: with other checks, summaries are made again."""
+    digest = hashlib.sha256()
+    root = Path(validation.__file__ or "").parent
+    for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".csv", ".toml")):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+class Kept:
+    """Summaries that were made before; where nothing can be kept they are made each time."""
+
+    def __init__(self, folder: Path) -> None:
+        self._db: sqlite3.Connection | None = None
+        with suppress(sqlite3.Error):
+            self._db = sqlite3.connect(folder / FILE, timeout=10.0)
+            table = "summaries (name TEXT PRIMARY KEY, code TEXT, body TEXT)"
+            self._db.execute(f"CREATE TABLE IF NOT EXISTS {table}")
+
+    def get(self, name: str) -> Summary | None:
+        """The summary of that name, if the same code judged it."""
+        if self._db is not None:
+            with suppress(sqlite3.Error, ValueError, KeyError, TypeError, IndexError):
+                query = "SELECT body FROM summaries WHERE name = ? AND code = ?"
+                found = self._db.execute(query, (name, judging_code())).fetchone()
+                return from_text(found[0]) if found else None
+        return None
+
+    def put(self, name: str, summary: Summary) -> None:
+        """Keep a summary."""
+        if self._db is not None:
+            with suppress(sqlite3.Error), self._db:
+                row: tuple[Any, ...] = (name, judging_code(), summary.as_text())
+                self._db.execute("INSERT OR REPLACE INTO summaries VALUES (?, ?, ?)", row)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._db is not None:
+            self._db.close()

@@ -1,0 +1,151 @@
+"""Series over runs and releases: exactly the planted steps are marked, and nothing is in series without a step."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main
+from reports.dashboard import events
+from reports.dashboard.series import _divided, _Entry, panels
+from reports.dashboard.steps import ERROR, TIME, steps
+from reports.dashboard.summary import FILE, Kept, Summary, summarise
+from validation.cells import Outcome, Slot
+from validation.store import Store
+
+SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
+
+
+def marked(found):
+    for panel in found:
+        for kind, own in (("error", panel.error_steps), ("time", panel.time_steps)):
+            yield from ((panel.key[:2], kind, at) for at, _ in own)
+
+
+def test_exactly_the_four_planted_steps_are_marked(history_panels, planted):
+    assert sorted(marked(history_panels)) == sorted((who, kind, first) for who, kind, first, _ in planted)
+
+
+def test_a_step_has_the_factor_that_was_planted(history_panels, planted):
+    for who, kind, first, factor in planted:
+        (panel,) = [p for p in history_panels if p.key[:2] == who]
+        found = dict(panel.error_steps if kind == "error" else panel.time_steps)
+        assert found[first].factor == pytest.approx(factor, rel=0.05)
+
+
+def without_steps(seed):
+    """A history of 60 runs of four series with scatter and no step."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for k in range(60):
+        cells, ratios = {}, {}
+        for who in SERIES:
+            key = (*who, "impact", 2)
+            cells[key] = {"s": (0.05 * float(np.exp(0.03 * rng.normal())), 1, 1)}
+            ratios[key] = (float(np.exp(0.08 * rng.standard_t(4))), "reference/reference")
+        out.append(_Entry(str(k), str(k), str(k), Summary(cells, {}), ratios))
+    return out
+
+
+def test_twenty_histories_without_a_step_raise_at_most_one_false_alarm():
+    alarms = [mark for seed in range(20) for mark in marked(_divided(without_steps(seed), "runs"))]
+    assert len(alarms) <= 1, alarms
+
+
+def test_the_same_series_with_a_step_raise_one():
+    """The other side: what raises no false alarm is not blind."""
+    entries = without_steps(3)
+    key = (*SERIES[0], "impact", 2)
+    for entry in entries[35:]:
+        ((slot, (error, *rest)),) = entry.summary.cells[key].items()
+        entry.summary.cells[key][slot] = (1.5 * error, *rest)
+    assert list(marked(_divided(entries, "runs"))) == [(SERIES[0], "error", 35)]
+
+
+@pytest.mark.parametrize("n", [2, 3, 8, 22])
+def test_values_that_repeat_exactly_have_a_step_wherever_they_change(n):
+    for at in range(1, n):
+        (found,) = steps([1.0] * at + [1.1] * (n - at), ERROR)
+        assert found.at == at and found.factor == pytest.approx(1.1)
+    assert steps([1.0] * n, ERROR) == []
+    assert steps([1.0] * (n - 1) + [1.005], ERROR) == [] and steps([1.0] * n + [1.08] * n, TIME) == []
+
+
+def test_a_time_that_stands_out_alone_is_no_step_and_one_that_stays_is():
+    assert steps([1.0] * 9 + [3.0] + [1.0] * 9, TIME) == []
+    assert [step.at for step in steps([1.0] * 9 + [1.5] * 3, TIME)] == [9]
+
+
+def test_a_flip_is_marked_once_and_says_in_which_direction():
+    entries = []
+    for k, fails in enumerate([0, 0, 1, 1, 0]):
+        cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1)}}
+        entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
+    (panel,) = _divided(entries, "runs")
+    assert [(event.at, event.kind, event.worse) for event in events(panel)] == [(2, "flip", True), (4, "flip", False)]
+
+
+def test_runs_that_asked_something_else_bring_no_step():
+    """A cell that the newest run does not have decides nothing; a run that lacks one has no error."""
+    key = ("e", "p", "impact", 2)
+    cells = [{"a": (0.1, 0, 1)}, {"a": (0.1, 0, 1), "b": (9.0, 1, 1)}, {"b": (9.0, 1, 1)}, {"a": (0.1, 0, 1)}]
+    (panel,) = _divided([_Entry(str(k), "", "", Summary({key: c}, {})) for k, c in enumerate(cells)], "runs")
+    assert [point.error for point in panel.points] == [0.1, 0.1, None, 0.1] and not panel.moved
+
+
+def test_errors_that_are_exact_are_one_level():
+    key = ("e", "p", "impact", 2)
+    sizes = [1e-16, 3e-9, 0.0, 2e-12]
+    (panel,) = _divided(
+        [_Entry(str(k), "", "", Summary({key: {"a": (s, 0, 1)}}, {})) for k, s in enumerate(sizes)], "runs"
+    )
+    assert not panel.moved
+
+
+def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeypatch):
+    store = Store(history_folder, create=False)
+    panels(store, history_folder)
+    assert (history_folder / FILE).exists()
+    monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
+    panels(store, history_folder)
+    monkeypatch.setattr("reports.dashboard.summary.judging_code", lambda: "other code")
+    with pytest.raises(pytest.fail.Exception):
+        panels(store, history_folder)
+    store.close()
+
+
+def test_where_nothing_can_be_kept_it_is_made_each_time(tmp_path):
+    kept = Kept(tmp_path / "missing")
+    kept.put("run", Summary({}, {}))
+    assert kept.get("run") is None
+    kept.close()
+
+
+def test_a_summary_counts_failing_checks_of_sound_cells_only(observation):
+    who = ("chipmunk", "tuned")
+    good, bad = observation(who, 0.0), observation(who, 0.2)
+    key = (*who, "impact", 2)
+    (brief,) = summarise([bad]).cells[key].values()
+    assert brief[0] == pytest.approx(0.2) and brief[1] > 0
+    (brief,) = summarise([good]).cells[key].values()
+    assert brief[0] == pytest.approx(0.0, abs=1e-15) and brief[1] == 0 and brief[2] > 0
+    assert not summarise([replace(bad, outcome=Outcome.INVALID)]).cells
+    other_step = replace(bad, slot=Slot("impact", (), 2, *who, 1.0 / 60.0))
+    assert not summarise([other_step, replace(bad, slot=replace(bad.slot, iterations=4))]).cells
+
+
+def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_path):
+    path = tmp_path / "d.html"
+    done = CliRunner().invoke(main, ["dashboard", "--out", str(history_folder), "-o", str(path), "--json"])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert told == {"path": str(path), "panels": 4, "moved": 4}
+    assert "<svg" in path.read_text()
+
+
+def test_a_store_without_a_finished_run_is_one_line(tmp_path):
+    Store(tmp_path).close()
+    done = CliRunner().invoke(main, ["dashboard", "--out", str(tmp_path)])
+    assert done.exit_code == 2 and "has no finished run" in done.output
