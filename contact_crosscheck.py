@@ -77,6 +77,23 @@ def main() -> None:
     command(prog_name="crosscheck")
 
 
+def pytest_addoption(parser: Any) -> None:
+    """Options of pytest (entry point ``pytest11``); without ``--crosscheck`` nothing else of this project is loaded."""
+    group = parser.getgroup("crosscheck", "contact scenes as tests (contact-crosscheck)")
+    group.addoption("--crosscheck", metavar="ENGINE", help="add a test per check of the contact scenes on ENGINE")
+    group.addoption("--scenes", metavar="A,B", default="", help="of --crosscheck: these scenes (default: all)")
+    group.addoption("--crosscheck-profile", metavar="P,Q", default="", help="of --crosscheck: these profiles")
+
+
+def pytest_configure(config: Any) -> None:
+    """Load the tests if they are asked for."""
+    if config.getoption("--crosscheck"):
+        check()
+        from reports import testing
+
+        config.pluginmanager.register(testing.Plugin(config), "contact-crosscheck")
+
+
 def _refused(line: str) -> int:
     print(line, file=sys.stderr)
     return 2

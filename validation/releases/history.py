@@ -11,7 +11,7 @@ from packaging.version import Version
 
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.comparison import Change, Family, Kind, compare_rows, families
-from validation.findings import row_key
+from validation.findings import Finding, row_key
 from validation.findings.files import findings_of
 from validation.rows import Row, rows_of
 from validation.store import RELEASE_TITLE, Store
@@ -142,12 +142,20 @@ def identity(row: dict[str, Any]) -> tuple[str, str]:
 
 
 def mended(row: Row) -> bool:
-    """Whether a row passes on a release for which its finding is not listed: a finding of others that is none here."""
-    findings = findings_of(row.engine)
-    if findings is None or row.physics != Physics.PASS.value:
+    """Whether a row passes on a release for which its finding is not listed: a finding of others that is none here.
+
+    What passes within the band of its finding was marginal, and is the same here as there.
+    """
+    finding = finding_of(row)
+    if finding is None or row.physics != Physics.PASS.value or finding.family.holds_for(row.engine_version):
         return False
-    finding = findings.members.get(row_key(slot_from_dict(row.slot), row.metric))
-    return finding is not None and not finding.family.holds_for(row.engine_version)
+    return finding.value is None or row.value is None or abs(row.value - finding.value) > finding.band
+
+
+def finding_of(row: Row) -> Finding | None:
+    """What is listed for a row, whatever releases it is listed for."""
+    findings = findings_of(row.engine)
+    return None if findings is None else findings.members.get(row_key(slot_from_dict(row.slot), row.metric))
 
 
 def sentence(change: Change) -> str:
