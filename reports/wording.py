@@ -126,3 +126,8 @@ def markdown(text: str) -> str:
 def params_text(params: Mapping[str, float]) -> str:
     """``e=0.8 height=1.03``."""
     return " ".join(f"{name}={value:g}" for name, value in params.items())
+
+
+def plural(count: int, noun: str) -> str:
+    """``1 run``, ``2 runs``."""
+    return f"{count} {noun}" + ("" if count == 1 else "s")

@@ -143,6 +143,18 @@ class Store:
                 self._db.execute("ROLLBACK")
             raise
 
+    @contextmanager
+    def writing(self) -> Iterator[sqlite3.Connection]:
+        """Tables themselves, in one transaction: for work on many runs (`validation.keeping`)."""
+        with self._guarded("write"), self._transaction():
+            yield self._db
+
+    def compact(self) -> None:
+        """Give the room of what was deleted back to the disk."""
+        with self._guarded("write"):
+            self._db.execute("VACUUM")
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+
     def close(self) -> None:
         """Close the file."""
         self._db.close()

@@ -31,7 +31,7 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
     The last bench in the same store, if there is one, becomes its part about speed.
     """
     path = writable(output or out / "report.html", "output")
-    with _extra("report"):
+    with extra("report"):
         from reports.page import load_source, render
     with stage(terminal(stderr=True), "report"):
         source = load_source(out, run)
@@ -58,7 +58,7 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
     Runs are judged once; what was judged is kept beside the results.
     """
     path = writable(output or out / "dashboard.html", "output")
-    with _extra("dashboard"):
+    with extra("dashboard"):
         from reports.dashboard import events, render
         from reports.dashboard.series import panels
     store, console = Store(out, create=False), terminal(stderr=True)
@@ -84,7 +84,7 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
 @OUT
 def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
     """Write RUN (the latest by default) as one archive: raw rows, environment, report, citation, checksums."""
-    with _extra("bundle"):
+    with extra("bundle"):
         from reports.bundle import write_bundle
     store = Store(out, create=False)
     path = writable(output or out / f"crosscheck-{store.run(run).id}.zip", "output")
@@ -94,9 +94,9 @@ def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
 
 
 @contextmanager
-def _extra(command: str) -> Iterator[None]:
-    """Say how to get what is missing: the page's libraries are an extra."""
+def extra(command: str, name: str = "report") -> Iterator[None]:
+    """Say how to get what is missing: libraries that only some commands need are extras."""
     try:
         yield
     except ImportError as error:
-        raise EngineError(f"{command}: {error.name} is missing; pip install 'contact-crosscheck[report]'") from None
+        raise EngineError(f"{command}: {error.name} is missing; pip install 'contact-crosscheck[{name}]'") from None

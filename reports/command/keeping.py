@@ -1,0 +1,89 @@
+"""``export``, ``merge``, ``prune``: results for other tools, results of several machines, and results that may go."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from adapters.scene import SceneError
+from reports.command.files import folder as writable_folder
+from reports.command.group import AS_JSON, OUT, main
+from reports.command.reporting import extra
+from reports.wording import plural
+from validation.keeping import Rules, doomed, prune
+from validation.keeping import merge as merge_stores
+from validation.store import Store
+
+
+@main.command()
+@click.argument("runs", metavar="[RUN]...", nargs=-1)
+@click.option("--parquet", "target", type=Path, metavar="FOLDER", required=True, help="Write Parquet files there.")
+@click.option("--all", "every", is_flag=True, help="All runs, not the latest.")
+@AS_JSON
+@OUT
+def export(runs: tuple[str, ...], target: Path, every: bool, as_json: bool, out: Path) -> None:
+    """Write RUNs (the latest by default) as Parquet: judged rows, raw metrics, kept trajectories."""
+    with extra("export", "parquet"):
+        from reports import parquet
+    writable_folder(target, "parquet")
+    store = Store(out, create=False)
+    try:
+        chosen = store.runs() if every else [store.run(name) for name in dict.fromkeys(runs or ("latest",))]
+        counts = parquet.write(store, chosen, out / "trajectories", target)
+    finally:
+        store.close()
+    said = ", ".join(f"{name}.parquet {count} lines" for name, count in counts.items())
+    click.echo(json.dumps({"folder": str(target), **counts}) if as_json else f"{target}: {said}")
+
+
+@main.command()
+@click.argument("sources", metavar="STORE...", nargs=-1, required=True, type=Path)
+@AS_JSON
+@OUT
+def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
+    """Add the runs of other STOREs (results folders) to OUT; no row is lost, none is there twice."""
+    told = {}
+    for source in sources:
+        Store(source, create=False).close()  # all of them must be there before the first is merged
+    store = Store(out)
+    try:
+        for source in sources:
+            told[str(source)] = vars(merge_stores(store, source))
+    finally:
+        store.close()
+    if as_json:
+        click.echo(json.dumps(told))
+        return
+    for name, found in told.items():
+        line = f"{name}: {plural(found['runs'], 'new run')}, {found['known']} known, {plural(found['rows'], 'row')}"
+        click.echo(line + (f"; {found['differing']} rows differ, ours stay" if found["differing"] else ""))
+
+
+@main.command("prune")
+@click.option("--keep", type=click.IntRange(1), help="Of runs with the same title, keep this many.")
+@click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Runs older than this go.")
+@click.option("--unfinished", is_flag=True, help="Interrupted runs go.")
+@click.option("--recordings", is_flag=True, help="Replays go, but of the newest run of each title.")
+@click.option("--dry-run", is_flag=True, help="Only say what would go.")
+@AS_JSON
+@OUT
+def prune_(
+    keep: int | None, days: float | None, unfinished: bool, recordings: bool, dry_run: bool, as_json: bool, out: Path
+) -> None:
+    """Delete runs from OUT by rules; the newest finished run of each title always stays."""
+    rules = Rules(keep, days, unfinished, recordings)
+    if rules == Rules():
+        raise SceneError("prune: name a rule: --keep, --older-than, --unfinished or --recordings")
+    store = Store(out, create=False, write=not dry_run)
+    try:
+        going = doomed(store.runs(), rules) if dry_run else prune(store, rules)
+    finally:
+        store.close()
+    if as_json:
+        click.echo(json.dumps({"runs": [run.id for run in going], "dry_run": dry_run}))
+        return
+    for run in going:
+        click.echo(f"{run.id}  {run.title}")
+    click.echo(f"{plural(len(going), 'run')} {'would go' if dry_run else 'went'}")

@@ -1,0 +1,93 @@
+"""`export`, `merge` and `prune` as a user calls them."""
+
+import json
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from adapters.trajectory import load_trajectory
+from reports.command import main
+from validation.store import Store
+
+pytest.importorskip("pyarrow", reason="pip install 'contact-crosscheck[parquet]'")
+pytest.importorskip("pymunk")
+
+
+def call(*words, status=0):
+    done = CliRunner().invoke(main, list(map(str, words)))
+    assert done.exit_code == status, done.output + repr(done.exception)
+    return done
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """Results of two small runs with their trajectories."""
+    folder = tmp_path_factory.mktemp("out")
+    for v in (2, 3):
+        call("run", "impact", "--engine", "chipmunk", "--dim", 2, "--param", f"v={v}", "--keep-trajectories", "--jobs", 1,
+             "--out", folder)  # fmt: skip
+    return folder
+
+
+def test_rows_metrics_and_trajectories_come_back_as_they_were(out, tmp_path):
+    told = json.loads(call("export", "--parquet", tmp_path / "p", "--out", out, "--json").stdout)
+    rows, metrics, states = (
+        pd.read_parquet(tmp_path / "p" / f"{name}.parquet") for name in ("rows", "observations", "trajectories")
+    )
+    assert (len(rows), len(metrics), len(states)) == (told["rows"], told["observations"], told["trajectories"])
+    store = Store(out, create=False)
+    observations = store.observations(store.run())
+    store.close()
+    raw = {(o.slot.key(), name): value for o in observations for name, (value, _) in o.metrics.items()}
+    found = {(row.slot, row.metric): row.value for row in metrics.itertuples()}
+    assert found == raw and len(raw) > 4
+    ratio = rows[(rows.metric == "rebound_ratio") & (rows.profile == "tuned")]
+    assert json.loads(ratio.params.iloc[0])["v"] == 3.0 and ratio.physics.iloc[0] == "pass"
+    for key in {o.slot.key() for o in observations}:
+        kept, own = load_trajectory(out / "trajectories" / f"{key}.npz"), states[states.slot == key]
+        assert (own[["x", "y", "angle"]].to_numpy().reshape(kept.pose.shape) == kept.pose).all()
+        assert (own[["vx", "vy", "omega"]].to_numpy().reshape(kept.twist.shape) == kept.twist).all()
+        assert (own.t.to_numpy().reshape(len(kept.t), -1)[:, 0] == kept.t).all()
+
+
+def test_all_exports_every_run_and_a_named_one_only_that(out, tmp_path):
+    call("export", "--all", "--parquet", tmp_path / "p", "--out", out)
+    runs = pd.read_parquet(tmp_path / "p" / "observations.parquet").run.unique()
+    assert len(runs) == 2
+    call("export", runs[0], "--parquet", tmp_path / "q", "--out", out)
+    assert list(pd.read_parquet(tmp_path / "q" / "rows.parquet").run.unique()) == [runs[0]]
+
+
+def test_other_tools_read_it(out, tmp_path):
+    call("export", "--parquet", tmp_path / "p", "--out", out)
+    lines = len(pd.read_parquet(tmp_path / "p" / "rows.parquet"))
+    seen = 0
+    for name, count in (
+        ("polars", lambda tool: tool.read_parquet(tmp_path / "p" / "rows.parquet").height),
+        ("duckdb", lambda tool: tool.sql(f"SELECT count(*) FROM '{tmp_path}/p/rows.parquet'").fetchone()[0]),
+    ):
+        try:
+            tool = __import__(name)
+        except ImportError:
+            continue
+        assert count(tool) == lines
+        seen += 1
+    if not seen:
+        pytest.skip("neither polars nor duckdb is installed")
+
+
+def test_merge_says_what_came(out, tmp_path):
+    first = call("merge", out, "--out", tmp_path)
+    assert "2 new runs, 0 known" in first.stdout
+    assert "0 new runs, 2 known, 0 rows" in call("merge", out, "--out", tmp_path).stdout
+    assert call("merge", tmp_path / "nothing", "--out", tmp_path / "new", status=2)
+    assert not (tmp_path / "new").exists()
+
+
+def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
+    call("merge", out, "--out", tmp_path)
+    assert "name a rule" in call("prune", "--out", tmp_path, status=2).output
+    assert "1 run would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
+    assert "1 run went" in call("prune", "--keep", 1, "--out", tmp_path).stdout
+    assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 1

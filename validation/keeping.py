@@ -1,0 +1,164 @@
+"""Many runs in one place: stores of several machines become one, and what is too old goes.
+
+A run is the same run in two stores if its id, date, machine and plan are; else one of them gets another id, made from
+what it is, so that merging the same store twice adds nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from adapters.plain import one_line
+from validation.store import Run, Store, StoreError
+
+#: Tables whose rows belong to a run, and what names a row there.
+TABLES = {
+    "observations": ("run", "slot"),
+    "timings": ("run", "slot", "purpose", "sampled", "round"),
+    "protocols": ("run",),
+    "recordings": ("run", "slot"),
+    "scenes": ("run", "name"),
+}
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What a merge did: runs that are new here, runs that were here, rows that came, rows that said something else."""
+
+    runs: int
+    known: int
+    rows: int
+    differing: int
+
+
+def merge(store: Store, other: Path) -> Merged:
+    """Add all runs of another store; nothing here is changed or doubled.
+
+    Rows of a run that both have are completed; where they have not the same row, ours stays, and is counted.
+
+    Raises
+    ------
+    StoreError
+        If the other store cannot be read, or is this one.
+    """
+    theirs = Store(other, create=False)  # checks version and damage
+    path = theirs.path.resolve()
+    theirs.close()
+    if path == store.path.resolve():
+        raise StoreError(f"merge: {path} is the store itself")
+    with store.writing() as db:
+        db.execute("CREATE TEMP TABLE IF NOT EXISTS ids (theirs TEXT PRIMARY KEY, ours TEXT)")
+        db.execute("DELETE FROM ids")
+        source = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+        try:
+            return _merged(db, source)
+        except sqlite3.DatabaseError as error:
+            raise StoreError(f"merge: cannot read {path}: {one_line(error)}") from None
+        finally:
+            source.close()
+
+
+def _merged(db: sqlite3.Connection, source: sqlite3.Connection) -> Merged:
+    new, known, rows, differing = 0, 0, 0, 0
+    for run in source.execute(
+        "SELECT id, date, commit_hash, machine, title, plan, plan_hash, finished FROM runs ORDER BY rowid"
+    ).fetchall():
+        name, added = _own_id(db, run)
+        new, known = new + added, known + (not added)
+        db.execute("UPDATE runs SET finished = max(finished, ?) WHERE id = ?", (run[-1], name))
+        for table in TABLES:
+            came, other = _copy(db, source, table, run[0], name)
+            rows, differing = rows + came, differing + other
+    return Merged(new, known, rows, differing)
+
+
+def _own_id(db: sqlite3.Connection, run: Sequence[object]) -> tuple[str, bool]:
+    """Id of a run of the other store here, and whether it is new."""
+    identity = tuple(run[i] for i in (1, 3, 5))  # date, machine, plan
+    digest = hashlib.sha256(repr(identity).encode()).hexdigest()[:6]
+    for name in (str(run[0]), f"{str(run[0])[:56]}-{digest}"):
+        there = db.execute("SELECT date, machine, plan FROM runs WHERE id = ?", (name,)).fetchone()
+        if there == identity:
+            return name, False
+        if there is None:
+            db.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (name, *run[1:]))
+            return name, True
+    raise StoreError(f"merge: two runs are called {one_line(run[0], 80)} and are not the same")
+
+
+def _copy(db: sqlite3.Connection, source: sqlite3.Connection, table: str, theirs: str, ours: str) -> tuple[int, int]:
+    """Rows of one run that came, and rows that both have and that are not the same."""
+    if not source.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (table,)).fetchone():
+        return 0, 0
+    columns = [row[1] for row in db.execute(f"PRAGMA table_info({table})")]
+    marks = ", ".join("?" * len(columns))
+    where = " AND ".join(f"{name} = ?" for name in TABLES[table])
+    came, other = 0, 0
+    for row in source.execute(f"SELECT {', '.join(columns)} FROM {table} WHERE run = ?", (theirs,)):
+        mine = (ours, *row[1:])
+        came += db.execute(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", mine).rowcount
+        key = tuple(mine[columns.index(name)] for name in TABLES[table])
+        other += db.execute(f"SELECT * FROM {table} WHERE {where}", key).fetchone() != mine
+    return came, other
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What may go; without any rule nothing does.
+
+    Parameters
+    ----------
+    keep
+        Of runs with the same title, all but the newest so many.
+    days
+        Runs that are older.
+    unfinished
+        Runs that were interrupted.
+    recordings
+        Not runs, but what the replay shows of all runs but the newest of each title.
+    """
+
+    keep: int | None = None
+    days: float | None = None
+    unfinished: bool = False
+    recordings: bool = False
+
+
+def doomed(runs: Iterable[Run], rules: Rules, now: datetime | None = None) -> list[Run]:
+    """Runs that the rules let go; the newest finished run of each title always stays."""
+    runs = list(runs)
+    now = now or datetime.now(UTC)
+    newest = {run.title: run.id for run in runs if run.finished}
+    place: dict[str, int] = {}
+    going = []
+    for run in reversed(runs):
+        place[run.title] = place.get(run.title, 0) + 1
+        if newest.get(run.title) == run.id:
+            continue
+        old = rules.days is not None and now - datetime.fromisoformat(run.date) > timedelta(days=rules.days)
+        beyond = rules.keep is not None and place[run.title] > rules.keep
+        if old or beyond or (rules.unfinished and not run.finished):
+            going.append(run)
+    return going[::-1]
+
+
+def prune(store: Store, rules: Rules, now: datetime | None = None) -> list[Run]:
+    """Delete what the rules let go, and give the room back; says which runs went."""
+    runs = store.runs()
+    going = doomed(runs, rules, now)
+    newest = {run.title: run.id for run in runs if run.finished}
+    with store.writing() as db:
+        for run in going:
+            for table in TABLES:
+                db.execute(f"DELETE FROM {table} WHERE run = ?", (run.id,))
+            db.execute("DELETE FROM runs WHERE id = ?", (run.id,))
+        if rules.recordings:
+            kept = ", ".join("?" * len(newest))
+            db.execute(f"DELETE FROM recordings WHERE run NOT IN ({kept})", tuple(newest.values()))
+    store.compact()
+    return going
