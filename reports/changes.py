@@ -19,7 +19,7 @@ from validation.releases.history import versions
 from validation.rows import rows_of
 from validation.store import RELEASE_TITLE, MissingError, Store
 
-#: A release of an engine as a side of a comparison: ``mujoco==3.2.7``.
+#: A release of an engine as a side of a comparison: ``myengine==3.2.7``.
 _RELEASE = re.compile(r"[^=/]+==[^=/]+")
 
 

@@ -79,7 +79,7 @@ def releases(
         _environments(remove, as_json)
         return
     if engine is None or which is None:
-        raise SceneError("releases: name an engine and its releases, such as: crosscheck releases mujoco 3.0.0..3.2.7")
+        raise SceneError("releases: name an engine and its releases, such as: crosscheck releases ENGINE 3.0.0..3.2.7")
     asked, wanted, effort, console = _prepared(engine, which, options, out)
     store = Store(out)
     told = [_drive(store, release, wanted, effort, console) for release in asked]

@@ -25,8 +25,8 @@ def out(tmp_path_factory):
     """Results of two small runs with their trajectories."""
     folder = tmp_path_factory.mktemp("out")
     for v in (2, 3):
-        call("run", "impact", "--engine", "chipmunk", "--dim", 2, "--param", f"v={v}", "--keep-trajectories", "--jobs", 1,
-             "--out", folder)  # fmt: skip
+        cell = ("impact", "--engine", "chipmunk", "--dim", 2, "--param", f"v={v}")
+        call("run", *cell, "--keep-trajectories", "--jobs", 1, "--out", folder)
     return folder
 
 

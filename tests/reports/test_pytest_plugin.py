@@ -31,22 +31,18 @@ def repository(tmp_path):
 
     def run(fastest="float('inf')", listed=(), releases="<=1.0", options=(), status=0):
         site = tmp_path / "site"
-        (site / "toyfindings").mkdir(parents=True)
-        shutil.copy(TOY / "toy_plugin.py", site)
+        adapter = site / "toycheck"
+        (adapter / "findings").mkdir(parents=True)
+        shutil.copy(TOY / "toy_plugin.py", adapter / "__init__.py")
         engine = (TOY / "toy_physics.py").read_text().replace("VERSION", "1.0")
         (site / "toyphysics.py").write_text(engine.replace('FASTEST = float("inf")', f"FASTEST = {fastest}"))
-        (site / "toyfindings" / files.FAMILIES).write_text(FAMILY.replace("RELEASES", releases))
+        (adapter / "findings" / files.FAMILIES).write_text(FAMILY.replace("RELEASES", releases))
         lines = [",".join(files.COLUMNS), *(f"slow,default,2,{params},1/240,,{rest}" for params, rest in listed)]
-        (site / "toyfindings" / files.MEMBERS).write_text("\n".join(lines) + "\n")
-        (site / "toyfindings" / "__init__.py").write_text("")
-        (site / "toyfindings" / "listed").mkdir()
-        for name in (files.FAMILIES, files.MEMBERS):
-            (site / "toyfindings" / name).rename(site / "toyfindings" / "listed" / name)
-        info = site / "toy_plugin-1.dist-info"
+        (adapter / "findings" / files.MEMBERS).write_text("\n".join(lines) + "\n")
+        info = site / "toycheck-1.dist-info"
         info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toy-plugin\nVersion: 1\n")
-        entries = f"[{registry.GROUP}]\ntoy = toy_plugin:ToyEngine\n\n[{files.GROUP}]\ntoy = toyfindings:listed\n"
-        (info / "entry_points.txt").write_text(entries)
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toycheck\nVersion: 1\n")
+        (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\ntoy = toycheck:ToyEngine\n")
         own = tmp_path / "repository"
         own.mkdir()
         (own / "test_own.py").write_text("def test_own():\n    assert True\n")

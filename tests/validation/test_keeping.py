@@ -39,9 +39,8 @@ def contents(store):
 
 def test_every_table_of_a_store_that_belongs_to_runs_is_merged(tmp_path):
     store = Store(tmp_path)
-    names = {
-        row[0] for row in sqlite3.connect(store.path).execute("SELECT name FROM sqlite_master WHERE type = 'table'")
-    }
+    query = "SELECT name FROM sqlite_master WHERE type = 'table'"
+    names = {row[0] for row in sqlite3.connect(store.path).execute(query)}
     assert names == {*TABLES, "runs"}
     for table, key in TABLES.items():
         info = sqlite3.connect(store.path).execute(f"PRAGMA table_info({table})").fetchall()
@@ -133,7 +132,8 @@ RUNS = [run(1, days=40), run(2, days=30, finished=False), run(3, "bench: a", day
 @pytest.mark.parametrize(
     ("rules", "going"),
     [(Rules(), ""), (Rules(keep=1), "124"), (Rules(keep=2), "12"), (Rules(keep=9), ""), (Rules(days=25), "12"),
-     (Rules(days=0), "124"), (Rules(unfinished=True), "2"), (Rules(recordings=True), ""), (Rules(days=35, keep=3), "1")],
+     (Rules(days=0), "124"), (Rules(unfinished=True), "2"), (Rules(recordings=True), ""),
+     (Rules(days=35, keep=3), "1")],
 )  # fmt: skip
 def test_rules_let_go_what_they_say_and_never_the_newest_of_a_title(rules, going):
     assert "".join(each.id for each in doomed(RUNS, rules, NOW)) == going
@@ -141,10 +141,10 @@ def test_rules_let_go_what_they_say_and_never_the_newest_of_a_title(rules, going
 
 def test_pruned_runs_leave_no_row_and_give_their_room_back(tmp_path, monkeypatch):
     store = filled(tmp_path, "one", monkeypatch, [0.1 * k for k in range(40)])
+    store.compact()
     size = store.path.stat().st_size
     newest = store.runs()[-1].id
     gone = prune(store, Rules(keep=1))
     assert len(gone) == 39 and [each.id for each in store.runs()] == [newest]
     assert {row[0] for rows in (contents(store)[table] for table in TABLES) for row in rows} == {newest}
-    sqlite3.connect(store.path).execute("PRAGMA wal_checkpoint(TRUNCATE)")
     assert store.path.stat().st_size < size

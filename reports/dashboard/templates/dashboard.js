@@ -1,5 +1,5 @@
 "use strict";
-/* Filters, kept behind a "?" in the address' fragment: #moved?engine=bullet&verdict=moved. A file has no other place. */
+/* Filters, kept behind a "?" in the address' fragment: #moved?scene=stack&verdict=moved. A file has no other place. */
 const form = document.getElementById("filter");
 const shown = document.getElementById("shown");
 const fields = ["engine", "scene", "verdict", "release"];
