@@ -28,6 +28,9 @@ RELEASES = Releases(
         Difference("<3.2.4", "there is no flag that disables autoreset: a state that is not finite starts anew",
                    "the counters of bad states are read after every advance; one that counts ends the run",
                    "measured: mjtDisableBit.mjDSBL_AUTORESET is there from 3.2.4 on"),
+        Difference("<3.5.0", "a contact's margin is the larger of its geoms', not their sum",
+                   "a geom gets all of it there, and half of it where they are added",
+                   "change log of 3.5.0, item 12"),
         Difference("<3.1.3", "contact.geom holds floating-point numbers", "they are turned into integers",
                    "measured: 3.1.2 float64, 3.1.3 int32"),
         Difference("<3.10.0", "there is no MjLogConfig: warnings cannot be switched off",
@@ -69,6 +72,16 @@ def check_state(mujoco: Any, data: Any) -> None:
     for kind in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC):
         if data.warning[kind].number:
             raise EngineError(f"state: MuJoCo has reset a state that was not finite ({kind.name})")
+
+
+def geom_margin(mujoco: Any, margin: float) -> float:
+    """What a geom must have for two of them to make a contact's ``margin`` [m]."""
+    return margin if _older(mujoco, 3, 5) else 0.5 * margin
+
+
+def _older(mujoco: Any, major: int, minor: int) -> bool:
+    found = [int(part) for part in str(mujoco.__version__).split(".")[:2]]
+    return found < [major, minor]
 
 
 def silence(mujoco: Any) -> None:

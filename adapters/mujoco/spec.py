@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.engine import Array, EngineError
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
-from adapters.mujoco.releases import empty_spec, no_autoreset
+from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-12 of the free body's,
@@ -115,7 +115,7 @@ class Spec:
             "condim": self._condim(friction),
             "solref": pair_solref(self.settings, restitution, self.dt),
             "solimp": self.settings["solimp"],
-            "margin": 0.5 * self.settings["margin"],  # a pair's margin is the sum of its geoms'
+            "margin": geom_margin(self.mujoco, self.settings["margin"]),
         }
 
     def _pair(self, a: int, b: int, restitution: float, friction: float) -> None:

@@ -33,8 +33,8 @@ def compare(
 ) -> None:
     """Say what changed from run A to run B: verdict flips first, then errors, then speed.
 
-    A and B are run ids in OUT, releases that were run into it (myengine==3.2.7), results folders (FOLDER or FOLDER:RUN),
-    or .jsonl files of rows.
+    A and B are run ids in OUT, releases that were run into it (myengine==3.2.7), results folders (FOLDER or
+    FOLDER:RUN), or .jsonl files of rows.
     """
     a, b = rendering.load_side(before, out), rendering.load_side(after, out)
     changes = sorted(compare_rows(a.rows, b.rows) + compare_speeds(a.ratios, b.ratios), key=by_seriousness)

@@ -95,6 +95,29 @@ def test_a_state_that_was_reset_is_refused_where_resets_cannot_be_disabled():
         check_state(mujoco, data)
 
 
+@pytest.mark.parametrize(
+    ("release", "own"), [("3.0.0", 1.0), ("3.4.0", 1.0), ("3.5.0", 0.5), ("3.10.1", 0.5), ("4.0.1", 0.5)]
+)
+def test_the_margin_of_two_geoms_makes_that_of_their_contact(release, own):
+    """Their sum since 3.5.0, the larger of the two before."""
+    from adapters.mujoco.releases import geom_margin
+
+    assert geom_margin(SimpleNamespace(__version__=release), 0.25) == own * 0.25
+
+
+def test_the_margin_of_a_contact_is_the_one_that_was_asked_for():
+    pytest.importorskip("mujoco")
+    engine, checked = registry.load("mujoco"), 0
+    for scene in scenes_of(engine):
+        for settings in settings_of(engine, scene):
+            simulation = engine.build(scene, 1.0 / 240.0, settings)
+            simulation.advance(1)
+            for contact in simulation._data.contact:
+                assert contact.includemargin == pytest.approx(settings["margin"], rel=1e-12)
+                checked += settings["margin"] > 0.0
+    assert checked > 10
+
+
 def test_an_mjspec_that_takes_no_attributes_is_replaced():
     from adapters.mujoco.releases import Mjcf, empty_spec
 
