@@ -64,12 +64,18 @@ def mark(change: Change) -> str:
     return {Kind.FLIP: "flip", Kind.OUTCOME: "ended", Kind.ERROR: "moved"}.get(change.kind, "other")
 
 
-def as_markdown(releases: Sequence[Told], steps: Sequence[Step]) -> str:
-    """Two tables: releases, and what moved."""
+def as_table(releases: Sequence[Told], steps: Sequence[Step]) -> str:
+    """A line per release, in Markdown."""
     out = ["| release | fails | mended | moved | |", "|---|---|---|---|---|"]
     out += ["| " + " | ".join(markdown(cell) for cell in _line(told, steps)) + " |" for told in releases]
+    return "\n".join(out) + "\n"
+
+
+def as_markdown(releases: Sequence[Told], steps: Sequence[Step]) -> str:
+    """Two tables: releases, and what moved."""
+    out = [as_table(releases, steps)]
     if steps:
-        out += ["", "| in | after | rows | what moved | by |", "|---|---|---|---|---|"]
+        out += ["| in | after | rows | what moved | by |", "|---|---|---|---|---|"]
     for step in steps:
         first = step.family.first
         size = f"{number(first.size, 3)} tol" if first.size else ""

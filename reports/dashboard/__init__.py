@@ -9,7 +9,7 @@ unit of the same machine. Complete without JavaScript, without a request, as str
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any
 
@@ -22,6 +22,7 @@ from reports.dashboard.steps import Step
 from reports.page import policy
 from reports.page.styling import engine_style
 from reports.wording import number
+from validation.releases.notes import explanations
 
 __all__ = ["render"]
 #: What each series runs over, in words.
@@ -37,6 +38,8 @@ class Event:
     kind: str
     worse: bool
     text: str
+    #: What the notes of a release say of such a step.
+    note: str = ""
 
     @property
     def label(self) -> str:
@@ -87,7 +90,17 @@ def events(panel: Panel) -> list[Event]:
         out.append(Event(panel, at, "flip", bool(point.lost), ", ".join(said)))
     out += [_step(panel, at, step, "error", panel.unit) for at, step in panel.error_steps]
     out += [_step(panel, at, step, "time", f"x {panel.opponent}") for at, step in panel.time_steps]
-    return sorted(out, key=lambda event: event.at)
+    return sorted((_noted(event) for event in out), key=lambda event: event.at)
+
+
+def _noted(event: Event) -> Event:
+    """An event on a release, with what the engine's notes say of it."""
+    panel = event.panel
+    if panel.over != "releases" or not event.at:
+        return event
+    engine, profile, scene, _ = panel.key
+    before, after = (panel.points[at].version for at in (event.at - 1, event.at))
+    return replace(event, note="; ".join(explanations(engine, scene, profile, before, after)))
 
 
 def _step(panel: Panel, at: int, step: Step, kind: str, unit: str) -> Event:

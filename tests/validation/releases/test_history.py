@@ -1,0 +1,138 @@
+"""Rows over releases: what moved in which, and what the notes say of it."""
+
+import pytest
+
+from reports.history import sentences
+from validation.cells import Observation, Outcome, Slot
+from validation.comparison import Kind
+from validation.findings import FindingsError
+from validation.releases import history, notes
+from validation.releases.history import steps, told_by
+
+SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
+OTHER = Slot("impact", (("e", 0.5), ("v", 8.0)), 2, "toy", "default", 1 / 240)
+
+
+def told(version, ratio, slots=(SLOT,), outcome=Outcome.OK):
+    """What a release says whose balls leave with that share of their speed."""
+    metrics = {} if ratio is None else {"rebound_ratio": (ratio, "")}
+    found = [Observation(slot, "c", 1, version, outcome, "no wheel", metrics) for slot in slots]
+    return told_by("toy", version, found)
+
+
+def kinds(releases):
+    return [(s.before, s.after, s.family.first.kind, len(s.family.changes)) for s in steps(releases)
+            if s.family.first.metric == "rebound_ratio"]  # fmt: skip
+
+
+def test_what_moves_is_told_once_in_the_release_where_it_moves():
+    releases = [told("1", 0.5), told("2", 0.5), told("3", 0.4), told("4", 0.4)]
+    assert kinds(releases) == [("2", "3", Kind.FLIP, 1)]
+
+
+def test_a_release_that_did_not_answer_is_passed_over():
+    silent = told("2", None, outcome=Outcome.NOT_INSTALLED)
+    assert silent.reason == "no wheel"
+    assert kinds([told("1", 0.5), silent, told("3", 0.4)]) == [("1", "3", Kind.FLIP, 1)]
+
+
+def test_cells_that_a_release_was_not_asked_are_compared_with_the_last_that_was():
+    releases = [told("1", 0.5, (SLOT, OTHER)), told("2", 0.5), told("3", 0.4, (SLOT, OTHER))]
+    assert sorted(kinds(releases)) == [("1", "3", Kind.FLIP, 1), ("2", "3", Kind.FLIP, 1)]
+
+
+def test_rows_that_move_together_are_one_step():
+    assert kinds([told("1", 0.5, (SLOT, OTHER)), told("2", 0.4, (SLOT, OTHER))]) == [("1", "2", Kind.FLIP, 2)]
+
+
+def test_a_cell_that_crashes_is_an_answer_and_one_that_is_invalid_is_none():
+    crashed = told("2", None, outcome=Outcome.CRASHED)
+    assert kinds([told("1", 0.5), crashed]) == [("1", "2", Kind.OUTCOME, 1)]
+    assert kinds([told("1", 0.5), told("2", 0.4, outcome=Outcome.INVALID), told("3", 0.5)]) == []
+
+
+def test_a_missing_answer_never_replaces_one(tmp_path):
+    from validation.store import RELEASE_TITLE, Store
+
+    store = Store(tmp_path)
+    for outcome in (Outcome.OK, Outcome.NOT_INSTALLED):
+        run, _ = store.start(f"{RELEASE_TITLE}chipmunk==1.0: impact", [], fresh=True)
+        slot = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
+        store.add(run, Observation(slot, "c", 1, "1.0", outcome, "gone"))
+    assert [o.outcome for o in history.observations(store, "chipmunk", "1.0")] == [Outcome.OK]
+    assert history.engines(store) == ["chipmunk"] and history.versions(store, "chipmunk") == ["1.0"]
+    assert history.versions(store, "chip") == []
+    store.close()
+
+
+def test_versions_are_in_the_order_of_versions(tmp_path):
+    from validation.store import RELEASE_TITLE, Store
+
+    store = Store(tmp_path)
+    for version in ("3.10.0", "3.9.0", "3.9.0", "4.0.0rc1", "4.0.0"):
+        store.start(f"{RELEASE_TITLE}toy=={version}: impact", [], fresh=True, apart=version)
+    assert history.versions(store, "toy") == ["3.9.0", "3.10.0", "4.0.0rc1", "4.0.0"]
+    assert [run.title for run in store.release_runs("toy", "4.0.0")] == ["release toy==4.0.0: impact"]
+    store.close()
+
+
+@pytest.fixture
+def noted(tmp_path, monkeypatch):
+    """`noted(text)` makes the notes on the toy."""
+
+    def write(text):
+        (tmp_path / notes.FILE).write_text(text)
+        monkeypatch.setattr(notes, "inside", lambda engine, name: tmp_path / name)
+        notes.notes_of.cache_clear()
+
+    yield write
+    notes.notes_of.cache_clear()
+
+
+NOTE = """
+[[change]]
+release = "2.5"
+scenes = ["impact"]
+profiles = ["*"]
+says = "speeds are capped"
+source = "notes of 2.5"
+"""
+
+
+def test_a_step_is_told_with_the_note_between_its_releases_or_is_unexplained(noted):
+    noted(NOTE)
+    found = steps([told("2", 0.5), told("3", 0.4)])
+    (said,) = sentences("toy", [step for step in found if step.family.first.metric == "rebound_ratio"])
+    assert (
+        said.startswith("**3** (after 2), default impact: rows that begin to fail 1; first")
+        and "0.5 1 (pass) -> 0.4 1 (fail)" in said
+    )
+    assert said.endswith("Speeds are capped (notes of 2.5).")
+    assert notes.explanations("toy", "impact", "default", "2.5", "3") == ["unexplained"]
+    assert notes.explanations("toy", "impact", "default", "2", "2.5") == ["speeds are capped (notes of 2.5)"]
+    assert notes.explanations("toy", "bounce", "default", "2", "3") == ["unexplained"]
+
+
+def test_without_notes_everything_is_unexplained():
+    assert notes.explanations("chipmunk", "impact", "tuned", "1", "2") == ["unexplained"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [('release = "2.5"', 'release = "two"', "release 'two' is no version"), ('["*"]', '"*"', "profiles must be a list"),
+     ("says", "tells", "needs exactly"), ('"notes of 2.5"', '" "', "source is missing"),
+     ("[[change]]", "[[change]", ":")],
+)  # fmt: skip
+def test_notes_that_are_wrong_are_one_line(noted, old, new, said):
+    noted(NOTE.replace(old, new))
+    with pytest.raises(FindingsError, match=r"^[^\n]*$") as caught:
+        notes.notes_of("toy")
+    assert said in str(caught.value)
+
+
+def test_every_note_of_ours_can_be_read():
+    from adapters import registry
+
+    for engine in registry.names():
+        for note in notes.notes_of(engine):
+            assert note.says and note.source
