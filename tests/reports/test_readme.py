@@ -47,6 +47,11 @@ RUN = {
     ],
     "crosscheck explain mujoco/default/bounce": ["explain mujoco/default/bounce"],
     "crosscheck compare A B": ["compare latest crosscheck-out", "compare crosscheck-out/rows.jsonl latest"],
+    "crosscheck releases --environments": ["releases --environments"],
+    "crosscheck dashboard": ["dashboard"],
+    "crosscheck export --parquet FOLDER": ["export --parquet tables"],
+    "crosscheck merge STORE": ["merge crosscheck-out --out both"],
+    "crosscheck prune --keep 50 --dry-run": ["prune --keep 50 --dry-run"],
     "crosscheck list scenes|engines|checks|runs": ["list scenes", "list engines", "list checks", "list runs"],
     "crosscheck describe bounce": ["describe bounce", "describe bullet"],
     "crosscheck doctor": ["doctor"],
@@ -63,6 +68,11 @@ SAID = {
     "explain mujoco/default/bounce": "crosscheck run bounce --param",
     "compare latest crosscheck-out": "nothing changed",
     "compare crosscheck-out/rows.jsonl latest": "nothing changed",
+    "releases --environments": "environments in",
+    "dashboard": "dashboard.html",
+    "export --parquet tables": "rows.parquet",
+    "merge crosscheck-out --out both": "2 new runs",
+    "prune --keep 50 --dry-run": "0 runs would go",
     "list scenes": "incline",
     "list engines": "chipmunk",
     "list checks": "apex_growth",
@@ -74,6 +84,8 @@ SAID = {
 }
 #: Command of the README -> why it is not run here.
 NOT_RUN = {
+    "crosscheck releases mujoco 3.2.7,3.12.0 stack": "installs releases: run by tests/validation/releases on local wheels",
+    "crosscheck bisect mujoco 3.4.0..3.12.0 stack --check drift": "installs releases: run by tests/validation/releases",
     "crosscheck run": "minutes: every continuous-integration run makes it by `make run`",
     "crosscheck run --full": "an hour: steps, heights and sweeps of all scenes",
     "crosscheck bench [SCENES]": "half a minute at least: run by test_bench_command.py",
