@@ -19,7 +19,7 @@ LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
     "engines": (("engine", "name"), ("version", "version"), ("profiles", "profiles"), ("status", "status")),
     "checks": (("check", "name"), ("truth", "truth"), ("tolerance", "bound"), ("because", "because")),
-    "runs": (("run", "id"), ("date", "date"), ("what", "title"), ("finished", "finished")),
+    "runs": (("run", "id"), ("date", "date"), ("commit", "commit"), ("what", "title"), ("finished", "finished")),
 }
 
 

@@ -47,10 +47,8 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
         data = list(lines(seen))
     elif what == "runs":
         store = Store(out, create=False)
-        data = [
-            {"id": r.id, "date": r.date, "commit": r.commit, "title": r.title, "finished": r.finished}
-            for r in store.runs()
-        ]
+        names = ("id", "date", "commit", "title", "finished")
+        data = [{name: getattr(run, name) for name in names} for run in store.runs()]
     else:
         data = {"scenes": listing.scenes, "engines": listing.engines, "checks": listing.checks}[what]()
     if as_json:
