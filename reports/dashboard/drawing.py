@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 
 from markupsafe import Markup
 
@@ -18,6 +19,8 @@ from reports.wording import number
 
 #: Size of a panel [px]; the page scales it to its column.
 WIDTH, LEFT, RIGHT = 330.0, 52.0, 8.0
+#: Points from which on single ones are no longer told apart.
+MANY = 60
 STRIP, ERROR, TIME = (4.0, 12.0), (22.0, 92.0), (104.0, 140.0)
 
 
@@ -45,19 +48,28 @@ def _x(index: int, count: int) -> float:
 
 
 def _strip(points: Sequence[Point]) -> str:
-    """One cell per point: hollow passes, filled fails; a flip has a mark of its own above."""
-    width = min(10.0, (WIDTH - LEFT - RIGHT) / max(1, len(points)))
+    """One cell per point: hollow passes, filled fails; a flip has a mark of its own above.
+
+    Where there are many points, neighbours of the same state are one cell.
+    """
+    count = len(points)
+    width = min(10.0, (WIDTH - LEFT - RIGHT) / max(1, count))
     out = []
+    for state, cells in groupby(range(count), key=lambda i: (_state(points[i]), i if count <= MANY else 0)):
+        first, *_, last = [*cells] * 2
+        if state[0]:
+            x, wide = _x(first, count) - width / 2, _x(last, count) - _x(first, count) + width
+            out.append(f'<rect class="{state[0]}" x="{x:.1f}" y="{STRIP[0]}" width="{wide:.1f}" height="8"/>')
     for i, point in enumerate(points):
-        if not point.judged:
-            continue
-        state = "bad" if point.fails else "good"
-        x = _x(i, len(points))
-        out.append(f'<rect class="{state}" x="{x - width / 2:.1f}" y="{STRIP[0]}" width="{width:.1f}" height="8"/>')
         if point.lost or point.mended:
+            x = _x(i, count)
             shape = f"M{x - 4:.1f} 0h8l-4 6z" if point.lost else f"M{x - 4:.1f} 6h8l-4 -6z"
             out.append(f'<path class="{"lost" if point.lost else "mended"}" d="{shape}"/>')
     return "".join(out)
+
+
+def _state(point: Point) -> str:
+    return ("bad" if point.fails else "good") if point.judged else ""
 
 
 def _axis(points: Sequence[Point], bottom: float) -> str:
@@ -85,9 +97,13 @@ def _line(
     def y(value: float) -> float:
         return room[1] - (room[1] - room[0]) * (0.5 + (math.log10(value) - middle) / span)
 
-    dots = " ".join(f"{_x(i, len(points)):.1f},{y(v):.1f}" for i, v in there)
+    # What lies between two equal values is on the line between them.
+    bends = [
+        p for k, p in enumerate(there) if not 0 < k < len(there) - 1 or not there[k - 1][1] == p[1] == there[k + 1][1]
+    ]
+    dots = " ".join(f"{_x(i, len(points)):.1f},{y(v):.1f}" for i, v in bends)
     out = [f'<polyline class="{name}" points="{dots}"/>']
-    if len(there) <= 60:
+    if len(points) <= MANY:
         out += [f'<circle cx="{_x(i, len(points)):.1f}" cy="{y(v):.1f}" r="1.8"/>' for i, v in there]
     labels = {high: room[0] + 4, low: room[1]} if high > 1.001 * low else {high: y(high) + 3}
     for value, place in labels.items():

@@ -29,6 +29,8 @@ from validation.workers import TIMEOUT
 SILENCE = 180.0
 #: Outcomes that may be different next time: what was missing may be there, what was slow may be fast.
 ASKED_AGAIN = (Outcome.NOT_INSTALLED, Outcome.UNSUPPORTED, Outcome.TIMED_OUT)
+#: Most scenes that the title of a run names.
+NAMED = 4
 Say = Callable[[str], None]
 
 
@@ -83,7 +85,8 @@ def drive(
     have = {} if effort.fresh else answered(store, release, wanted)
     todo = [slot for slot in wanted if slot not in have]
     if todo:
-        scenes = " ".join(dict.fromkeys(slot.scene for slot in todo))
+        named = list(dict.fromkeys(slot.scene for slot in todo))
+        scenes = " ".join(named) if len(named) <= NAMED else f"{len(named)} scenes"
         run, _ = store.start(f"{RELEASE_TITLE}{release.name}: {scenes}", todo, fresh=True, apart=release.name)
         found: dict[Slot, Observation] = {}
         try:
