@@ -6,6 +6,7 @@
     mypackage/myengine/
         __init__.py       MyEngine: the adapter, which imports the engine inside functions
         releases.py       RELEASES: what older releases do differently (`adapters.releases`)
+        changes.toml      what the engine's own notes say of steps over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
         experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
         findings/         families.toml and members.csv (`validation.findings`)

@@ -46,9 +46,8 @@ def _sentence(engine: str, before: str, after: str, profile: str, scene: str, ow
     )
     said = ", ".join(f"{what} {count}" for count, what in counts if count)
     first = own[0].family.first
-    where = " ".join((f"{first.dimension}-D", first.params)).strip()
     why = "; ".join(explanations(engine, scene, profile, before, after))
-    moved = f"`{first.metric}` ({where}) {first.before} -> {first.after}"
+    moved = f"`{first.metric}` ({history.cell_of(first)}) {first.before} -> {first.after}"
     return (
         f"**{after}** (after {before}), {profile} {scene}: rows that {said}; first {moved}. {why[0].upper()}{why[1:]}."
     )

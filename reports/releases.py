@@ -13,7 +13,7 @@ from rich.text import Text
 from reports.wording import markdown, number
 from validation.comparison import Change, Kind
 from validation.releases.bisection import Found
-from validation.releases.history import Step, Told, mended, sentence
+from validation.releases.history import Step, Told, cell_of, mended, sentence
 from validation.verdicts import Physics
 
 #: Most families of changes that the terminal shows of one release; --json and --markdown have all.
@@ -110,6 +110,7 @@ def found_as_plain(found: Found, engine: str, versions: Sequence[str], commands:
         "asked": [versions[index] for index in found.asked],
         "silent": {versions[index]: reason for index, reason in found.silent.items()},
         "change": found.change.as_dict(),
+        "cell": cell_of(found.change),
         "others": None if found.others is None else [[versions[i], versions[j]] for i, j in found.others],
         "commands": list(commands),
     }
@@ -118,7 +119,7 @@ def found_as_plain(found: Found, engine: str, versions: Sequence[str], commands:
 def found_as_text(plain: dict[str, Any]) -> str:
     """What a bisection found, in sentences."""
     change = plain["change"]
-    where = f"{change['profile']} {change['scene']} {change['dimension']}-D {change['params']}".strip()
+    where = f"{change['profile']} {change['scene']} {plain['cell']}"
     lines = [
         f"{change['kind']} in {plain['engine']} {plain['after']}: {where} {change['metric']}",
         f"  {plain['engine']} {plain['before']}: {change['before']}",

@@ -22,7 +22,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, request_from
 from reports.stages import say
 from reports.terminal import terminal
-from validation.cells import Observation, Slot, format_dt, slot_from_dict
+from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
 from validation.releases import environments, history
 from validation.releases.bisection import Unchanged, bisect
 from validation.releases.choosing import Release, chosen
@@ -40,6 +40,9 @@ def _cells(command: Command) -> Command:
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
         click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
+        click.option(
+            "--iterations", multiple=True, type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count."
+        ),
         click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core."),
         click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s]."),
         click.option("--fresh", is_flag=True, help="Ask again what the store has already."),
@@ -99,7 +102,7 @@ def _prepared(
 ) -> tuple[list[Release], list[Slot], Effort, Console]:
     """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
     console = terminal(stderr=True)
-    request = request_from({**options, "engine": [engine], "iterations": (), "ulp": (), "full": False})
+    request = request_from({**options, "engine": [engine], "ulp": (), "full": False})
     effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
     folder(out)
     asked = chosen(engine, which)
@@ -185,6 +188,8 @@ def _commands(engine: str, before: str, after: str, slot: Slot, out: Path) -> li
     name, _, _ = slot.scene.rpartition("@")
     parts = ["crosscheck", "releases", engine, f"{before},{after}", name or slot.scene, "--profile", slot.profile]
     parts += ["--dim", str(slot.dimension), "--dt", format_dt(slot.dt)]
+    if slot.iterations is not None:
+        parts += ["--iterations", str(slot.iterations)]
     for key, value in slot.params:
         parts += ["--param", f"{key}={value!r}"]
     where = [] if out == Path("crosscheck-out") else ["--out", str(out)]

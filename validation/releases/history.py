@@ -160,5 +160,12 @@ def finding_of(row: Row) -> Finding | None:
 
 def sentence(change: Change) -> str:
     """``default bounce 3-D e=0.8 apex[1]: 0.1 m (fail) -> 0.2 m (fail)``."""
-    where = f"{change.profile} {change.scene} {change.dimension}-D {change.params}".strip()
+    where = f"{change.profile} {change.scene} {cell_of(change)}"
     return f"{where} {change.metric}: {change.before} -> {change.after}"
+
+
+def cell_of(change: Change) -> str:
+    """``3-D n=10 at 4 iterations``: which cell of its scene moved."""
+    iterations = change.slot.get("iterations")
+    asked = f"at {iterations} iterations" if iterations else ""
+    return " ".join(text for text in (f"{change.dimension}-D", change.params, asked) if text)
