@@ -16,11 +16,12 @@ from validation.store import Store
 
 HEAD = """# Physics over engine releases
 
-Made by `make releases`{commit}. The same cells of every scene of the quick suite on each release, driven by one adapter
-in an environment of its own; receipts ran before each cell. A row is one check of one cell. *fails* counts rows outside
-their tolerance; *mended* those that pass although they are listed as findings of other releases; *moved* those whose
-verdict flips or whose value moves beyond its noise floor. `crosscheck bisect` finds each of these steps again. What the
-notes say of a release is set beside a step that it may explain; it was not proven by building that one change.
+Made by `make releases`{commit}. The same cells of every scene of the quick suite on each release,
+driven by one adapter in an environment of its own; receipts ran before each cell. A row is one check of one cell.
+*fails* counts rows outside their tolerance; *mended* those that pass although they are listed as findings of other
+releases; *moved* those whose verdict flips or whose value moves beyond its noise floor. `crosscheck bisect` finds each
+of these steps again. What the notes say of a release is set beside a step that it may explain; it was not proven by
+building that one change.
 """
 
 

@@ -21,7 +21,7 @@ from reports.dashboard.series import Panel, by_engine
 from reports.dashboard.steps import Step
 from reports.page import policy
 from reports.page.styling import engine_style
-from reports.wording import number
+from reports.wording import number, plural
 from validation.releases.notes import explanations
 
 __all__ = ["render"]
@@ -85,12 +85,16 @@ def events(panel: Panel) -> list[Event]:
     out = []
     for at in panel.flips:
         point = panel.points[at]
-        said = [f"{point.lost} cells begin to fail"] * bool(point.lost)
-        said += [f"{point.mended} cells cease to fail"] * bool(point.mended)
+        said = [f"begin to fail: {plural(point.lost, 'cell')}"] * bool(point.lost)
+        said += [f"cease to fail: {plural(point.mended, 'cell')}"] * bool(point.mended)
         out.append(Event(panel, at, "flip", bool(point.lost), ", ".join(said)))
     out += [_step(panel, at, step, "error", panel.unit) for at, step in panel.error_steps]
     out += [_step(panel, at, step, "time", f"x {panel.opponent}") for at, step in panel.time_steps]
-    return sorted((_noted(event) for event in out), key=lambda event: event.at)
+    noted, before = [], -1
+    for event in sorted(out, key=lambda event: event.at):
+        noted.append(event if event.at == before else _noted(event))  # what is said of a release is said once
+        before = event.at
+    return noted
 
 
 def _noted(event: Event) -> Event:
