@@ -177,7 +177,7 @@ def test_a_box_that_sticks_may_move_by_one_step_and_one_that_slides_misses_a_hun
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_rules_take_the_truth_they_are_given_and_no_other(name):
     """A rule that looked up a truth of its own would judge a scene by something else than its law."""
-    scene = CATALOGUE[name].scene(2)
+    scene = CATALOGUE[name].scene(CATALOGUE[name].dimensions[0])
     truth = {metric: 10.0 + k for k, metric in enumerate(CATALOGUE[name].exact(scene))}
     stated = {c.metric: c.truth for c in CATALOGUE[name].rule(scene, DT, truth) if c.metric in truth}
     assert stated == truth
