@@ -52,7 +52,8 @@ def found(name: str, check: Check, engine: Engine) -> Finding:
         return Finding(name, "refused", one_line(refusal))
     except Exception as error:  # a plugin may raise anything
         wrong = one_line(f"{type(error).__name__}: {error}")
-    return judged(name, wrong, (check.__doc__ or "").splitlines()[0].rstrip("."), expected)
+    meant = (check.__doc__ or name).partition("\n")[0].rstrip(".")
+    return judged(name, wrong, meant, expected)
 
 
 def judged(name: str, wrong: str, meant: str, expected: Expected | None) -> Finding:

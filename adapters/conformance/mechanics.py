@@ -53,7 +53,7 @@ def free_fall(engine: Engine) -> str:
     scene = flying()
     for profile in engine.profiles:
         asked = accepted(engine, profile, scene)
-        # A delay of d steps that the profile declares is a place d g t dt behind the scheme's.
+        # A delay of d steps that the profile declares is a place d g t dt behind the scheme's, d known to its band.
         late = engine.declares(profile, needs(asked), DT).get("sampling")
         offset = engine.scheme(profile).position_offset - 2.0 * (late.value if late else 0.0)
         linear, angular = _loss(engine, profile, asked)
@@ -67,10 +67,15 @@ def free_fall(engine: Engine) -> str:
         slack = engine.facts.round_off + linear * fastest * max(1.0, fastest)
         # Quaternions that are turned to first order and normalised lose (w dt)^3/12 a step.
         turn = abs(body.twist[2]) * DT
+        vague = (late.band if late else 0.0) * float(np.linalg.norm(g)) * scene.duration * DT
         bent = len(found.t) * turn**3 / 12.0
         for what, off, band in (
             ("velocity", np.abs(found.twist[:, 0, :2] - velocity).max(), slack),
-            ("place", np.abs(found.pose[:, 0, :2] - place).max(), engine.facts.round_off + slack * scene.duration),
+            (
+                "place",
+                np.abs(found.pose[:, 0, :2] - place).max(),
+                engine.facts.round_off + slack * scene.duration + vague,
+            ),
             ("spin", np.abs(found.twist[:, 0, 2] - body.twist[2]).max(), engine.facts.round_off + 2.0 * angular),
             (
                 "angle",

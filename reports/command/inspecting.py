@@ -124,3 +124,15 @@ def _self_test(as_json: bool) -> NoReturn:
     else:
         click.echo(f"{len(rows) - missed} of {len(rows)} as they must be; the first row is the healthy toy")
     sys.exit(1 if missed else 0)
+
+
+@main.command("new-adapter")
+@click.argument("name")
+@click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
+def new_adapter(name: str, into: Path) -> None:
+    """Write a small package for an engine of your own: it works, and its test runs the conformance checks."""
+    from adapters.new_adapter import write_package
+
+    for path in write_package(name, into):
+        click.echo(f"wrote {path}")
+    click.echo(f"next: pip install -e {into / name}, and crosscheck check-adapter {name}")
