@@ -129,10 +129,15 @@ def _self_test(as_json: bool) -> NoReturn:
 @main.command("new-adapter")
 @click.argument("name")
 @click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
-def new_adapter(name: str, into: Path) -> None:
+@AS_JSON
+def new_adapter(name: str, into: Path, as_json: bool) -> None:
     """Write a small package for an engine of your own: it works, and its test runs the conformance checks."""
     from adapters.new_adapter import write_package
 
-    for path in write_package(name, into):
+    written = [str(path) for path in write_package(name, into)]
+    if as_json:
+        click.echo(json.dumps({"name": name, "files": written}, indent=1))
+        return
+    for path in written:
         click.echo(f"wrote {path}")
     click.echo(f"next: pip install -e {into / name}, and crosscheck check-adapter {name}")

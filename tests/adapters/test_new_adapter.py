@@ -1,5 +1,6 @@
 """`crosscheck new-adapter`: what it writes is a package that works, and that is short enough to be read."""
 
+import json
 import os
 import subprocess
 import sys
@@ -43,6 +44,12 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     command = [sys.executable, "-m", "reports.command", *asked]
     ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert ran.returncode == 0 and "my_discs/plain" in ran.stderr and "Every row passes" in ran.stderr, ran.stderr
+
+
+def test_json_names_the_files_that_were_written(tmp_path):
+    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path), "--json"])
+    told = json.loads(done.output)
+    assert told["name"] == "mine" and [Path(file).is_file() for file in told["files"]] == [True] * 3
 
 
 @pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "a" * 200])
