@@ -57,11 +57,21 @@ class Scheme:
         Phases of a step, for people.
     position_offset
         Free fall from rest is sampled at ``x(t) + position_offset * g * t * dt / 2`` along gravity: +1 velocity
-        first (semi-implicit Euler falls too far), -1 position first (lags behind), 0 second order.
+        first (semi-implicit Euler falls too far), -1 position first (lags behind), 0 second order, 1/n where a step
+        is made of n semi-implicit ones.
     """
 
     order: str
-    position_offset: int
+    position_offset: float
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A conformance check that an engine is known to fail: which, why, and where that is known from."""
+
+    check: str
+    because: str
+    source: str
 
 
 @dataclass(frozen=True)
@@ -153,6 +163,7 @@ ROLES: Mapping[Role, str] = {
     "solution": "solves its contact problem and says whether it did; what fails there is a defect",
     "matched": "made to follow the textbook's law by settings that nobody ships; in no ranking",
 }
+Precision = Literal["double", "single"]
 #: Name of the profile in the rows of an engine that cannot be asked for its own.
 NOT_KNOWN = "?"
 
@@ -175,6 +186,21 @@ class EngineFacts:
     roles: Mapping[str, Role] = field(default_factory=dict)
     #: Colour of the engine in pictures, ``#rrggbb``; reports choose one where it is empty.
     colour: str = ""
+    #: Numbers that the engine computes with.
+    precision: Precision = "double"
+
+    @property
+    def epsilon(self) -> float:
+        """Distance from 1 to the next number that the engine knows."""
+        return 2.0**-52 if self.precision == "double" else 2.0**-23
+
+    @property
+    def round_off(self) -> float:
+        """What a number of order 10 may be off after some tens of steps, or a quaternion's root and product.
+
+        A hundred roundings of single numbers; of double ones far more, since nothing near it is of interest.
+        """
+        return 1e-9 if self.precision == "double" else 1e3 * self.epsilon
 
     def profile(self, role: Role) -> str | None:
         """Name of the profile with this role, if there is one."""
@@ -189,6 +215,8 @@ class Engine(ABC):
     profiles: Mapping[str, ProfileRule]
     #: What the adapter knows of other releases; None: nothing, its package is the only distribution.
     releases: Releases | None = None
+    #: Conformance checks that it is known to fail.
+    expected: tuple[Expected, ...] = ()
 
     @property
     def name(self) -> str:

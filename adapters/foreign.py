@@ -17,7 +17,7 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import EntryPoint
 from multiprocessing.connection import Connection
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 from adapters.engine import (
     ROLES,
@@ -25,6 +25,7 @@ from adapters.engine import (
     Engine,
     EngineError,
     EngineFacts,
+    Precision,
     Quirk,
     Role,
     Scheme,
@@ -263,7 +264,14 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         {str(name): _scheme(scheme) for name, scheme in data["profile_schemes"].items()},
         {str(name): _role(role) for name, role in data["roles"].items()},
         _colour(data["colour"]),
+        _precision(data["precision"]),
     )
+
+
+def _precision(text: Any) -> Precision:
+    if text not in get_args(Precision):
+        raise ValueError(f"precision is {one_line(text, NAME)!r}, possible are {', '.join(get_args(Precision))}")
+    return cast(Precision, text)
 
 
 def _role(role: Any) -> Role:
@@ -279,4 +287,4 @@ def _colour(text: Any) -> str:
 
 
 def _scheme(data: Mapping[str, Any]) -> Scheme:
-    return Scheme(str(data["order"]), int(data["position_offset"]))
+    return Scheme(str(data["order"]), float(data["position_offset"]))

@@ -1,8 +1,7 @@
-"""What the bench is known to catch: faults planted in a healthy engine, and what caught each.
+"""Faults of a given size that any engine can be given from outside.
 
-`CAUGHT_BY` are faults of a toy engine; the tests plant every one of them and the report shows the table, so that a
-reader knows how far "all receipts hold" goes. `Planted` gives any engine a fault of a given size, from which
-`validation.detection` computes what every check and every receipt can see.
+`validation.detection` computes from them what every check and every receipt can see. Those of a toy engine, with what
+must catch each, stand in `adapters.conformance.faults`.
 """
 
 from __future__ import annotations
@@ -17,36 +16,6 @@ import numpy as np
 from adapters.engine import Array, Contacts, Declared, Engine, EngineError, Simulation
 from adapters.needs import Needs
 from adapters.scene import Body, Box, Disc, Scene, Sphere
-
-#: Fault -> what catches it: a receipt by its quantity, or a conformance check.
-CAUGHT_BY = {
-    "restitution ignored": "receipt restitution",
-    "friction applied twice": "receipt friction",
-    "friction 2 % low": "receipt friction",
-    "impulses reported 2 % low": "receipt impulse",
-    "friction reported 2 % low": "receipt friction_impulse",
-    "gravity sign": "receipt gravity",
-    "half against full extents": "receipt size",
-    "state sampled one step late": "receipt sampling",
-    "world shared between builds": "check fresh",
-    "disc inertia given to a sphere": "receipt inertia",
-    "hidden damping of 4 %": "receipt linear_damping",
-    "angle sign": "receipt turn",
-    "mass ignored": "receipt mass",
-    "impulse of the wrong body": "check impulse",
-    "torque sign": "receipt turn",
-    "step of its own": "receipt step",
-    "spin damped": "receipt angular_damping",
-    "principal axes swapped": "receipt inertia",
-    "start not as the scene says": "check states",
-    "bodies in another order": "check states",
-    "normal points from the second body": "check contacts",
-    "bodies not in order of the scene": "check contacts",
-    "unknown settings ignored": "check refusals",
-    "setting without a reason": "check profiles",
-    "refusal of several lines": "check refusals",
-    "nothing read back": "check readback",
-}
 
 #: Faults of a given size that any engine can be given from outside, in what it is told...
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")

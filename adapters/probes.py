@@ -49,13 +49,14 @@ LOAD_ACCELERATION, LOAD_SPIN_UP = 2.0, 1.5
 
 @dataclass(frozen=True)
 class Case:
-    """What probes are made for: pair values, step, and the step order that the engine states."""
+    """What probes are made for: pair values, step, and step order and precision that the engine states."""
 
     dimension: int
     restitution: float
     friction: float
     dt: float
-    position_offset: int
+    position_offset: float
+    epsilon: float = 2.0**-52
 
 
 @dataclass(frozen=True)

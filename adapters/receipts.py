@@ -53,8 +53,8 @@ QUANTITIES = (
     "turn",
 )
 
-#: Band of everything an engine gets exactly: some thousand roundings of 2.2e-16 each.
-ROUND_OFF = 1e-12
+#: Band of everything an engine gets exactly, in roundings: 1e-12 of a double number.
+ROUNDINGS = 1e-12 / 2.0**-52
 #: What a profile's own solve may leave of friction, as a share of the coefficient, unless it declares more: what a
 #: sliding box is judged to at 1/240 s (`validation.bounds.driven`, dt/100 s = 4e-5), rounded up.
 FRICTION_SHARE = 1e-4
@@ -91,7 +91,14 @@ def receipts(
     """
     settings = engine.settings(profile, needs, dt, iterations)
     values = tuple((setting.name, _frozen(setting.value)) for setting in settings)
-    case = Case(needs.dimension, needs.restitution, needs.friction, dt, engine.scheme(profile).position_offset)
+    case = Case(
+        needs.dimension,
+        needs.restitution,
+        needs.friction,
+        dt,
+        engine.scheme(profile).position_offset,
+        engine.facts.epsilon,
+    )
     names = tuple(name for name in PROBES if _applies(name, needs))
     declared = engine.declares(profile, needs, dt)
     for quantity in declared:
@@ -184,15 +191,19 @@ def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -
     """Band of what is as asked, and why: round-off, what the probe can resolve, and drag that is declared."""
     if quantity == "turn":
         return 0.0, "a sign"
+    round_off = ROUNDINGS * case.epsilon
     if quantity == "size":
         # A predicted contact acts up to a step of approach and one of rebound early, another one up to a step late.
         path = (1.0 + case.restitution) * LANDING_SPEED * case.dt
-        return path / HALF_EXTENTS[0] + ROUND_OFF, "one step of motion, and a predicted rebound"
-    band, because = ROUND_OFF, "exact but for round-off"
+        return path / HALF_EXTENTS[0] + round_off, "one step of motion, and a predicted rebound"
+    band, because = round_off, "exact but for round-off"
     if quantity == "impulse":
-        band, because = IMPULSE_SHARE, "impulses are bookkeeping: they add up to m dv but for a solver's tolerance"
+        band, because = (
+            max(IMPULSE_SHARE, round_off),
+            "impulses are bookkeeping: they add up to m dv but for a solver's tolerance",
+        )
     if quantity in ("friction", "friction_impulse"):
-        band = FRICTION_SHARE * case.friction + ROUND_OFF
+        band = FRICTION_SHARE * case.friction + round_off
         because = "a sliding box is solved to a share of 1e-4 of its friction"
     drag = _drag(quantity, case, declared)
     return (band + drag, f"{because}; and declared drag") if drag else (band, because)

@@ -86,6 +86,8 @@ def test_every_profile_of_ours_has_a_role_of_its_own(engine):
 
 #: Words of engines where they mean something else, or where our own solver is meant.
 OTHER_WORDS = {
+    ("adapters/conformance/faults.py", "default"): "the toy's profile",
+    ("adapters/conformance/toy.py", "default"): "the toy's profile",
     ("adapters/engine.py", "one"): "a role",
     ("adapters/engine.py", "tuned"): "a role",
     ("reports/palette.py", "one"): "a role",
@@ -114,7 +116,8 @@ def test_no_engine_profile_or_colour_is_special_outside_its_folder():
 
 #: Words that are scenes' names as well, where they mean something else.
 OTHER_MEANINGS = {
-    ("adapters/conformance.py", "impact"): "a regime of `Needs`",
+    ("adapters/conformance/self_test.py", "impact"): "a regime of `Needs`",
+    ("adapters/conformance/statements.py", "impact"): "a regime of `Needs`",
     ("adapters/needs.py", "impact"): "a regime of `Needs`",
     ("adapters/receipts.py", "impact"): "a regime of `Needs`",
     ("adapters/probes.py", "slide"): "a probe",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -84,16 +85,60 @@ def doctor(as_json: bool) -> None:
 
 
 @main.command("check-adapter")
-@click.argument("name", shell_complete=engine_names)
+@click.argument("name", shell_complete=engine_names, required=False)
+@click.option("--self-test", "testing", is_flag=True, help="Plant faults in a toy engine: does its check catch each?")
 @AS_JSON
-def check_adapter_(name: str, as_json: bool) -> None:
-    """Run the conformance checks on the adapter of an engine; exits with 1 if it breaks one."""
+def check_adapter_(name: str | None, testing: bool, as_json: bool) -> None:
+    """Run the conformance checks on the adapter of an engine; exits with 1 if it breaks one.
+
+    A check whose scenes the engine refuses is refused, which is no pass; one that the adapter lists as an expected
+    failure is told as such, and as an unexpected pass if it holds.
+    """
+    if testing == (name is not None):
+        raise click.UsageError("name an engine, or give --self-test")
+    if testing:
+        _self_test(as_json)
     from adapters.conformance import check_adapter
 
-    findings = check_adapter(registry.load(name))
+    findings = check_adapter(registry.load(str(name)))
     if as_json:
-        click.echo(json.dumps([asdict(finding) for finding in findings], indent=1, default=str))
+        click.echo(json.dumps([{**asdict(each), "holds": each.holds} for each in findings], indent=1))
     else:
         for finding in findings:
             click.echo(str(finding))
     sys.exit(0 if all(finding.holds for finding in findings) else 1)
+
+
+def _self_test(as_json: bool) -> NoReturn:
+    """Show each planted fault as it is tried: size, what must catch it, and whether that did."""
+    from adapters.conformance.self_test import self_test
+
+    rows = []
+    for row in self_test():
+        rows.append({**asdict(row), "size": None if math.isnan(row.size) else row.size})
+        if not as_json:
+            size = "" if math.isnan(row.size) else f"{row.size:g} {row.unit}"
+            click.echo(f"{'ok  ' if row.caught else 'FAIL'}  {row.fault}{f', {size}' if size else ''}: {row.check}")
+    missed = sum(not row["caught"] for row in rows)
+    if as_json:
+        click.echo(json.dumps(rows, indent=1))
+    else:
+        click.echo(f"{len(rows) - missed} of {len(rows)} as they must be; the first row is the healthy toy")
+    sys.exit(1 if missed else 0)
+
+
+@main.command("new-adapter")
+@click.argument("name")
+@click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
+@AS_JSON
+def new_adapter(name: str, into: Path, as_json: bool) -> None:
+    """Write a small package for an engine of your own: it works, and its test runs the conformance checks."""
+    from adapters.new_adapter import write_package
+
+    written = [str(path) for path in write_package(name, into)]
+    if as_json:
+        click.echo(json.dumps({"name": name, "files": written}, indent=1))
+        return
+    for path in written:
+        click.echo(f"wrote {path}")
+    click.echo(f"next: pip install -e {into / name}, and crosscheck check-adapter {name}")

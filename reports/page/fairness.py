@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters import registry
+from adapters.conformance.faults import FAULTS
 from adapters.engine import EngineFacts
 from adapters.engine_folder import laws_of
-from adapters.planted_faults import CAUGHT_BY
 from reports.cures import setting_text
 from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
@@ -109,7 +109,15 @@ def fairness(source: Source) -> Fairness:
     solver = registry.solver()
     own = [(mark, sum(f.count for f in fs), fs) for mark, _, every in findings(source)
            if (fs := [f for f in every if f.engine == solver])]  # fmt: skip
-    return Fairness(solver, own, _once(cures(source)), [_sheet(source, name) for name in source.engines], CAUGHT_BY)
+    return Fairness(solver, own, _once(cures(source)), [_sheet(source, name) for name in source.engines], _planted())
+
+
+def _planted() -> dict[str, str]:
+    """Each fault that the kit's self-test plants, its sizes, and what must catch it."""
+    return {
+        f"{name} ({', '.join(f'{size:g}' for size in fault.sizes)} {fault.unit})" if fault.sizes else name: fault.check
+        for name, fault in FAULTS.items()
+    }
 
 
 def _once(every: Iterable[Cure]) -> list[Cure]:

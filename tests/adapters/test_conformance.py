@@ -3,8 +3,11 @@
 import pytest
 
 from adapters import registry
-from adapters.conformance import CHECKS, check_adapter
+from adapters.conformance import CHECKS, check_adapter, items
+from adapters.conformance.spoilt import Spoilt
+from adapters.engine import Expected
 from adapters.receipts import QUANTITIES
+from adapters.scene import Box
 
 
 def failing(findings):
@@ -24,7 +27,7 @@ def test_findings_are_one_line_each(toy):
 
 
 def test_a_fault_that_no_receipt_sees_is_found(toy):
-    found = failing(check_adapter(toy("world shared between builds")))
+    found = failing(check_adapter(toy("world shared with another")))
     assert "fresh" in found
     assert not [name for name in found if name.startswith("receipt")]
 
@@ -47,9 +50,66 @@ def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
     assert told["readback"] == "RuntimeError: no world today"
 
 
+def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_class):
+    class Discs(toy_class):
+        def refuses(self, scene, profile):
+            boxes = any(isinstance(body.shape, Box) for body in scene.bodies)
+            return "shape: balls only" if boxes else super().refuses(scene, profile)
+
+    findings = check_adapter(Discs())
+    assert [str(finding) for finding in findings if not finding.holds] == []
+    told = {finding.check: finding for finding in findings}
+    assert {name for name, finding in told.items() if finding.status == "refused"} == {
+        "process",  # a class of a function cannot be named to another process
+        "receipt friction", "receipt friction_impulse", "receipt size", "receipt impulse", "receipt mass",
+        "receipt inertia", "receipt turn", "receipt linear_damping", "receipt angular_damping",
+    }  # fmt: skip
+    assert "balls only" in str(told["receipt friction"])
+    assert told["receipt gravity"].status == told["states"].status == told["contacts"].status == "ok"
+
+
+def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
+    class Idle(toy_class):
+        def refuses(self, scene, profile):
+            return "not today"
+
+    passed = {finding.check for finding in check_adapter(Idle()) if finding.status == "ok"}
+    assert passed == {"packages", "facts", "profiles"}
+
+
+def test_expected_failures_are_told_and_an_unexpected_pass_is_a_failure(toy_class):
+    class Known(Spoilt):
+        expected = (Expected("states", "it starts late", "its manual"), Expected("contacts", "no", "nowhere"))
+
+    told = {finding.check: finding for finding in check_adapter(Known("start displaced", 1e-6))}
+    assert told["states"].status == "expected" and told["states"].holds
+    assert "it starts late (its manual): " in told["states"].message
+    assert told["contacts"].status == "unexpected pass" and not told["contacts"].holds
+
+    class Mistaken(toy_class):
+        expected = (Expected("stats", "a slip of the pen", "none"), Expected("receipt mass", "no", "none"))
+
+    told = {finding.check: finding for finding in check_adapter(Mistaken())}
+    assert not told["stats"].holds and "no such check" in told["stats"].message
+    assert told["receipt mass"].status == "unexpected pass"
+
+
+def test_items_are_one_per_check_and_fail_with_the_finding(toy):
+    healthy, spoilt = items(toy()), items(toy("start displaced"))
+    assert [str(item) for item in healthy] == [*CHECKS, "receipt probes", *(f"receipt {q}" for q in QUANTITIES)]
+    by_name = {item.name: item for item in spoilt}
+    with pytest.raises(AssertionError, match=r"FAIL .*states: "):
+        by_name["states"].hold()
+    assert by_name["profiles"].hold().status == "ok"
+    assert {item.name: item for item in healthy}["receipt mass"].hold().status == "ok"
+
+
 @pytest.mark.parametrize("name", registry.names())
 def test_our_adapters_conform(name):
     found = registry.find(name)
     if found.engine is None:
         pytest.skip(found.reason)
-    assert [str(finding) for finding in check_adapter(found.engine) if not finding.holds] == []
+    findings = check_adapter(found.engine)
+    assert [str(finding) for finding in findings if not finding.holds] == []
+    if found.facts.profile("solution"):
+        assert {finding.status for finding in findings} == {"ok"} and not found.engine.expected

@@ -1,59 +1,90 @@
-"""Detection power: every planted fault is caught by a named receipt or check that the healthy toy passes."""
+"""Detection power: every planted fault is caught by what names it, which the healthy toy passes."""
 
+import json
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from adapters.conformance import CHECKS
+from adapters.conformance import CHECKS, self_test
+from adapters.conformance.faults import FAULTS
+from adapters.conformance.spoilt import Spoilt
 from adapters.lift import lower_pose
 from adapters.needs import Needs
-from adapters.planted_faults import CAUGHT_BY, _turned
-from adapters.receipts import receipts
+from adapters.planted_faults import _turned
+from adapters.receipts import QUANTITIES, receipts
+from reports.command import main
 
-#: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
-EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81)
-DT = 1 / 60
-
-
-def broken(engine, name):
-    kind, what = name.split()
-    if kind == "check":
-        try:
-            return CHECKS[what](engine)
-        except Exception as error:  # as `check_adapter` does: what a faulty engine raises is a finding
-            return f"{type(error).__name__}: {error}"
-    return [slip for slip in receipts(engine, "default", EVERYTHING, DT) if slip.quantity == what and not slip.holds]
+EVERYTHING, DT = self_test.EVERYTHING, 1 / 60
+PLANTED = [(name, size) for name, fault in FAULTS.items() for size in fault.sizes or (math.nan,)]
 
 
-@pytest.mark.parametrize("name", sorted(set(CAUGHT_BY.values())))
+@pytest.mark.parametrize("name", sorted({fault.check for fault in FAULTS.values()}))
 def test_healthy_toy_passes(toy, name):
-    assert not broken(toy(), name)
+    assert self_test.broken(toy(), name) == ""
 
 
-@pytest.mark.parametrize("fault, name", CAUGHT_BY.items())
-def test_planted_fault_is_caught(toy, fault, name):
-    assert broken(toy(fault), name)
+@pytest.mark.parametrize(("fault", "size"), PLANTED)
+def test_planted_fault_is_caught(fault, size):
+    assert self_test.broken(Spoilt(fault, size), FAULTS[fault].check)
 
 
-def test_every_fault_that_can_be_planted_is_in_the_table(faults):
-    assert set(faults) == set(CAUGHT_BY)
+def test_every_check_and_receipt_has_a_fault_and_at_least_25_have_three_sizes():
+    named = {fault.check for fault in FAULTS.values()}
+    # Which packages lie on the path is no matter of an adapter.
+    assert named == {*CHECKS, *(f"receipt {quantity}" for quantity in QUANTITIES)} - {"packages"}
+    assert Counter(len(fault.sizes) for fault in FAULTS.values())[3] >= 25
+    assert {len(fault.sizes) for fault in FAULTS.values()} == {0, 3}
+    assert all(list(fault.sizes) == sorted(fault.sizes, reverse=True) for fault in FAULTS.values())
+
+
+def told(monkeypatch, faults, *args):
+    monkeypatch.setattr(self_test, "FAULTS", faults)
+    monkeypatch.setattr(self_test, "check_adapter", lambda engine: [])
+    return CliRunner().invoke(main, ["check-adapter", "--self-test", *args])
+
+
+def test_the_self_test_is_a_command_that_tells_every_row(monkeypatch):
+    few = {name: FAULTS[name] for name in ("states", "nothing read back", "start displaced") if name in FAULTS}
+    done = told(monkeypatch, few, "--json")
+    rows = json.loads(done.output)
+    assert done.exit_code == 0 and [row["caught"] for row in rows] == [True] * 5
+    assert [(row["fault"], row["check"], row["size"]) for row in rows[1:]] == [
+        ("nothing read back", "readback", None),
+        *(("start displaced", "states", size) for size in (1e-2, 1e-4, 1e-6)),
+    ]
+    text = told(monkeypatch, few).output
+    assert "ok    start displaced, 0.0001 m: states" in text and "5 of 5 as they must be" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_fault_that_goes_unnoticed_fails_the_self_test(monkeypatch):
+    monkeypatch.setitem(CHECKS, "states", lambda engine: "")
+    done = told(monkeypatch, {"start displaced": FAULTS["start displaced"]})
+    assert done.exit_code == 1 and done.output.count("FAIL") == 3 and "1 of 4" in done.output
+
+
+def test_either_an_engine_or_the_self_test_is_asked_for():
+    for args in ([], ["toy", "--self-test"]):
+        assert CliRunner().invoke(main, ["check-adapter", *args]).exit_code == 2
 
 
 #: Faults of one parameter, and all receipts they break: the others must not be drawn in.
 ALONE = {
     "restitution ignored": {"restitution"},
-    "friction applied twice": {"friction", "friction_impulse"},
-    "friction 2 % low": {"friction", "friction_impulse"},
-    "impulses reported 2 % low": {"impulse"},
-    "friction reported 2 % low": {"friction_impulse"},
-    "state sampled one step late": {"sampling", "friction"},  # the last step of a slide is missing, its weight is not
-    "disc inertia given to a sphere": {"inertia"},
-    "angle sign": {"turn"},
-    "mass ignored": {"mass"},
-    "spin damped": {"inertia", "angular_damping"},
+    "friction too high": {"friction", "friction_impulse"},
+    "friction too low": {"friction", "friction_impulse"},
+    "impulses reported too low": {"impulse"},
+    "friction reported too low": {"friction_impulse"},
+    "state read late": {"sampling", "friction"},  # the last step of a slide is missing, its weight is not
+    "inertia of a disc given to a ball": {"inertia"},
+    "angles the wrong way": {"turn"},
+    "mass too small": {"mass"},
+    "spin that dies down": {"inertia", "angular_damping"},
     "impulse of the wrong body": {"impulse"},
-    "world shared between builds": set(),
+    "world shared with another": set(),
 }
 
 

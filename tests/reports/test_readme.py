@@ -94,6 +94,8 @@ NOT_RUN = {
     "crosscheck certify [--order|--self-test]": "compiles and runs the solver's gates: run by test_certify_command.py",
     "crosscheck compile": "minutes where the kernels are not there yet: `make test` begins with it",
     "crosscheck findings --prove ID": "runs an engine again with one setting switched: run by test_proving_command.py",
+    "crosscheck new-adapter NAME": "writes a package: run by tests/adapters/test_new_adapter.py",
+    "crosscheck check-adapter --self-test": "a minute: all its rows are tests of tests/adapters/test_planted_faults.py",
     "crosscheck tune ENGINE": "minutes: its search is run by tests/validation/test_tuning.py",
     "crosscheck tune ENGINE --decisive": "minutes: its measurement is run by tests/validation/test_decisive.py",
 }

@@ -1,0 +1,147 @@
+"""The toy engine with one fault: what it is told, what it does, or what is read of it, is spoilt by a given amount."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from adapters.conformance.toy import ToyEngine
+from adapters.engine import Array, Contacts, Declared, Engine, EngineError, EngineFacts, Setting, Simulation
+from adapters.needs import Needs
+from adapters.scene import Scene
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One way in which an adapter is wrong.
+
+    Parameters
+    ----------
+    check
+        What must catch it: the name of a check, or ``receipt <quantity>``.
+    sizes
+        Three sizes in ``unit``, the largest first; empty where a thing is wrong or right.
+    told, stepped
+        What the engine is told instead of the scene and the step.
+    pose, twist, contacts, readback
+        What is read instead, made of the world, what is true, and the size.
+    settings, refuses, facts, build
+        What the engine itself says or does instead.
+    """
+
+    check: str
+    sizes: tuple[float, ...] = ()
+    unit: str = ""
+    told: Callable[[Scene, float], Scene] | None = None
+    stepped: Callable[[float, float], float] | None = None
+    pose: Callable[[World, Array, float], Array] | None = None
+    twist: Callable[[World, Array, float], Array] | None = None
+    contacts: Callable[[World, Contacts, float], Contacts] | None = None
+    readback: Callable[[World, dict[str, Any], float], dict[str, Any]] | None = None
+    settings: Callable[[list[Setting]], list[Setting]] | None = None
+    refuses: Callable[[Scene, str | None], str | None] | None = None
+    facts: Callable[[EngineFacts], EngineFacts] | None = None
+    build: Callable[[Spoilt, Scene, float, dict[str, Any]], tuple[float, dict[str, Any]]] | None = None
+
+
+@dataclass
+class Past:
+    """What an engine with a fault keeps between its worlds; a healthy one keeps nothing."""
+
+    steps: int = 0
+    last: str = ""
+    kept: list[bytes] = field(default_factory=list)
+
+
+class Spoilt(Engine):
+    """The toy with the fault called ``name`` of `adapters.conformance.faults`, of ``size``."""
+
+    def __init__(self, name: str, size: float) -> None:
+        from adapters.conformance.faults import FAULTS
+
+        self.fault, self.size, self.inner, self.past = FAULTS[name], size, ToyEngine(), Past()
+        self._told = name, size
+        self.facts = self.fault.facts(self.inner.facts) if self.fault.facts else self.inner.facts
+        self.profiles = {profile: self._rule(profile) for profile in self.inner.profiles}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process makes the same fault anew."""
+        return Spoilt, self._told
+
+    def _rule(self, profile: str) -> Callable[[Needs, float], list[Setting]]:
+        def rule(needs: Needs, dt: float) -> list[Setting]:
+            given = self.inner.profiles[profile](needs, dt)
+            return self.fault.settings(given) if self.fault.settings else given
+
+        return rule
+
+    def version(self) -> str:
+        """Version of the toy."""
+        return self.inner.version()
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """What the toy refuses, or what the fault makes of it."""
+        said = self.inner.refuses(scene, profile)
+        return self.fault.refuses(scene, said) if self.fault.refuses else said
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Nothing: no fault is declared."""
+        return {}
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """A world that is told, stepped or read wrongly."""
+        given = dict(settings)
+        if self.fault.build:
+            dt, given = self.fault.build(self, scene, dt, given)
+        told = self.fault.told(scene, self.size) if self.fault.told else scene
+        step = self.fault.stepped(dt, self.size) if self.fault.stepped else dt
+        if self.refuses(scene, "") and not self.fault.refuses:
+            raise EngineError(str(self.refuses(scene, "")))
+        return World(self, scene, self.inner.build(told, step, given), dt)
+
+
+class World(Simulation):
+    """One world of a spoilt engine."""
+
+    def __init__(self, engine: Spoilt, scene: Scene, inner: Simulation, dt: float) -> None:
+        self.engine, self.scene, self.inner, self.dt = engine, scene, inner, dt
+        self.steps, self.at_once = 0, 1
+        #: Steps that other worlds of this engine had made when this one was built, and the scene before it.
+        self.born, self.after = engine.past.steps, engine.past.last
+        engine.past.last = scene.name
+        self.before = inner.pose(), inner.twist(), inner.contacts()
+
+    @property
+    def others(self) -> int:
+        """Steps that other worlds have made since this one was built."""
+        return self.engine.past.steps - self.born - self.steps
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`."""
+        self.at_once = max(self.at_once, steps)
+        for _ in range(steps):
+            self.before = self.inner.pose(), self.inner.twist(), self.inner.contacts()
+            self.inner.advance(1)
+            self.steps += 1
+            self.engine.past.steps += 1
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`."""
+        spoil = self.engine.fault.pose
+        return spoil(self, self.inner.pose(), self.engine.size) if spoil else self.inner.pose()
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        spoil = self.engine.fault.twist
+        return spoil(self, self.inner.twist(), self.engine.size) if spoil else self.inner.twist()
+
+    def contacts(self) -> Contacts:
+        """See `Simulation.contacts`."""
+        spoil = self.engine.fault.contacts
+        return spoil(self, self.inner.contacts(), self.engine.size) if spoil else self.inner.contacts()
+
+    def readback(self) -> dict[str, Any]:
+        """See `Simulation.readback`."""
+        spoil = self.engine.fault.readback
+        return spoil(self, self.inner.readback(), self.engine.size) if spoil else self.inner.readback()

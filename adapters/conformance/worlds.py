@@ -1,0 +1,280 @@
+"""Worlds of an adapter: they start as asked, hold what was asked, share nothing, and repeat bit for bit."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import json
+import os
+import pickle
+from collections.abc import Callable
+from itertools import product
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.conformance.finding import NotAsked
+from adapters.conformance.scenes import (
+    DT,
+    accepted,
+    built,
+    driven,
+    resting,
+    rolling,
+    sliding,
+    striking,
+    values,
+)
+from adapters.engine import Engine, Simulation
+from adapters.isolation import Child, IsolationError, Lost
+from adapters.plain import one_line
+from adapters.scene import Scene
+from adapters.stepping import posed_for
+
+#: Seconds that a process may take to import an engine and step it 48 times; kernels may be compiled meanwhile.
+PATIENCE = 300.0
+#: Builds before memory is looked at, and builds that it must be steady over. What a first build fetches is kept.
+WARM, BUILDS = 200, 1000
+#: What memory may grow by over `BUILDS` builds [bytes]: allocators keep a page here and there, a thousand worlds
+#: that are not freed take a kilobyte each at the very least.
+STEADY = 2**20
+
+
+def states(engine: Engine) -> str:
+    """Poses and twists are those of all bodies in the scene's order, and start as the scene says."""
+    for profile, order in product(engine.profiles, (1, -1)):
+        planar = accepted(engine, profile, resting(order), resting(order, box=False))
+        scene = posed_for(engine, planar)
+        simulation = built(engine, planar, profile)
+        try:
+            pose, twist, changed = simulation.pose(), simulation.twist(), simulation.initial_change
+        finally:
+            simulation.close()
+        asked = np.array([body.pose for body in scene.bodies])
+        if pose.shape != asked.shape or twist.shape != (len(scene.bodies), 3 if scene.dimension == 2 else 6):
+            return f"{profile}: shapes are {pose.shape} and {twist.shape}"
+        slack = engine.facts.round_off
+        if not np.allclose(twist, [body.twist for body in scene.bodies], rtol=0.0, atol=slack):
+            return f"{profile}: bodies start with other velocities than the scene's"
+        # A start that was changed on purpose is shown beside the result; it must be said.
+        if not changed and not np.allclose(pose, asked, rtol=0.0, atol=slack):
+            return f"{profile}: bodies start in another pose than the scene's, and initial_change does not say so"
+    return ""
+
+
+def readback(engine: Engine) -> str:
+    """What the engine holds is told as data, and is what was declared: step, gravity, masses, moments, materials."""
+    for profile in engine.profiles:
+        scene = accepted(engine, profile, resting(), resting(box=False))
+        simulation = built(engine, scene, profile)
+        try:
+            held = simulation.readback()
+        finally:
+            simulation.close()
+        if not held:
+            return f"{profile}: nothing is read back"
+        json.dumps(held)
+        for name, asked, told in _stated(engine, profile, posed_for(engine, scene), held):
+            if not _same(asked, told, engine.facts.round_off):
+                return f"{profile}: {name} was declared {asked}, the engine holds {told}"
+    return ""
+
+
+def _stated(engine: Engine, profile: str, scene: Scene, held: dict[str, Any]) -> list[tuple[str, Any, Any]]:
+    """Name, declared and held value of everything that is read back under the names that the contract knows."""
+    pairs = [(f"settings.{k}", v, held[k]) for k, v in values(engine, profile, scene).items() if k in held]
+    for name, asked in (("dt", DT), ("gravity", scene.gravity)):
+        if name in held:
+            pairs.append((name, asked, held[name]))
+    for body in scene.bodies:
+        told = held.get("bodies", {}).get(body.name, {}) if body.motion == "free" else {}
+        for name, value in (("mass", body.mass), ("inertia", body.inertia)):
+            if name in told:
+                pairs.append((f"{body.name}.{name}", value, told[name]))
+    for i, j, material in scene.contact_pairs():
+        told = held.get("pairs", {}).get(f"{scene.bodies[i].name}-{scene.bodies[j].name}", {})
+        for name in ("restitution", "friction"):
+            if name in told:
+                pairs.append((f"{material.a}-{material.b}.{name}", getattr(material, name), told[name]))
+    return pairs
+
+
+def _same(asked: Any, told: Any, slack: float) -> bool:
+    if isinstance(asked, str):
+        return asked.lower() in str(told).lower()  # an engine may write its own prefix to a word
+    if isinstance(asked, bool) or asked is None:
+        return bool(asked == told)
+    try:
+        a, b = np.asarray(asked, float), np.asarray(told, float)
+    except (TypeError, ValueError):
+        return True  # a table or a word of the engine's own, which only its adapter can read
+    return a.shape != b.shape or bool(np.allclose(a, b, rtol=slack, atol=slack * 1e-3))
+
+
+# ---- bit for bit ---------------------------------------------------------------------------------------------------
+
+
+def fresh(engine: Engine) -> str:
+    """Two worlds stepped in turn give, bit for bit, what each gives alone."""
+    for profile in engine.profiles:
+        scenes = [accepted(engine, profile, *variants) for variants in _three()]
+        alone = [_interleaved(engine, profile, [scene])[0] for scene in scenes]
+        together = _interleaved(engine, profile, scenes)
+        for scene, a, b in zip(scenes, alone, together, strict=True):
+            if not np.array_equal(a, b):
+                return f"{profile}: {scene.name} comes out otherwise when another world is stepped in between"
+    return ""
+
+
+def _three() -> tuple[tuple[Scene, ...], ...]:
+    other = resting(-1, 4.0), resting(-1, 4.0, box=False)
+    return (resting(), resting(box=False)), other, (striking(),)
+
+
+def _interleaved(engine: Engine, profile: str, scenes: list[Scene]) -> list[np.ndarray]:
+    """Final states of worlds that are all built first and then stepped in turn."""
+    worlds: list[Simulation] = []
+    try:
+        for scene in scenes:
+            worlds.append(built(engine, scene, profile))
+        for _ in range(24):
+            for world in worlds:
+                world.advance(1)
+        return [np.hstack([world.pose(), world.twist()]) for world in worlds]
+    finally:
+        for world in worlds:
+            world.close()
+
+
+def repeat(engine: Engine) -> str:
+    """The same scene gives the same bits again, in the same process."""
+    for profile in engine.profiles:
+        scene = accepted(engine, profile, sliding(), rolling())
+        hashes = {driven(engine, scene, profile).state_hash() for _ in range(3)}
+        if len(hashes) > 1:
+            return f"{profile}: {scene.name} came out in {len(hashes)} ways of 3"
+    return ""
+
+
+def history(engine: Engine) -> str:
+    """A scene gives the same bits after another one has run."""
+    for profile in engine.profiles:
+        scene = accepted(engine, profile, sliding(), rolling())
+        before = driven(engine, scene, profile).state_hash()
+        for other in (striking(), accepted(engine, profile, resting(-1, 4.0), resting(-1, 4.0, box=False))):
+            driven(engine, other, profile)
+            if driven(engine, scene, profile).state_hash() != before:
+                return f"{profile}: {scene.name} comes out otherwise after {other.name}"
+    return ""
+
+
+def process(engine: Engine) -> str:
+    """A scene gives the same bits in a fresh process."""
+    here = _hashes(engine)
+    try:
+        asked = pickle.dumps(engine)
+    except Exception as error:
+        raise NotAsked(f"the engine cannot be named to another process: {type(error).__name__}") from None
+    try:
+        child = Child(serve_hashes)
+    except IsolationError as error:
+        raise NotAsked(str(error)) from None
+    try:
+        child.send(asked)
+        there = json.loads(child.receive(PATIENCE))
+    except Lost as lost:
+        return f"{lost}: {one_line(child.tail())}"
+    finally:
+        child.stop()
+    if "not there" in there:
+        raise NotAsked(f"the engine cannot be had in another process: {there['not there']}")
+    differing = [profile for profile in here if there.get(profile) != here[profile]]
+    return f"{', '.join(differing)}: comes out otherwise in a fresh process" if differing else ""
+
+
+def serve_hashes(connection: Connection) -> None:
+    """Run the scene of `process` on one engine; runs in the child, which gets the engine from its parent alone."""
+    try:
+        engine = pickle.loads(connection.recv_bytes())
+    except Exception as error:
+        connection.send_bytes(json.dumps({"not there": f"{type(error).__name__}: {error}"}).encode())
+        return
+    connection.send_bytes(json.dumps(_hashes(engine)).encode())
+
+
+def _hashes(engine: Engine) -> dict[str, str]:
+    scenes = {profile: accepted(engine, profile, sliding(), rolling()) for profile in engine.profiles}
+    return {profile: driven(engine, scene, profile).state_hash() for profile, scene in scenes.items()}
+
+
+def stride(engine: Engine) -> str:
+    """The loop that is timed, many steps at once and nothing read, ends in the bits of the loop that is judged."""
+    for profile in engine.profiles:
+        scene = accepted(engine, profile, sliding(), rolling())
+        ends = [_stepped(engine, scene, profile, strides) for strides in ((24,), (1,) * 24, (1, 7, 16))]
+        if not all(np.array_equal(ends[0], end) for end in ends):
+            return f"{profile}: 24 steps at once end elsewhere than 24 single ones that are read in between"
+    return ""
+
+
+def _stepped(engine: Engine, scene: Scene, profile: str, strides: tuple[int, ...]) -> np.ndarray:
+    simulation = built(engine, scene, profile)
+    try:
+        for steps in strides:
+            simulation.advance(steps)
+            if len(strides) > 1:
+                simulation.pose(), simulation.twist(), simulation.contacts(), simulation.readback()
+        return np.hstack([simulation.pose(), simulation.twist()])
+    finally:
+        simulation.close()
+
+
+# ---- memory --------------------------------------------------------------------------------------------------------
+
+
+def memory(engine: Engine) -> str:
+    """A thousand worlds that are built, stepped and closed leave no memory behind."""
+    if resident() is None:
+        raise NotAsked("this system does not tell how much memory a process holds")
+    profile = next(iter(engine.profiles))
+    scene = accepted(engine, profile, resting(), resting(box=False))
+    posed, given = posed_for(engine, scene), values(engine, profile, scene)
+
+    def build(times: int) -> None:
+        for _ in range(times):
+            simulation = engine.build(posed, DT, given)
+            simulation.advance(1)
+            simulation.close()
+
+    build(WARM)
+    # An allocator may take a pool more once; what leaks does so again.
+    grown = _growth(build)
+    if grown > STEADY:
+        grown = min(grown, _growth(build))
+    return f"{profile}: {BUILDS} worlds leave {grown / BUILDS:.0f} bytes each" if grown > STEADY else ""
+
+
+def _growth(build: Callable[[int], None]) -> float:
+    before = _settled()
+    build(BUILDS)
+    return _settled() - before
+
+
+def _settled() -> float:
+    """Resident memory once all that is free is given back: what an earlier check left free would hide a leak."""
+    gc.collect()
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # GNU's allocator alone has it
+        ctypes.CDLL(None).malloc_trim(0)
+    return resident() or 0.0
+
+
+def resident() -> float | None:
+    """Resident memory of this process [bytes]; None where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except (OSError, ValueError, IndexError):
+        return None
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
