@@ -193,3 +193,27 @@ class TestTruth:
         )
         assert certificate.holds and len(certificate.t) == 21
         assert certificate.error[-1] < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_quaternion_that_is_a_unit_one_but_for_round_off_is_no_jump(seed):
+    """But one that is not what the run begins with is."""
+    angle = np.random.default_rng(seed).uniform(0.0, 3.0)
+    turn = (math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0)
+    box = Body(Box((0.1, 0.2, 0.3)), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.0, *turn))
+    model = Model(3, [box], (0.0, 0.0, -G), 0.0, 0.0)
+    assert refused(model, 5) == set()
+    record = Simulation(model, Settings.reference(DT)).record(5, pieces=True)
+    other = replace(model, bodies=(replace(box, pose=(0.0, 0.0, 0.0, turn[0], turn[1] + 1e-14, 0.0, 0.0)),))
+    assert "joined" in {finding.name for finding in audit(other, record, DT) if not finding.holds}
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e3])
+def test_energy_from_nowhere_is_seen_without_loads_however_light_bodies_are(size):
+    """Without loads it used to be measured against a joule."""
+    light = Body(Disc(0.5), 1e-6 * size, 0.125e-6 * size, (0.0, 0.0, 0.0), (0.1, 0.0, 0.0))
+    model = Model(2, [light], (0.0, 0.0), 0.0, 0.0)
+    record = Simulation(model, Settings.reference(DT)).record(5, pieces=True)
+    faster = replace(record.pieces, twist_after=record.pieces.twist_after * (1.0 + 1e-3))
+    found = {finding.name for finding in audit(model, replace(record, pieces=faster), DT) if not finding.holds}
+    assert "gained" in found
