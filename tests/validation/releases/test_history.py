@@ -5,7 +5,7 @@ import pytest
 from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
 from validation.comparison import Kind
-from validation.findings import FindingsError
+from validation.findings import Family, Finding, FindingsError
 from validation.releases import history, notes
 from validation.releases.history import steps, told_by
 
@@ -74,6 +74,17 @@ def test_versions_are_in_the_order_of_versions(tmp_path):
     assert history.versions(store, "toy") == ["3.9.0", "3.10.0", "4.0.0rc1", "4.0.0"]
     assert [run.title for run in store.release_runs("toy", "4.0.0")] == ["release toy==4.0.0: impact"]
     store.close()
+
+
+@pytest.mark.parametrize(
+    ("value", "releases", "is_mended"), [(0.4, "<2", True), (0.4, ">=2", False), (0.5, "<2", False)]
+)
+def test_what_passes_beyond_the_band_of_a_finding_of_other_releases_is_mended(monkeypatch, value, releases, is_mended):
+    """What passes within the band was marginal there, and is the same here."""
+    family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", releases)
+    monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, value, 0.01))
+    (row,) = [row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio"]
+    assert row.physics == "pass" and history.mended(row) is is_mended
 
 
 @pytest.fixture

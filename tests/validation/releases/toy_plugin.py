@@ -1,6 +1,8 @@
 """Adapter of `toyphysics`, as somebody else's package would bring it; installed by the fixture `toy_releases`."""
 
 import math
+import os
+import time
 from typing import ClassVar
 
 import numpy as np
@@ -59,6 +61,7 @@ class ToySimulation(Simulation):
         }  # fmt: skip
 
     def advance(self, steps):
+        time.sleep(float(os.environ.get("TOY_SLEEP", "0")))  # for tests of what becomes of a cell that takes long
         for _ in range(steps):
             for disc in self.discs.values():
                 disc.step(self.dt)
