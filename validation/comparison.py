@@ -85,7 +85,7 @@ def by_seriousness(change: Change) -> tuple[Any, ...]:
     kinds = list(Kind)
     size = change.size if math.isfinite(change.size) else math.inf
     return (kinds.index(change.kind), not change.regressed, -abs(size), change.engine, change.profile, change.scene,
-            change.dimension, change.params, change.metric)  # fmt: skip
+            change.dimension, change.params, change.metric, change.slot.get("iterations") or 0)  # fmt: skip
 
 
 def _row_change(a: Plain, b: Plain) -> Change | None:
