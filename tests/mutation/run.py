@@ -46,7 +46,7 @@ SUBJECTS = {
     "validation/scenes/incline.py": ("validation/test_worked_bounds.py", "validation/test_bench_primary.py"),
     "validation/metrics.py": ("validation/test_metrics.py",),
     "validation/quantities.py": ("validation/test_quantities.py", "validation/test_scene_files.py"),
-    "adapters/law.py": ("validation/test_verdicts.py", "validation/test_deviations_chipmunk.py"),
+    "adapters/law.py": ("validation/test_verdicts.py", "validation/test_worked_bounds.py"),
     "reports/exports.py": ("reports/test_exports.py", "reports/test_what_is_shown.py"),
     "reports/wording.py": ("reports/test_wording.py", "reports/test_what_is_shown.py"),
     "reports/changes.py": ("reports/test_changes.py", "reports/test_comparison.py"),

@@ -334,3 +334,95 @@ def test_a_load_in_space_is_along_the_third_axis_and_a_window_leaves_out_its_fir
     trajectory = recorded(still, [[(0, 1, (7.0, 9.0, 64.0))]] * 4 + [[(0, 1, (7.0, 9.0, 3.0))]] * 4)
     (mean, _), deviation = metrics.interface_load(trajectory, 0, 1, 1.0, 0.5)
     assert (mean, deviation) == (3.0, 0.0)
+
+
+def moved(pose, twist=None, dimension=2):
+    """A trajectory of one body, number 1, beside one that never moves."""
+    pose = np.asarray(pose, dtype=float)
+    width = 3 if dimension == 2 else 6
+    whole = np.zeros((len(pose), 2, pose.shape[1]))
+    whole[:, 1] = pose
+    rates = np.zeros((len(pose), 2, width))
+    if twist is not None:
+        rates[:, 1] = twist
+    return Trajectory(np.arange(len(pose)) * 0.1, whole, rates, None, 0.1, "completed")
+
+
+def turned(axis, angles):
+    """Unit quaternions about an axis."""
+    return [[math.cos(0.5 * a), *(math.sin(0.5 * a) * np.array(axis))] for a in angles]
+
+
+def test_a_hop_is_the_largest_change_of_height_up_or_down():
+    for heights, size in (([1.0, 1.2, 0.9], 0.2), ([1.0, 1.2, 0.5], 0.5)):
+        assert metrics.hop(moved([(9.0 * k, y, 7.0 * k) for k, y in enumerate(heights)])) == pytest.approx(size)
+        space = [(3.0 * k, 4.0 * k, y, 1.0, 0.0, 0.0, 0.0) for k, y in enumerate(heights)]
+        assert metrics.hop(moved(space, dimension=3)) == pytest.approx(size)
+
+
+def test_astray_is_the_level_distance_from_a_line_through_the_start():
+    line = np.array([0.6, 0.8])
+    places = [(1.0, 2.0), (1.0 + 0.6 * 5.0, 2.0 + 0.8 * 5.0), (1.0 + 0.6 - 0.8 * 0.25, 2.0 + 0.8 + 0.6 * 0.25)]
+    space = [(*p, 3.0 * k, 1.0, 0.0, 0.0, 0.0) for k, p in enumerate(places)]
+    assert metrics.astray(moved(space, dimension=3), line) == pytest.approx(0.25, rel=1e-12)
+    assert metrics.astray(moved([(1.0, 2.0, 0.0), (4.0, 7.0, 1.0)]), np.array([1.0])) == 0.0
+
+
+def test_tilt_counts_whole_turns_and_its_rate_is_the_spin_about_the_same_axis():
+    angles = np.linspace(0.0, 9.0, 19)
+    plane = moved([(0.0, 0.0, a) for a in angles], np.full((19, 3), (1.0, 2.0, 5.0)))
+    assert metrics.tilt(plane) == pytest.approx(angles)
+    assert metrics.tilt_rate(plane) == pytest.approx(np.full(19, 5.0))
+    # Counter-clockwise seen with the first axis to the right and the third one up is about minus the second.
+    pose = [(0.0, 0.0, 0.0, *q) for q in turned((0.0, -1.0, 0.0), angles)]
+    space = moved(pose, np.full((19, 6), (1.0, 2.0, 3.0, 4.0, -5.0, 6.0)), 3)
+    assert metrics.tilt(space) == pytest.approx(angles)
+    assert metrics.tilt_rate(space) == pytest.approx(np.full(19, 5.0))
+
+
+def test_a_point_of_a_body_goes_with_it():
+    angles = [0.0, 0.5 * math.pi, math.pi]
+    plane = moved([(1.0, 2.0, a) for a in angles])
+    assert metrics.point(plane, 1, (0.3, 0.1)) == pytest.approx(np.array([(1.3, 2.1), (0.9, 2.3), (0.7, 1.9)]))
+    space = moved([(1.0, 2.0, 3.0, *q) for q in turned((0.0, 0.0, 1.0), angles)], dimension=3)
+    there = np.array([(1.3, 2.1, 3.5), (0.9, 2.3, 3.5), (0.7, 1.9, 3.5)])
+    assert metrics.point(space, 1, (0.3, 0.1, 0.5)) == pytest.approx(there)
+
+
+@pytest.mark.parametrize("level", [-0.8, -0.3, 0.0, 0.4, 1.3, 5.0])
+def test_a_crossing_of_a_cubic_is_exact_wherever_samples_lie(level):
+    """Value t^3 / 2 + t - 1, sampled at uneven times that begin late; the root is found by itself."""
+    t = np.array([0.1, 0.35, 0.8, 1.7, 2.5])
+    value, rate = 0.5 * t**3 + t - 1.0, 1.5 * t**2 + 1.0
+    (time, why), (speed, why_too) = metrics.crossing(t, value, rate, level)
+    low, high = 0.1, 2.5
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if 0.5 * middle**3 + middle - 1.0 < level else (low, middle)
+    assert (why, why_too) == ("", "")
+    assert time == pytest.approx(low, rel=1e-12)
+    assert speed == pytest.approx(1.5 * low**2 + 1.0, rel=1e-11)
+
+
+def test_a_crossing_is_the_first_on_the_way_up_and_none_where_the_level_is_not_reached():
+    t = np.linspace(0.0, 10.0, 401)
+    (time, _), (speed, _) = metrics.crossing(t, np.sin(t), np.cos(t), 0.5)
+    assert time == pytest.approx(math.asin(0.5), abs=1e-8)
+    assert speed == pytest.approx(math.cos(math.asin(0.5)), abs=1e-5)
+    late = slice(40, None)  # from 1 s on it is above, goes down and comes up again
+    (time, _), _ = metrics.crossing(t[late], np.sin(t)[late], np.cos(t)[late], 0.5)
+    assert time == pytest.approx(2.0 * math.pi + math.asin(0.5), abs=1e-8)
+    nothing = (None, metrics.NOT_PASSED)
+    assert metrics.crossing(t, np.sin(t), np.cos(t), 1.5) == (nothing, nothing)
+    assert metrics.NOT_PASSED == "it never gets there"
+
+
+def test_a_crossing_at_a_sample_is_that_sample():
+    t, value = np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0])
+    assert metrics.crossing(t, value, np.ones(3), 1.0)[0][0] == pytest.approx(1.0, abs=1e-12)
+    assert metrics.crossing(t, value, np.ones(3), 2.0)[0][0] == pytest.approx(2.0, abs=1e-12)
+    # Three roots between two samples: the first is meant.
+    rate = np.array([30.0, 30.0])
+    time = metrics.crossing(np.array([0.0, 1.0]), np.array([-1.0, 1.0]), rate, 0.0)[0][0]
+    roots = np.roots([56.0, -84.0, 30.0, -1.0])
+    assert time == pytest.approx(roots.real.min(), abs=1e-9)

@@ -1,9 +1,12 @@
 """Bounds of the four scenes, worked out once more from their derivations, number by number, with units and sources."""
 
 import math
+from fnmatch import fnmatchcase
 
 import pytest
 
+from adapters.law import exactly
+from validation import bounds
 from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
@@ -181,3 +184,75 @@ def test_rules_take_the_truth_they_are_given_and_no_other(name):
     truth = {metric: 10.0 + k for k, metric in enumerate(CATALOGUE[name].exact(scene))}
     stated = {c.metric: c.truth for c in CATALOGUE[name].rule(scene, DT, truth) if c.metric in truth}
     assert stated == truth
+
+
+#: Of every bound: worked value at g = 9 m/s^2, dt = 1/4 s, and the sentence that a user reads.
+STATED = {
+    "exact": ((3.0,), 3e-12, "exact law at every dt: only round-off of at most 1000 velocity updates remains"),
+    "bookkeeping": (
+        (4.0,),
+        4e-12,
+        "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law",
+    ),
+    "slips": (
+        (3, 9.0, 0.25),
+        1.6875,
+        "each of n interfaces may slip by what one step of free fall adds, and slips add up: n g dt^2",
+    ),
+    "found_late": (
+        (9.0, 0.25, 7e9),
+        0.5625 + 7e-3,
+        "one interface whose contact is found one step late: one step of free fall, g dt^2, whatever lies above",
+    ),
+    "landed": (
+        (2.0, 9.0, 0.25, 7e9),
+        0.5 + 0.5625 + 7e-3,
+        "the impact is found up to one step late, v dt deep, and the rest one more step of free fall: + g dt^2",
+    ),
+    "still_energy": (
+        (3.0, 9.0, 0.25),
+        1.5 * (0.01 * 2.25) ** 2,
+        "n bodies below the speed that counts as motion, v1/100 = g dt/100",
+    ),
+    "settled": (
+        (2, 0.001, 10.0),
+        0.2,
+        "moving at v1/100 for longer would use up the drift of n g dt^2; and the last second must be at rest",
+    ),
+    "carried": (
+        (0.25,),
+        0.005,
+        "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted",
+    ),
+    "steady": ((), 0.02, "a body slower than v1/100 changes its momentum by at most 2 m v1/100 a step"),
+    "straight": ((9.0, 0.25, 7e9), 0.5625 + 7e-3, "one step of a force across the path: g dt^2"),
+    "stuck": (
+        (9.0, 0.25, 2.0),
+        0.28125,
+        "a sticking box may move by what one step of free fall adds, g dt^2, over the whole run",
+    ),
+    "driven": (
+        (9.0, 0.25, 2.0),
+        0.01125,
+        "constant force is exact in every scheme: only motion below v1/100 = g dt/100 is forgiven",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_a_bound_is_its_number_and_says_why(name):
+    arguments, value, because = STATED[name]
+    bound = getattr(bounds, name)(*arguments)
+    assert bound.value == pytest.approx(value, rel=1e-12)
+    assert bound.because == because
+
+
+def test_one_is_the_scale_of_what_has_none_and_a_run_that_is_too_short_has_no_time_to_settle():
+    assert bounds.exact().value == bounds.bookkeeping().value == 1e-12
+    assert bounds.settled(2, 0.25, 10.0).value == 9.0
+
+
+def test_a_metric_with_an_index_is_a_pattern_of_itself_alone():
+    assert exactly("impulse[2]") == "impulse[[]2]"
+    assert fnmatchcase("impulse[2]", exactly("impulse[2]"))
+    assert not fnmatchcase("impulse2", exactly("impulse[2]"))
