@@ -35,6 +35,10 @@ def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
     return found
 
 
+#: Scenes on which not every engine has a clean profile that are told one by one; of more it is told by engine.
+FEW = 4
+
+
 def answering(source: Source) -> list[str]:
     """Engines that gave at least one answer."""
     return [engine for engine in source.engines if any(row["physics"] for row in source.of(engine=engine))]
@@ -56,10 +60,16 @@ def agreement(source: Source) -> str:
             + (f": {joined(who)}" if same else "")
             + _spread(source, everywhere[0], clean[everywhere[0]])
         )
-    for scene in source.scenes:
-        if scene not in everywhere:
-            who = [f"{e}/{p}" for e, profiles in clean[scene].items() for p in profiles]
-            parts.append(f"on {scene} only {joined(who)}" if who else f"on {scene} none passes everything")
+    elsewhere = [scene for scene in source.scenes if scene not in everywhere]
+    if len(elsewhere) > FEW:
+        for engine in engines:
+            without = [scene for scene in elsewhere if engine not in clean[scene] or not clean[scene][engine]]
+            if without:
+                parts.append(f"no profile of {engine} passes everything on {joined(without)}")
+        return "; ".join(parts) + "."
+    for scene in elsewhere:
+        who = [f"{e}/{p}" for e, profiles in clean[scene].items() for p in profiles]
+        parts.append(f"on {scene} only {joined(who)}" if who else f"on {scene} none passes everything")
     return "; ".join(parts) + "."
 
 

@@ -168,6 +168,20 @@ def test_the_sentences_change_when_the_physics_of_the_data_flips():
     assert base[2] != flipped[2]
 
 
+def test_where_many_scenes_part_the_engines_each_engine_says_where_it_has_no_clean_profile():
+    clean = next(row for row in golden("base").rows if row["physics"] == "pass")
+    rows = []
+    for k in range(6):
+        for engine in ("one", "two"):
+            verdict = "fail" if engine == "two" and k > 0 else "pass"
+            rows.append(clean | {"scene": f"scene{k}", "engine": engine, "profile": "tuned", "physics": verdict})
+    source = Source(golden("base").run, rows, [])
+    first = dict(sentences(source))["Where they agree"]
+    assert first.startswith("on scene0 every engine has a profile")
+    assert "no profile of two passes everything on scene1, scene2, scene3, scene4 and scene5." in first
+    assert "no profile of one" not in first
+
+
 def test_a_drift_within_the_tolerance_changes_the_stated_spread_only():
     base, drifted = said("base"), said("drift")
     assert base[0] != drifted[0]
