@@ -44,6 +44,11 @@ def answering(source: Source) -> list[str]:
     return [engine for engine in source.engines if any(row["physics"] for row in source.of(engine=engine))]
 
 
+def answers(source: Source, scene: str, engine: str) -> bool:
+    """Whether an engine gave an answer that is judged on a scene."""
+    return any(row["physics"] for row in source.of(scene=scene, engine=engine))
+
+
 def agreement(source: Source) -> str:
     """Where the engines agree."""
     engines = answering(source)
@@ -63,7 +68,7 @@ def agreement(source: Source) -> str:
     elsewhere = [scene for scene in source.scenes if scene not in everywhere]
     if len(elsewhere) > FEW:
         for engine in engines:
-            without = [scene for scene in elsewhere if engine not in clean[scene] or not clean[scene][engine]]
+            without = [scene for scene in elsewhere if not clean[scene].get(engine) and answers(source, scene, engine)]
             if without:
                 parts.append(f"no profile of {engine} passes everything on {joined(without)}")
         return "; ".join(parts) + "."

@@ -175,6 +175,7 @@ def test_where_many_scenes_part_the_engines_each_engine_says_where_it_has_no_cle
         for engine in ("one", "two"):
             verdict = "fail" if engine == "two" and k > 0 else "pass"
             rows.append(clean | {"scene": f"scene{k}", "engine": engine, "profile": "tuned", "physics": verdict})
+    rows.append(clean | {"scene": "scene6", "engine": "one", "profile": "tuned"})  # of which the other has nothing
     source = Source(golden("base").run, rows, [])
     first = dict(sentences(source))["Where they agree"]
     assert first.startswith("on scene0 every engine has a profile")
