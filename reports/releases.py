@@ -36,7 +36,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console) -
     console.print(Text(f"{releases[0].engine}: {len(releases)} releases, {rows} rows each", style="bold"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading, side in (("release", "left"), ("fails", "right"), ("mended", "right"), ("moved", "right")):
-        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type]
+        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type]  # a word of rich's own
     table.add_column("", overflow="fold")
     for told in releases:
         table.add_row(*_line(told, steps))

@@ -225,6 +225,7 @@ FAULTS: dict[str, Fault] = {
     "impulses reported too low": Fault("receipt impulse", SHARES, "share", contacts=_impulse(_low)),
     "friction reported too low": Fault("receipt friction_impulse", SHARES, "share", contacts=_impulse(_slipping)),
     "angles the wrong way": Fault("receipt turn", pose=_mirrored_turn),
+    # The wrong word is the fault, which the type checker sees as well.
     "role that is none": Fault("facts", facts=lambda facts: replace(facts, roles={"default": "best"})),  # type: ignore[dict-item]
     "setting without a reason": Fault("profiles", settings=_no_reason),
     "setting that is set twice": Fault("profiles", settings=lambda given: given * 2),
