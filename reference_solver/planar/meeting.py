@@ -15,7 +15,7 @@ from reference_solver.planar.separating_axis import CORNERS, best_axis, corner, 
 from reference_solver.planar.state import FIXED, HALF_SPACE, Bodies, Indices
 from reference_solver.stepping import time_of_impact
 from reference_solver.stepping.operations import provide
-from reference_solver.stepping.paths import Paths, allocate_paths, derivative
+from reference_solver.stepping.paths import Paths, allocate_paths, derivative, derivative_bound
 from reference_solver.stepping.time_of_impact import (
     CENTRE,
     CORNERS_FIRST,
@@ -150,8 +150,16 @@ def separate(meeting: Meeting) -> float:
     return value - trial.real[0, ROUNDING] - trial.real[1, ROUNDING]
 
 
+@inner_kernel
+def turn_bounds(meeting: Meeting, i: int, now: float, until: float) -> tuple[float, float]:
+    """Bounds of the rates of the angle."""
+    paths = meeting.paths
+    return derivative_bound(paths, i, True, 1, now, until), derivative_bound(paths, i, True, 2, now, until)
+
+
 provide(time_of_impact.is_half_space, Meeting, is_half_space)
 provide(time_of_impact.introduce, Meeting, introduce)
 provide(time_of_impact.stand, Meeting, stand)
 provide(time_of_impact.fix_plane, Meeting, fix_plane)
 provide(time_of_impact.separate, Meeting, separate)
+provide(time_of_impact.turn_bounds, Meeting, turn_bounds)

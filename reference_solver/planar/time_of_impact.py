@@ -15,12 +15,7 @@ from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, 
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
-from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held, overlap_time
-
-#: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
-DEEP = 3e-5
-#: Margin with which every pair of shapes answers with its points, however far apart they are.
-UNLIMITED = 1e300
+from reference_solver.stepping.time_of_impact import DEEP, UNLIMITED, first_contact, next_contact_of_held, overlap_time
 
 
 @inner_kernel

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
-from reference_solver.pieces import CONTACTS, FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, RELEASE, Journal
+from reference_solver.pieces import (
+    CONTACTS,
+    FIFTH_ORDER,
+    FIXED,
+    FORCES,
+    FROZEN,
+    IMPACT,
+    IMPULSE_LEVEL,
+    RELEASE,
+    Journal,
+)
+from reference_solver.spatial.midpoint import exchange_levers
 from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import add, cross, row, times_transposed
 from reference_solver.stepping.clock import HELD, LEFT
@@ -67,12 +78,16 @@ def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: 
     if struck(bodies):
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
         enter_bodies(journal, journal.pose, bodies.first)
+        if sub.clock[HELD] > 0.0:
+            exchange_levers(manifolds, sub)  # those of the start
         enter_points(journal, manifolds, True)
+        if sub.clock[HELD] > 0.0:
+            exchange_levers(manifolds, sub)
     curved = False
     for i in range(len(bodies)):
         curved = curved or bodies.curved[i] != 0
     keep_state(journal, journal.pose, bodies.first)
-    scheme = FIXED if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
+    scheme = IMPULSE_LEVEL if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
     open_piece(journal, begin, length, FORCES, scheme)
     enter_bodies(journal, bodies.pose, bodies.twist)
     first = journal.used[CONTACTS]
@@ -80,6 +95,15 @@ def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: 
     if curved:
         enter_moments(journal, manifolds, sub.lasting, first)
     keep_state(journal, bodies.pose, bodies.twist)
+
+
+@inner_kernel
+def enter_settled(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options) -> None:
+    """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
+    if is_kept(sub.journal):
+        open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
+        enter_bodies(sub.journal, bodies.pose, bodies.twist)
+        enter_points(sub.journal, manifolds, True)
 
 
 @inner_kernel

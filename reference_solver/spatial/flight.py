@@ -1,4 +1,4 @@
-"""Where a body is at time t of a sub-step whose loads are constant, and bounds of its turning (E30).
+"""Motion within one sub-step: where bodies are at any time of it, and how far they get (E24, E30).
 
 x(t) = x + v t + a t^2 / 2 is exact. A body whose spin keeps its axis turns by w t + b t^2 / 2. One with unequal moments
 turns by the splitting E18, composed to order 8 in pieces short enough that its error is round-off.
@@ -6,11 +6,13 @@ turns by the splitting E18, composed to order 8 in pieces short enough that its 
 
 from __future__ import annotations
 
-import math
-
 from reference_solver.compilation import inner_kernel, kernel
-from reference_solver.spatial.motion import composed_turn, quaternion, set_orientation, spin_of
-from reference_solver.spatial.state import BOX, CAPSULE, FIXED, Bodies
+from reference_solver.spatial.broadphase import bound_bodies
+from reference_solver.spatial.impact import carries
+from reference_solver.spatial.kinematics import relative_twist, velocity_at
+from reference_solver.spatial.motion import composed_turn, momentum_of, quaternion, set_orientation, spin_of
+from reference_solver.spatial.separation import radius_of
+from reference_solver.spatial.state import BOX, CAPSULE, FIXED, FREE, HALF_SPACE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.turning import spin_from_rate
 from reference_solver.spatial.vector import (
     Vector,
@@ -20,7 +22,14 @@ from reference_solver.spatial.vector import (
     rotation_quaternion,
     row,
     scale,
+    sub,
 )
+from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.options import Options
+
+#: A body that gets no farther than this fraction of its smallest half width in a sub-step is at rest.
+AT_REST = 1e-14
 
 
 @inner_kernel
@@ -130,37 +139,111 @@ def reach_of(bodies: Bodies, i: int) -> float:
     return bodies.geometry[i, 0] if bodies.kind[i] == CAPSULE else 0.0
 
 
-@kernel
-def turning_bounds(bodies: Bodies, i: int, duration: float) -> tuple[float, float]:
-    """Bounds of |w| [rad/s] and of |dw/dt| [rad/s^2] over the time.
+@inner_kernel
+def begin_flight(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> None:
+    """Rates of a sub-step from its first and last velocities; ``twist`` is then the first (E24).
 
-    With angular momentum L a body turns at |L| / I_min at most, and w changes by I^-1 (torque - w x L).
+    What only its loads accelerate has exactly their rates, so that bodies which fall alike move straight to each other.
     """
-    if not bodies.turning[i]:
-        return 0.0, 0.0
-    if bodies.curved[i]:  # w is the integral of exp(u psi) psi' over u from 0 to 1
-        fastest = path_bound(bodies, i, 3, 1, duration)
-        return fastest, path_bound(bodies, i, 3, 2, duration) + 0.5 * fastest * fastest
-    w, b = row(bodies.twist, i, 3), curvature(bodies, i, 3)
-    if not bodies.gyroscopic[i]:
-        return length(w) + duration * length(b), length(b)
-    least = min(bodies.moments[i, 0], bodies.moments[i, 1], bodies.moments[i, 2])
-    fastest = (length(row(bodies.angular_momentum, i, 0)) + duration * length(b)) / least
-    return fastest, fastest * fastest + length(b) / least
+    mark_closing(bodies, manifolds, sub_step, options, time)
+    for i in range(len(bodies)):
+        loaded = bodies.motion[i] == FREE
+        for k in range(6):
+            bodies.last[i, k] = bodies.twist[i, k]
+        for k in range(3):
+            loaded = loaded and bodies.last[i, k] == bodies.first[i, k] + time * bodies.acceleration[i, k]
+            bodies.momentum_before[i, k] = bodies.angular_momentum[i, k]
+        for k in range(6):
+            bodies.rate[i, k] = (bodies.last[i, k] - bodies.first[i, k]) / time
+            bodies.twist[i, k] = bodies.first[i, k]
+        if loaded:
+            for k in range(3):
+                bodies.rate[i, k] = bodies.acceleration[i, k]
+        if bodies.gyroscopic[i]:
+            begin_turn(bodies, i)
 
 
 @inner_kernel
-def bend_of_path(bodies: Bodies, i: int, duration: float) -> float:
-    """Largest change of the acceleration of the centre over the time; none but on a curved path [m/s^2]."""
-    return duration * path_bound(bodies, i, 0, 3, duration) if bodies.curved[i] else 0.0
+def begin_turn(bodies: Bodies, i: int) -> None:
+    """Angular momentum after the impacts of a body with unequal moments, and the torque that acts from there on."""
+    hit = momentum_of(bodies, i, sub(row(bodies.first, i, 3), row(bodies.before, i, 3)))
+    torque = momentum_of(bodies, i, row(bodies.rate, i, 3))
+    for k in range(3):
+        bodies.angular_momentum[i, k] += hit[k]
+        bodies.rate[i, 3 + k] = torque[k]
 
 
 @inner_kernel
-def first_fall(c: float, b: float, a: float) -> float:
-    """First t >= 0 at which c + b t + a t^2 / 2, c >= 0, falls through zero; infinite if it never does (O3)."""
-    if b < 0.0:
-        discriminant = b * b - 2.0 * a * c
-        return 2.0 * c / (math.sqrt(discriminant) - b) if discriminant >= 0.0 else math.inf
-    if a >= 0.0:
-        return math.inf
-    return (b + math.sqrt(b * b - 2.0 * a * c)) / -a
+def undo(bodies: Bodies) -> None:
+    """Back to where the sub-step began."""
+    for i in range(len(bodies)):
+        for k in range(6):
+            bodies.twist[i, k] = bodies.before[i, k]
+        for k in range(3):
+            bodies.angular_momentum[i, k] = bodies.momentum_before[i, k]
+
+
+@inner_kernel
+def mark_closing(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> None:
+    """Bodies of loaded contacts whose normals turn or whose gaps close follow the velocity at the end (E24).
+
+    At impulse level none does: what closes is part of the mean velocity (E28).
+    """
+    for i in range(len(bodies)):
+        bodies.closing[i] = 0
+    for m in range(len(manifolds) if sub_step.clock[HELD] == 0.0 else 0):
+        v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            if not carries(manifolds, m, p, time / options.dt):
+                continue
+            drift = max(abs(velocity_at(v, w, manifolds, m, p)[2]), manifolds.gap[m, p] / time)
+            if drift > DRIFT * manifolds.speed[m, p]:
+                bodies.closing[manifolds.body_a[m]] = bodies.closing[manifolds.body_b[m]] = 1
+
+
+@inner_kernel
+def move_along(bodies: Bodies, t: float, whole: bool) -> None:
+    """Go to time t of the sub-step (E24); ``whole``: its end, where velocities are what the solve found, to the bit."""
+    for i in range(len(bodies)):
+        if bodies.motion[i] == FIXED:
+            continue
+        place_at(bodies, i, t, bodies, i)
+        for k in range(6):
+            bodies.twist[i, k] = bodies.last[i, k] if whole else bodies.first[i, k] + t * bodies.rate[i, k]
+        if bodies.gyroscopic[i]:
+            momentum = add_scaled(row(bodies.angular_momentum, i, 0), t, row(bodies.rate, i, 3))
+            w = spin_of(bodies, i, momentum)
+            for k in range(3):
+                bodies.angular_momentum[i, k] = momentum[k]
+                bodies.twist[i, 3 + k] = w[k]
+
+
+@inner_kernel
+def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
+    """Bounds of all bodies over the sub-step up to t; False if nothing moves."""
+    bound_bodies(bodies, options)
+    moves = False
+    for i in range(len(bodies)):
+        share = 2.0 if bodies.closing[i] else 1.0
+        turns = bodies.turning[i] and (
+            bodies.twist[i, 3] != 0.0
+            or bodies.twist[i, 4] != 0.0
+            or bodies.twist[i, 5] != 0.0
+            or bodies.rate[i, 3] != 0.0
+            or bodies.rate[i, 4] != 0.0
+            or bodies.rate[i, 5] != 0.0
+        )
+        moves = moves or turns
+        for k in range(3):
+            v = bodies.twist[i, k]
+            way = t * max(abs(v), abs(v + t * share * bodies.rate[i, k]))
+            if bodies.curved[i]:
+                way = path_bound(bodies, i, 0, 1, t) * t
+            moves = moves or way > AT_REST * bodies.extent[i]
+            if turns and bodies.kind[i] != HALF_SPACE:
+                far = reach_of(bodies, i) + radius_of(bodies, i)
+                bodies.low[i, k] = min(bodies.low[i, k], bodies.pose[i, k] - far)
+                bodies.high[i, k] = max(bodies.high[i, k], bodies.pose[i, k] + far)
+            bodies.low[i, k] -= way
+            bodies.high[i, k] += way
+    return moves

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.model import Array
 from reference_solver.spatial.state import Ledger, Manifolds
-from reference_solver.spatial.vector import Vector, add, row, times_transposed
+from reference_solver.spatial.vector import Vector, row, times_transposed
 
 
 @inner_kernel
 def enter_contacts(manifolds: Manifolds, ledger: Ledger) -> None:
-    """Add the impulses of impacts and of the force phase to the entries of the same features.
+    """Add the impulses of impacts and of the force phase to the entries of the same features."""
+    enter_impulses(manifolds, manifolds.hit, ledger)
+    enter_impulses(manifolds, manifolds.impulse, ledger)
+
+
+@inner_kernel
+def enter_impulses(manifolds: Manifolds, impulses: Array, ledger: Ledger) -> None:
+    """Add impulses (m, p, 3), in the frames of the manifolds.
 
     The ledger must have room for all points. Geometry is that of the first sub-step in which a contact appears.
     """
@@ -20,8 +28,7 @@ def enter_contacts(manifolds: Manifolds, ledger: Ledger) -> None:
                 k += 1
             if k == ledger.filled[0] or order(manifolds, m, p, ledger, k) > 0:
                 insert(manifolds, m, p, ledger, k)
-            both: Vector = add(row(manifolds.hit[m], p, 0), row(manifolds.impulse[m], p, 0))
-            impulse = times_transposed(manifolds.frame, m, both)
+            impulse: Vector = times_transposed(manifolds.frame, m, row(impulses[m], p, 0))
             for d in range(3):
                 ledger.real[k, 6 + d] += impulse[d]
 

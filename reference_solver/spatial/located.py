@@ -11,16 +11,27 @@ from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
-from reference_solver.spatial.certificate import open_solve, point_work
-from reference_solver.spatial.entries import enter_release, enter_sub_step
+from reference_solver.spatial.certificate import certify, open_solve, point_work
+from reference_solver.spatial.entries import enter_release, enter_settled, enter_sub_step
+from reference_solver.spatial.flight import begin_flight, move_along, undo
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.jam import weigh_clusters
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
-from reference_solver.spatial.ledger import enter_contacts
+from reference_solver.spatial.ledger import enter_contacts, enter_impulses
+from reference_solver.spatial.midpoint import (
+    close_gaps,
+    exchange_levers,
+    keep_change,
+    levers_of_start,
+    misses_end,
+    press_at_mid_drift,
+    take_back,
+)
 from reference_solver.spatial.motion import accelerate, displace
-from reference_solver.spatial.next_impact import begin_flight, move_along, next_impact, undo
-from reference_solver.spatial.phase import cut_phase, end_phase, enter_phase, part_points
+from reference_solver.spatial.phase import NO_PHASE, cut_phase, end_phase, enter_phase, part_points
 from reference_solver.spatial.position import correct_positions
+from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.slide import certify_press, press_until_stick
 from reference_solver.spatial.state import (
     POINTS,
@@ -35,6 +46,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.spatial.time_of_impact import next_impact
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.stepping.clock import (
@@ -46,7 +58,10 @@ from reference_solver.stepping.clock import (
     LEFT,
     OUTCOME,
     REBOUND,
+    UNSETTLED,
     count_event,
+    end_settling,
+    hold_rest,
     open_step,
     weigh_event,
 )
@@ -76,11 +91,14 @@ def located_step(
     tally: Array,
 ) -> bool:
     """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
-    if sub.clock[LEFT] == 0.0:
+    if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
         open_step(sub.clock, len(bodies), options.dt)
         ledger.filled[0] = 0
-    while sub.clock[LEFT] > 0.0:
-        if not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
+    while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
+        if sub.clock[UNSETTLED] > 0.0:
+            if not settle(bodies, detection, room, memory, problem, sub, ledger, options, tally):
+                return False
+        elif not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
             return False
     return True
 
@@ -103,20 +121,28 @@ def sub_step(
     if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
         return False
     manifolds = room[:found]
-    if left == options.dt and sub.clock[JAMMED] == 0.0:
+    if left == options.dt and sub.clock[JAMMED] == 0.0 and sub.clock[HELD] == 0.0:
         weigh_clusters(bodies, manifolds, sub, options, tally)
         if sub.clock[HELD] > 0.0:
             return True  # points that may close are looked for as well
+    for k in range(len(tally)):
+        sub.opened[k] = tally[k]
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
     smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
-    pushed = False
+    if smooth == NO_PHASE:
+        hold_rest(sub.clock, tally)
+        go_back(tally, sub.opened)
+        copy_twists(bodies.before, bodies.twist)
+        return True
+    held, pushed = sub.clock[HELD] > 0.0, False
     if smooth > 0.0:
         length = smooth
         part_points(bodies, manifolds, options, length)
     else:
-        certify_press(bodies, manifolds, options, tally, length)
+        if not held:
+            certify_press(bodies, manifolds, options, tally, length)
         pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
-    begin_flight(bodies, manifolds, options, length)
+    begin_flight(bodies, manifolds, sub, options, length)
     end = length
     if sub.clock[EVENTS] < EVENT_BUDGET:
         end = next_impact(bodies, detection, manifolds, sub, options, length)
@@ -127,15 +153,22 @@ def sub_step(
         cut_phase(bodies, manifolds, sub, end)
         length = end
     remember_forces(bodies, detection, manifolds, memory, length, options.dt)
-    if end < length:
+    if end < length or held:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
-    enter_contacts(manifolds, ledger)
+    if held:
+        exchange_levers(manifolds, sub)
+        enter_impulses(manifolds, manifolds.hit, ledger)
+        exchange_levers(manifolds, sub)
+        enter_impulses(manifolds, manifolds.impulse, ledger)
+    else:
+        enter_contacts(manifolds, ledger)
     keep_state(sub.journal, bodies.pose, bodies.before)
     move_along(bodies, end, end == length and smooth == 0.0)
     if smooth > 0.0:
         end_phase(bodies, sub, tally, end)
     if pushed:
         displace(bodies, options.dt)
+    sub.clock[UNSETTLED] = end if held and found > 0 else 0.0
     enter_sub_step(bodies, manifolds, sub, options, end)
     if options.restitution and release(bodies, manifolds, problem, options, tally):
         enter_contacts(manifolds, ledger)
@@ -144,6 +177,62 @@ def sub_step(
     if end < left and (haste or not shortened):
         count_event(sub.clock, tally, (CRAWL if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
+    return True
+
+
+@inner_kernel
+def go_back(tally: Array, kept: Array) -> None:
+    """Forget what solves that are made again entered since the tally was kept, but for the sweeps they cost."""
+    for k in range(len(tally)):
+        if k != SWEEPS and k != WORST_SWEEPS:
+            tally[k] = kept[k]
+
+
+@inner_kernel
+def settle(
+    bodies: Bodies,
+    detection: Detection,
+    room: Manifolds,
+    memory: Memory,
+    problem: Problem,
+    sub: SubStep,
+    ledger: Ledger,
+    options: Options,
+    tally: Array,
+) -> bool:
+    """Take out what the impulse-level scheme leaves of the gaps and velocities of contacts that it held (E28).
+
+    Gaps first: velocities are those that the closed contacts allow. Their impulses are found anew with the rows of the
+    end, by a solve that starts from them: what was too much is taken back. Otherwise it would be an impact in the
+    sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
+    anew.
+    """
+    found = detect_touching(bodies, detection, room, memory, options, sub.clock)
+    if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
+        return False
+    if found == 0:
+        end_settling(sub.clock)
+        return True
+    keep_state(sub.journal, bodies.pose, bodies.twist)
+    moved = close_gaps(bodies, room[:found], options)
+    if moved:
+        found = detect_touching(bodies, detection, room, memory, options, sub.clock)
+        if found < 0:
+            return False
+    manifolds, time = room[:found], sub.clock[UNSETTLED]
+    misses = misses_end(bodies, manifolds, options, time)
+    if misses:
+        prepare_wrenches(bodies, manifolds, options)
+        take_back(bodies, manifolds, options, tally)
+        open_solve(bodies, 0.0, tally)
+        warm_start(bodies, manifolds, options)
+        solve_velocities(bodies, manifolds, problem, options, tally)
+        certify(bodies, manifolds, options, tally)
+        keep_change(bodies, manifolds, time)
+        enter_impulses(manifolds, manifolds.hit, ledger)
+    if moved or misses:
+        enter_settled(bodies, manifolds, sub, options)
+    end_settling(sub.clock)
     return True
 
 
@@ -164,17 +253,19 @@ def solve_sub_step(
     copy_twists(bodies.twist, bodies.before)
     prepare_wrenches(bodies, manifolds, options)
     length, found = sub.clock[LEFT], NO_IMPACT
-    for k in range(len(tally)):
-        sub.saved[k] = tally[k]
-    for _ in range(SERIES_PASSES):
-        for k in range(len(tally)):
-            if k != SWEEPS and k != WORST_SWEEPS:
-                tally[k] = sub.saved[k]
+    for k in range(SERIES_PASSES):
+        if k > 0:
+            go_back(tally, sub.opened)
+            if sub.clock[HELD] > 0.0:
+                levers_of_start(bodies, manifolds, sub, options)
         found = collide_now(bodies, detection, manifolds, problem, options, tally)
-        for k in range(len(tally)):
-            sub.struck[k] = tally[k]
-        struck, held = found >= LANDED, sub.clock[HELD] > 0.0
-        length = press_until_stick(bodies, manifolds, problem, options, tally, sub.clock[LEFT], struck, held)
+        for j in range(len(tally)):
+            sub.struck[j] = tally[j]
+        struck = found >= LANDED
+        if sub.clock[HELD] > 0.0 and len(manifolds) > 0:
+            press_at_mid_drift(bodies, manifolds, problem, sub, options, tally, sub.clock[LEFT])
+        else:
+            length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
         if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
             break
     if found >= REBOUNDED:

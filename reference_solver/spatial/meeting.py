@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.spatial.flight import copy_body, reach_of
+from reference_solver.spatial.flight import copy_body, curvature, place_at, reach_of
 from reference_solver.spatial.motion import set_orientation
 from reference_solver.spatial.separation import radius_of, separation
 from reference_solver.spatial.state import BODY, BOX, CAPSULE, FIXED, HALF_SPACE, Bodies, Indices
@@ -19,6 +19,7 @@ from reference_solver.spatial.vector import (
     axis,
     cross,
     dot,
+    length,
     quaternion_product,
     rotation_quaternion,
     row,
@@ -28,7 +29,7 @@ from reference_solver.spatial.vector import (
 )
 from reference_solver.stepping import time_of_impact
 from reference_solver.stepping.operations import provide
-from reference_solver.stepping.paths import Paths, allocate_paths, derivative
+from reference_solver.stepping.paths import Paths, allocate_paths, derivative, derivative_bound
 from reference_solver.stepping.time_of_impact import (
     CENTRE,
     CORNERS_FIRST,
@@ -55,7 +56,7 @@ MOST_CORNERS = 8
 class Meeting(NamedTuple):
     """A pair of bodies at a time of the step; the first may be a plane (`time_of_impact`)."""
 
-    bodies: Any  # all, read for their shapes only, and for the place of what is fixed
+    bodies: Any  # all, read for their shapes, the place of what is fixed, and how bodies turn by their momentum
     paths: Paths  # of all
     trial: Any  # (2,): the pair where it stands
     kind: Indices  # (KINDS,)
@@ -137,6 +138,12 @@ def spin_on(paths: Paths, i: int, t: float) -> tuple[Vector, Vector]:
 
 
 @inner_kernel
+def flies_by_momentum(bodies: Bodies, i: int) -> bool:
+    """Whether body i turns by its angular momentum, not along a polynomial (E30)."""
+    return bool(bodies.gyroscopic[i] and not bodies.curved[i])
+
+
+@inner_kernel
 def stand(meeting: Meeting, t: float) -> None:
     """Poses, velocities and corners of both bodies at time t."""
     trial, paths, bodies, vector = meeting.trial, meeting.paths, meeting.bodies, meeting.vector
@@ -148,7 +155,11 @@ def stand(meeting: Meeting, t: float) -> None:
             for d in range(3):
                 trial.pose[k, d] = paths.pose[i, d] + derivative(paths, i, d, 0, t)
                 vector[VELOCITY + k, d] = derivative(paths, i, d, 1, t)
-            if bodies.turning[i] and (meeting.size[k, REACH] > 0.0 or bodies.kind[i] == HALF_SPACE):
+            if flies_by_momentum(bodies, i):
+                place_at(bodies, i, t, trial, k)
+                for d in range(3):
+                    vector[SPIN + k, d] = trial.twist[k, 3 + d]
+            elif bodies.turning[i] and (meeting.size[k, REACH] > 0.0 or bodies.kind[i] == HALF_SPACE):
                 psi, w = spin_on(paths, i, t)
                 start = (paths.pose[i, 3], paths.pose[i, 4], paths.pose[i, 5], paths.pose[i, 6])
                 set_orientation(trial, k, quaternion_product(rotation_quaternion(psi), start))
@@ -193,8 +204,27 @@ def separate(meeting: Meeting) -> float:
     return value
 
 
+@inner_kernel
+def turn_bounds(meeting: Meeting, i: int, now: float, until: float) -> tuple[float, float]:
+    """|w| is at most |psi'| and |dw/dt| at most |psi''| + |psi'|^2 / 2 (`spin_on`); else what its momentum allows.
+
+    With angular momentum L a body turns at |L| / I_min at most, and w changes by I^-1 (torque - w x L).
+    """
+    bodies, paths = meeting.bodies, meeting.paths
+    if not bodies.turning[i]:
+        return 0.0, 0.0
+    if flies_by_momentum(bodies, i):
+        least = min(bodies.moments[i, 0], bodies.moments[i, 1], bodies.moments[i, 2])
+        torque = length(curvature(bodies, i, 3))
+        fastest = (length(row(bodies.angular_momentum, i, 0)) + until * torque) / least
+        return fastest, fastest * fastest + torque / least
+    spin, change = derivative_bound(paths, i, True, 1, now, until), derivative_bound(paths, i, True, 2, now, until)
+    return spin, change + 0.5 * spin * spin
+
+
 provide(time_of_impact.is_half_space, Meeting, is_half_space)
 provide(time_of_impact.introduce, Meeting, introduce)
 provide(time_of_impact.stand, Meeting, stand)
 provide(time_of_impact.fix_plane, Meeting, fix_plane)
 provide(time_of_impact.separate, Meeting, separate)
+provide(time_of_impact.turn_bounds, Meeting, turn_bounds)

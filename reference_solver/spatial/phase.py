@@ -19,7 +19,7 @@ from reference_solver.spatial.operations import Spatial, displace
 from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub, times_transposed
-from reference_solver.stepping.clock import HELD, OUTCOME
+from reference_solver.stepping.clock import HELD, JAMMED, OUTCOME
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
@@ -30,12 +30,17 @@ from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK, SWEEPS
 #: Gap of a contact that is held, as a share of the smaller half width: more is for the frozen solve to close (E20).
 CLOSED = 1e-9
 
+#: What becomes of contacts: all are noted; there are none; gaps are left to close; one cannot be followed.
+NOTED, NO_CONTACTS, GAPS_OPEN, NOT_FOLLOWED = 0, 1, 2, 3
+#: Length of a phase where rows turn and no phase is found, or none is looked for.
+NO_PHASE = -1.0
+
 
 @inner_kernel
-def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> bool:
-    """Note all points that are pressed together, and which bodies they hold; False where one cannot be followed."""
+def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> int:
+    """Note all points that are pressed together, and which bodies they hold; what became of it."""
     lasting = sub_step.lasting
-    k = 0
+    k, outcome = 0, NOTED
     for i in range(len(bodies)):
         sub_step.held[i] = 0
     for m in range(len(manifolds)):
@@ -45,17 +50,17 @@ def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> bo
             if manifolds.open[m, p] or manifolds.release[m, p] > 0.0:
                 continue
             if k == len(lasting.gap) or not name_features(bodies, manifolds, lasting, POINTS * m + p, k):
-                return False
+                return NOT_FOLLOWED
             lasting.row[k] = POINTS * m + p
             lasting.speeds[k], lasting.extent[k] = manifolds.speed[m, p], extent
             follow(bodies, lasting, k)
             if not abs(lasting.gap[k]) <= CLOSED * extent + gap_noise(bodies, manifolds, m, p):
-                return False
+                outcome = GAPS_OPEN
             sub_step.held[a] = sub_step.held[b] = 1
             k += 1
     lasting.size[CONTACTS] = k
     lasting.size[BODIES] = len(bodies)
-    return k > 0
+    return outcome if k > 0 else NO_CONTACTS
 
 
 @inner_kernel
@@ -126,6 +131,16 @@ def keeps_turn(twist: Array, i: int, time: float) -> bool:
 
 
 @inner_kernel
+def any_turns(bodies: Bodies, manifolds: Manifolds, time: float) -> bool:
+    """Whether a body with contacts turns in that time, at its velocities first or last."""
+    for m in range(len(manifolds)):
+        for i in (manifolds.body_a[m], manifolds.body_b[m]):
+            if not (keeps_turn(bodies.first, i, time) and keeps_turn(bodies.last, i, time)):
+                return True
+    return False
+
+
+@inner_kernel
 def same_rows(before: Array, after: Array, extent: float) -> bool:
     """Whether the rows of one side of a contact are the same but for round-off."""
     for r in range(3):
@@ -137,31 +152,42 @@ def same_rows(before: Array, after: Array, extent: float) -> bool:
     return True
 
 
+@inner_kernel
+def is_exact(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: float) -> bool:
+    """Whether the frozen solve from ``first`` to ``last`` is: no row changes on its way. Notes the contacts."""
+    noted = sub_step.noted[0] = note_contacts(bodies, manifolds, sub_step)
+    if noted == NO_CONTACTS:
+        return True
+    if noted == NOT_FOLLOWED:
+        return not any_turns(bodies, manifolds, time)
+    begin_phase(Spatial(bodies, bodies.pose, bodies.twist), sub_step.lasting)
+    return rows_stay(bodies, manifolds, sub_step, time)
+
+
 @spliced_kernel
 def enter_phase(
     bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, tally: Array, left: float, frozen: float
 ) -> float:
-    """Go through a phase whose rows change, at most ``left`` long; its length, 0 where the frozen solve is the one.
+    """Go through a phase whose rows change, at most ``left`` long; its length, 0 where the frozen solve is exact.
 
+    `NO_PHASE` where it is not, and no phase is found; where the island jams none is looked for.
     ``frozen``: length of the frozen solve, from ``first`` to ``last``. Afterwards ``twist`` are the velocities at the
     end of the phase, its poses and velocities stand in the sub-step, the paths in the bodies; poses are those of its
     start.
     """
     for i in range(len(bodies)):
         bodies.curved[i] = 0
-    lasting = sub_step.lasting
-    if sub_step.clock[HELD] > 0.0 or not note_contacts(bodies, manifolds, sub_step):
+    if sub_step.clock[HELD] > 0.0 or is_exact(bodies, manifolds, sub_step, frozen):
         return 0.0
-    space = Spatial(bodies, bodies.pose, bodies.twist)
-    begin_phase(space, lasting)
-    if rows_stay(bodies, manifolds, sub_step, frozen):
-        return 0.0
+    lasting, space = sub_step.lasting, Spatial(bodies, bodies.pose, bodies.twist)
+    if sub_step.noted[0] != NOTED or sub_step.clock[JAMMED] > 0.0:
+        return NO_PHASE
     copy_twists(bodies.first, bodies.twist)
     time, outcome = find_phase(space, lasting, left)
     sub_step.clock[OUTCOME] = outcome
     if outcome == FAILED:
         copy_twists(bodies.last, bodies.twist)
-        return 0.0
+        return NO_PHASE
     for k in range(len(tally)):
         if k != SWEEPS and k != WORST_SWEEPS:
             tally[k] = sub_step.struck[k]

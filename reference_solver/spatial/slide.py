@@ -12,10 +12,12 @@ from reference_solver.spatial.impact import clear_point, copy_twists, set_refere
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
+from reference_solver.spatial.phase import is_exact
 from reference_solver.spatial.prepare import warm_start
-from reference_solver.spatial.state import HALF_SPACE, Bodies, Manifolds
+from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
+from reference_solver.stepping.clock import LEFT
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
@@ -35,12 +37,10 @@ def press(
     length: float,
     left: float,
     struck: bool,
-    held: bool,
 ) -> None:
     """Velocities at the end of a sub-step of ``length``, out of ``left``: from ``first`` to ``twist`` (E20).
 
-    ``struck``: impacts came first, so that lasting contacts may part as well; ``held``: none does, by the fixed-step
-    law (E28). v* is kept for the certificate.
+    ``struck``: impacts came first, so that lasting contacts may part as well. v* is kept for the certificate.
     """
     copy_twists(bodies.first, bodies.twist)
     for m in range(len(manifolds)):
@@ -51,7 +51,7 @@ def press(
             clear_point(manifolds, m, p)
             manifolds.slip[m, p, 0], manifolds.slip[m, p, 1] = u[0], u[1]
             leaves = u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0)
-            if leaves and not held and flies(bodies, manifolds, m, p, u[2], length):
+            if leaves and flies(bodies, manifolds, m, p, u[2], length):
                 manifolds.open[m, p] = 1
                 continue
             for k in range(3):
@@ -69,16 +69,12 @@ def press(
 def flies(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, length: float) -> bool:
     """Whether a point that parts with u leaves, and loads do not bring it back within ``length`` from mere noise.
 
-    A rebound with e > 0 always does, however low: its series ends when it ends (E22). Between two bodies that other
-    points hold, returns are not looked for, and what loads bring back in time does not leave.
+    A rebound with e > 0 always does, however low: its series ends when it ends (E22).
     """
     if manifolds.impact[m, p] and manifolds.restitution[m] > 0.0:
         return True
     pull = load_speed(bodies, manifolds, m, p, 1.0)
-    if 2.0 * u > pull * length:
-        return True
-    plane = bodies.kind[manifolds.body_a[m]] == HALF_SPACE or bodies.kind[manifolds.body_b[m]] == HALF_SPACE
-    return bool(plane and u * u > 2.0 * pull * gap_noise(bodies, manifolds, m, p))
+    return u * u > 2.0 * pull * gap_noise(bodies, manifolds, m, p) or 2.0 * u > pull * length
 
 
 @inner_kernel
@@ -148,30 +144,37 @@ def press_until_stick(
     bodies: Bodies,
     manifolds: Manifolds,
     problem: Problem,
+    sub_step: SubStep,
     options: Options,
     tally: Array,
-    left: float,
     struck: bool,
-    held: bool,
 ) -> float:
-    """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length."""
+    """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length.
+
+    Where rows turn the frozen solve is not what counts, and the first one is enough.
+    """
+    left = sub_step.clock[LEFT]
     if len(manifolds) == 0:
         copy_twists(bodies.first, bodies.twist)
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
     residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
-    press(bodies, manifolds, problem, options, tally, left, left, struck, held)
+    press(bodies, manifolds, problem, options, tally, left, left, struck)
     length, slipped = left, 0.0
-    for _ in range(STICK_SOLVES if options.friction and not held else 0):
+    for k in range(STICK_SOLVES if options.friction else 0):
         end = slip_end(bodies, manifolds, options, length)
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break
+        if k == 0:
+            copy_twists(bodies.twist, bodies.last)
+            if not is_exact(bodies, manifolds, sub_step, length):
+                break
         if end < length and length - slipped <= CLOSE * length:
             break
         slipped = max(slipped, length) if end > length else slipped
         # What a point that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
         tally[RESIDUAL], tally[UNCONVERGED] = residual, unconverged  # of the solve that is used, as in the plane
-        press(bodies, manifolds, problem, options, tally, length, left, struck, held)
+        press(bodies, manifolds, problem, options, tally, length, left, struck)
     return length

@@ -229,13 +229,19 @@ class SubStep(NamedTuple):
 
     clock: Array  # (CLOCK_SIZE,): see LEFT .. HELD of planar.state
     trial: Bodies  # (2,): a pair of bodies at another time
-    saved: Array  # (SIZE,): the tally before an attempt
+    opened: Array  # (SIZE,): the tally before the sub-step
+    saved: Array  # (SIZE,): the tally before the work of its force phase
     struck: Array  # (SIZE,): the tally after the impacts
     lasting: Lasting  # contacts of a force phase whose rows change
     held: Indices  # (n,): 1 where one of them holds the body
+    noted: Indices  # (1,): what became of noting them, see `phase`
     rows: Array  # (k, 2, 3, 6): their rows at its start
     end_pose: Array  # (n, 7): poses at its end
     end_twist: Array  # (n, 6)
+    start_pose: Array  # (n, 7): poses at the start of one at impulse level, which is solved at mid-drift
+    kept: Manifolds  # as many as there is room for: frames and levers of the start, or of mid-drift
+    probe: Manifolds  # (1,): a manifold at another time
+    meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
     journal: Journal
 
 
@@ -247,18 +253,24 @@ class Ledger(NamedTuple):
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
 
 
-def allocate_sub_step(bodies: int) -> SubStep:
-    """Return the room for a sub-step of so many bodies."""
+def allocate_sub_step(bodies: int, manifolds: int, meeting: Any) -> SubStep:
+    """Return the room for a sub-step of so many bodies and manifolds."""
     return SubStep(
         clock=np.zeros(CLOCK_SIZE),
         trial=np.zeros(2, BODY).view(np.recarray),
+        opened=np.zeros(TALLY_SIZE),
         saved=np.zeros(TALLY_SIZE),
         struck=np.zeros(TALLY_SIZE),
         lasting=allocate_lasting(3, bodies, MOST_ROWS),
         held=np.zeros(bodies, np.int64),
+        noted=np.zeros(1, np.int64),
         rows=np.zeros((MOST_ROWS, 2, 3, 6)),
         end_pose=np.zeros((bodies, 7)),
         end_twist=np.zeros((bodies, 6)),
+        start_pose=np.zeros((bodies, 7)),
+        kept=allocate_manifolds(manifolds),
+        probe=allocate_manifolds(1),
+        meeting=meeting,
         journal=allocate_journal(3, 0, 0),
     )
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.broadphase import find_candidates
+from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_frame, set_world_points, sort_points
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
-from reference_solver.stepping.clock import HELD, LEFT
-from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, ROUND_OFF
+from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, ROUND_OFF
 from reference_solver.stepping.options import Options
 
 
@@ -22,7 +23,8 @@ def detect_touching(
 ) -> int:
     """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room.
 
-    Where what is left goes by the fixed-step law, all gaps with e = 0 may be closed (E28). ``clock``: of the sub-step.
+    Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed; at the end of such a
+    sub-step those that carried load in it are wanted, and overlaps (E28). ``clock``: of the sub-step.
     """
     if not find_candidates(bodies, detection, options):
         return -1
@@ -39,8 +41,12 @@ def detect_touching(
             continue
         sort_points(manifolds, m)
         set_world_points(bodies, manifolds, m)
-        close_all = clock[HELD] > 0.0 and detection.restitution[key // n, key % n] == 0.0
-        keep_points(bodies, manifolds, m, memory, known, clock[LEFT], close_all)
+        if clock[UNSETTLED] > 0.0:
+            keep_loaded(bodies, manifolds, m, memory, known)
+        else:
+            may_close = clock[HELD] > 0.0 and detection.restitution[key // n, key % n] == 0.0
+            late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
+            keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
         if manifolds.points[m] > 0:
             describe(bodies, detection, manifolds, m, options)
             m += 1
@@ -59,9 +65,13 @@ def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 
 @inner_kernel
 def keep_points(
-    bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, left: float, close_all: bool
+    bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, late: float, ahead: float
 ) -> None:
-    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap; or all."""
+    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap.
+
+    ``late``: time [s] within which what touches may close its gap; ``ahead``: the step, where others may be closed as
+    well if their approach is soft (E28), else 0.
+    """
     a, b = manifolds.body_a[m], manifolds.body_b[m]
     kept = 0
     for p in range(manifolds.points[m]):
@@ -69,19 +79,38 @@ def keep_points(
         at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
         approach = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
         lasts = recall_force(manifolds, m, p, memory, known)
-        meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + LATE * left * abs(approach)
-        if lasts or meets or close_all:
-            for d in range(3):
-                manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
-                manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
-                manifolds.point[m, kept, d] = manifolds.point[m, p, d]
-                manifolds.force[m, kept, d] = manifolds.force[m, p, d]
-            manifolds.gap[m, kept] = manifolds.gap[m, p]
-            manifolds.feature[m, kept] = manifolds.feature[m, p]
+        meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + late * abs(approach)
+        if lasts or meets or (ahead > 0.0 and -approach <= soft_speed(bodies, manifolds, m, p, ahead)):
+            move_point(manifolds, m, p, kept)
             manifolds.lasts[m, kept] = 1 if lasts else 0
             manifolds.meets[m, kept] = 1 if meets else 0
             kept += 1
     manifolds.points[m] = kept
+
+
+@inner_kernel
+def keep_loaded(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int) -> None:
+    """Keep the points that carried load in the sub-step that has ended, or overlap."""
+    kept = 0
+    for p in range(manifolds.points[m]):
+        lasts = recall_force(manifolds, m, p, memory, known)
+        if lasts or manifolds.gap[m, p] < -gap_noise(bodies, manifolds, m, p):
+            move_point(manifolds, m, p, kept)
+            manifolds.lasts[m, kept] = manifolds.meets[m, kept] = 1
+            kept += 1
+    manifolds.points[m] = kept
+
+
+@inner_kernel
+def move_point(manifolds: Manifolds, m: int, p: int, kept: int) -> None:
+    """Give point p of manifold m the place ``kept``."""
+    for d in range(3):
+        manifolds.arm_a[m, kept, d] = manifolds.arm_a[m, p, d]
+        manifolds.arm_b[m, kept, d] = manifolds.arm_b[m, p, d]
+        manifolds.point[m, kept, d] = manifolds.point[m, p, d]
+        manifolds.force[m, kept, d] = manifolds.force[m, p, d]
+    manifolds.gap[m, kept] = manifolds.gap[m, p]
+    manifolds.feature[m, kept] = manifolds.feature[m, p]
 
 
 @inner_kernel

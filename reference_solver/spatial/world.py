@@ -14,6 +14,7 @@ from reference_solver.pieces import allocate_journal
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.spatial.located import copy_ledger, run_located
+from reference_solver.spatial.meeting import allocate_meeting
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.problem import assemble, pose_problem
 from reference_solver.spatial.state import (
@@ -30,7 +31,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
-from reference_solver.stepping.options import FIXED_STEP, MIDPOINT, options, uses_direct
+from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
 from reference_solver.tally import new_tally
 
 
@@ -44,11 +45,9 @@ class World:
         self._detection = allocate_detection(model, 8 * n + 64)
         self._manifolds = allocate_manifolds(4 * n + 16)
         self._memory = allocate_memory(4 * n + 16)
-        self._sub_step = allocate_sub_step(n)
+        self._sub_step = allocate_sub_step(n, 4 * n + 16, allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._options = options(settings, needs)
-        if self._options.scheme == MIDPOINT:
-            raise ValueError("scheme: 'midpoint' exists in the plane only")
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
         self.journal = allocate_journal(3, n, 0)
@@ -150,6 +149,7 @@ class World:
         memory[: len(self._memory)] = self._memory
         self._memory = memory
         self._manifolds = allocate_manifolds(2 * len(self._manifolds))
+        self._sub_step = self._sub_step._replace(kept=allocate_manifolds(len(self._manifolds)))
         self._problem = allocate_problem(3, len(self._bodies), self._most_points, bool(self._options.direct))
 
 

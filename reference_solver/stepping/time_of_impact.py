@@ -22,7 +22,7 @@ from typing import Any
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF
 from reference_solver.stepping.operations import operation
-from reference_solver.stepping.paths import Paths, derivative, derivative_bound
+from reference_solver.stepping.paths import derivative, derivative_bound
 
 #: Entries of `Meeting.kind`: first and second body, number of their corners, whether the first is a plane.
 FIRST, SECOND, CORNERS_FIRST, CORNERS_SECOND, PLANE = 0, 1, 2, 3, 4
@@ -32,9 +32,9 @@ KINDS = 5
 RADIUS, REACH, EXTENT = 0, 1, 2
 SIZES = 3
 #: Rows of `Meeting.vector`: centre of the first and of the second body, their velocities and spins, the direction of
-#: the separation from first to second, the plane's normal in the first body's axes.
-CENTRE, VELOCITY, SPIN, NORMAL, FACE = 0, 2, 4, 6, 7
-VECTORS = 8
+#: the separation from first to second, the plane's normal in the first body's axes, the spin of that direction [rad/s].
+CENTRE, VELOCITY, SPIN, NORMAL, FACE, TURN = 0, 2, 4, 6, 7, 8
+VECTORS = 9
 
 #: Units in the last place of coordinates and sizes below which a separation is round-off: four.
 UNITS = 4.0 * 2.0**-52
@@ -47,6 +47,12 @@ CREEPS = 100
 TURN_ALONG = 0.01
 #: Corners that are off a face by less than this share of its body are on it.
 ON_FACE = 1e-9
+#: A direction that turns faster than this many times both bodies together keeps to edges that are nearly parallel.
+HASTY = 10.0
+#: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
+DEEP = 3e-5
+#: Margin with which every pair of shapes answers with its points, however far apart they are.
+UNLIMITED = 1e300
 
 
 @operation
@@ -241,7 +247,8 @@ def corner_rate(meeting: Any, c: int, d: int) -> tuple[float, float]:
     """Rate of the separation of corner c of the first from corner d of the second body along the normal [m/s].
 
     And how far they are behind the farthest corners, both together [m], from the centres. Seen from a plane, which
-    turns its normal along, the other body turns the opposite way about the plane's centre.
+    turns its normal along, the other body turns the opposite way about the plane's centre. Else the direction turns
+    with the spin `TURN`, that of nothing but for a moment (`safe_step`).
     """
     v = meeting.vector
     x, y, z = v[SPIN + 1, 0], v[SPIN + 1, 1], v[SPIN + 1, 2]
@@ -253,6 +260,11 @@ def corner_rate(meeting: Any, c: int, d: int) -> tuple[float, float]:
     rate = v[NORMAL, 0] * (v[VELOCITY + 1, 0] - v[VELOCITY, 0] + y * az - z * ay - (v[SPIN, 1] * fz - v[SPIN, 2] * fy))
     rate += v[NORMAL, 1] * (v[VELOCITY + 1, 1] - v[VELOCITY, 1] + z * ax - x * az - (v[SPIN, 2] * fx - v[SPIN, 0] * fz))
     rate += v[NORMAL, 2] * (v[VELOCITY + 1, 2] - v[VELOCITY, 2] + x * ay - y * ax - (v[SPIN, 0] * fy - v[SPIN, 1] * fx))
+    if meeting.kind[PLANE] == 0:
+        tx, ty, tz = v[TURN, 0], v[TURN, 1], v[TURN, 2]
+        rate += (ty * v[NORMAL, 2] - tz * v[NORMAL, 1]) * (v[CENTRE + 1, 0] - v[CENTRE, 0] + ax - fx)
+        rate += (tz * v[NORMAL, 0] - tx * v[NORMAL, 2]) * (v[CENTRE + 1, 1] - v[CENTRE, 1] + ay - fy)
+        rate += (tx * v[NORMAL, 1] - ty * v[NORMAL, 0]) * (v[CENTRE + 1, 2] - v[CENTRE, 2] + az - fz)
     reach = 0.0 if meeting.kind[PLANE] else height(meeting, 0, c, 1.0)
     return rate, reach + height(meeting, 1, d, -1.0)
 
@@ -292,26 +304,117 @@ def safe_time(meeting: Any, clearance: float, acceleration: float) -> float:
 
 @inner_kernel
 def safe_step(meeting: Any, clearance: float, acceleration: float, now: float, until: float) -> tuple[float, float]:
-    """`safe_time`, and the acceleration that it is for; small ones with the direction turning along with a face.
+    """`safe_time`, and the acceleration that it is for; small ones with the direction turning along with what touches.
 
     A corner over the face of a body that turns: along a fixed direction one end of the face comes up, however clear of
-    it the corner is.
+    it the corner is. Two edges that cross likewise.
     """
     step = safe_time(meeting, clearance, acceleration)
     if meeting.kind[PLANE] or step > TURN_ALONG * (until - now):
         return step, acceleration
     first, second, n = meeting.kind[FIRST], meeting.kind[SECOND], meeting.vector[NORMAL]
     nx, ny, nz = n[0], n[1], n[2]
-    if not choose_face(meeting, nx, ny, nz, now):
-        return step, acceleration
-    watch_all(meeting)
-    bend = relative_acceleration(meeting, now) - bend_bound(meeting, now, until)
-    along = safe_time(meeting, clearance, bend)
-    introduce(meeting, first, second)
-    watch_all(meeting)
-    stand(meeting, now)
-    set_normal(meeting, nx, ny, nz)
+    along, bend = step, acceleration
+    if choose_face(meeting, nx, ny, nz, now):
+        watch_all(meeting)
+        bend = relative_acceleration(meeting, now) - bend_bound(meeting, now, until)
+        along = safe_time(meeting, clearance, bend)
+        introduce(meeting, first, second)
+        watch_all(meeting)
+        stand(meeting, now)
+        set_normal(meeting, nx, ny, nz)
+    elif turn_with_edges(meeting):
+        bend = relative_acceleration(meeting, now) - edge_bend_bound(meeting, now, until)
+        along = safe_time(meeting, clearance, bend)
+        for d in range(3):
+            meeting.vector[TURN, d] = 0.0
     return (along, bend) if along > step else (step, acceleration)
+
+
+@inner_kernel
+def turn_with_edges(meeting: Any) -> bool:
+    """Let the direction keep at a right angle to the edges that it separates, in space; False if there are none.
+
+    With the rates n.(w x e) of both edges e, ``n' . e`` is to be minus that: n' from the dual basis of the edges.
+    """
+    v = meeting.vector
+    if meeting.paths.coefficient.shape[1] < 6:
+        return False
+    nx, ny, nz = v[NORMAL, 0], v[NORMAL, 1], v[NORMAL, 2]
+    ax, ay, az, has_a = touching_edge(meeting, 0, 1.0)
+    bx, by, bz, has_b = touching_edge(meeting, 1, -1.0)
+    da = triple(nx, ny, nz, v[SPIN, 0], v[SPIN, 1], v[SPIN, 2], ax, ay, az)
+    db = triple(nx, ny, nz, v[SPIN + 1, 0], v[SPIN + 1, 1], v[SPIN + 1, 2], bx, by, bz)
+    if has_a and has_b:
+        spat = triple(ax, ay, az, bx, by, bz, nx, ny, nz)
+        if spat == 0.0:
+            return False
+        da, db = -da / spat, -db / spat
+        x = da * (by * nz - bz * ny) + db * (ny * az - nz * ay)
+        y = da * (bz * nx - bx * nz) + db * (nz * ax - nx * az)
+        z = da * (bx * ny - by * nx) + db * (nx * ay - ny * ax)
+    elif has_a:
+        share = -da / (ax * ax + ay * ay + az * az)
+        x, y, z = share * ax, share * ay, share * az
+    elif has_b:
+        share = -db / (bx * bx + by * by + bz * bz)
+        x, y, z = share * bx, share * by, share * bz
+    else:
+        return False
+    v[TURN, 0], v[TURN, 1], v[TURN, 2] = ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
+    spins = 0.0
+    for k in range(2):
+        spins += math.sqrt(v[SPIN + k, 0] ** 2 + v[SPIN + k, 1] ** 2 + v[SPIN + k, 2] ** 2)
+    if not math.sqrt(x * x + y * y + z * z) <= HASTY * spins:
+        v[TURN, 0] = v[TURN, 1] = v[TURN, 2] = 0.0
+        return False
+    return True
+
+
+@inner_kernel
+def triple(ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float) -> float:
+    """Return a . (b x c), by components."""
+    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+
+
+@inner_kernel
+def touching_edge(meeting: Any, k: int, sign: float) -> tuple[float, float, float, bool]:
+    """Edge between the two corners of body k that lie farthest along the normal times ``sign``; whether it is one."""
+    far, found, one, other = -math.inf, 0, 0, 0
+    for c in range(meeting.kind[CORNERS_FIRST + k]):
+        far = max(far, height(meeting, k, c, sign))
+    for c in range(meeting.kind[CORNERS_FIRST + k]):
+        if height(meeting, k, c, sign) >= far - ON_FACE * meeting.size[k, REACH]:
+            found += 1
+            one, other = other, c
+    if found != 2:
+        return 0.0, 0.0, 0.0, False
+    first, last = meeting.corner[k, one], meeting.corner[k, other]
+    return last[0] - first[0], last[1] - first[1], last[2] - first[2], True
+
+
+@inner_kernel
+def edge_bend_bound(meeting: Any, now: float, until: float) -> float:
+    """`bend_bound` along a direction n that turns with the constant spin `TURN`.
+
+    The gap n . R of two corners, R leading from one to the other, bends by ``n''.R + 2 n'.R' + n.R''``.
+    """
+    paths, v = meeting.paths, meeting.vector
+    f, s = meeting.kind[FIRST], meeting.kind[SECOND]
+    spin_f, change_f = turn_bounds(meeting, f, now, until)
+    spin_s, change_s = turn_bounds(meeting, s, now, until)
+    turn = math.sqrt(v[TURN, 0] ** 2 + v[TURN, 1] ** 2 + v[TURN, 2] ** 2)
+    reach_f, reach_s = meeting.size[0, REACH], meeting.size[1, REACH]
+    speed = derivative_bound(paths, f, False, 1, now, until) + derivative_bound(paths, s, False, 1, now, until)
+    pull = derivative_bound(paths, f, False, 2, now, until) + derivative_bound(paths, s, False, 2, now, until)
+    jerk = derivative_bound(paths, f, False, 3, now, until) + derivative_bound(paths, s, False, 3, now, until)
+    wide = 0.0
+    for d in range(3):
+        wide += (v[CENTRE + 1, d] - v[CENTRE, d]) ** 2
+    wide = math.sqrt(wide) + (until - now) * speed + reach_f + reach_s
+    bend = reach_f * (spin_f * spin_f + change_f) + reach_s * (spin_s * spin_s + change_s) + (until - now) * jerk
+    bend += 2.0 * pull  # the present acceleration is taken along the present normal
+    return bend + turn * turn * wide + 2.0 * turn * (speed + spin_f * reach_f + spin_s * reach_s)
 
 
 @inner_kernel
@@ -321,11 +424,10 @@ def watch_all(meeting: Any) -> None:
         meeting.watched[c] = 1
 
 
-@inner_kernel
-def turn_bounds(paths: Paths, i: int, now: float, until: float) -> tuple[float, float]:
-    """Bounds of the spin [rad/s] and of its change [rad/s^2] (see `bend_bound`); in the plane the last term is none."""
-    spin, change = derivative_bound(paths, i, True, 1, now, until), derivative_bound(paths, i, True, 2, now, until)
-    return spin, change + (0.0 if paths.coefficient.shape[1] == 3 else 0.5 * spin * spin)
+@operation
+def turn_bounds(meeting: Any, i: int, now: float, until: float) -> tuple[float, float]:
+    """Bounds of the spin [rad/s] of body i, and of its change [rad/s^2], over the time (see `bend_bound`)."""
+    raise NotImplementedError
 
 
 @inner_kernel
@@ -338,8 +440,8 @@ def bend_bound(meeting: Any, now: float, until: float) -> float:
     """
     paths = meeting.paths
     f, s = meeting.kind[FIRST], meeting.kind[SECOND]
-    spin_f, change_f = turn_bounds(paths, f, now, until)
-    spin_s, change_s = turn_bounds(paths, s, now, until)
+    spin_f, change_f = turn_bounds(meeting, f, now, until)
+    spin_s, change_s = turn_bounds(meeting, s, now, until)
     jerk = derivative_bound(paths, f, False, 3, now, until) + derivative_bound(paths, s, False, 3, now, until)
     bend = meeting.size[1, REACH] * (spin_s * spin_s + change_s) + (until - now) * jerk
     if meeting.kind[PLANE] == 0:
