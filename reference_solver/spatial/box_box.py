@@ -23,6 +23,8 @@ FACE_ADVANTAGE = 1e-6
 #: A pair of edges must separate better than any face by this part. It has to exceed the tilt [rad] with which boxes
 #: land on each other, about v dt / L = 1e-3: an edge pair is one point where a face offers four.
 EDGE_ADVANTAGE = 1e-3
+#: The same where bodies touch to round-off when they do: what is larger is a tilt, and their normal that of the edges.
+EXACT_ADVANTAGE = 1e-7
 #: Edges closer to parallel than this [rad] offer no axis of their own: a face normal covers them.
 PARALLEL = 1e-6
 #: Cosines above -TIE, and distances above -TIE half extents, count as positive. Where a direction is exactly tied (two
@@ -35,9 +37,17 @@ EDGES = 72 * 64
 
 @inner_kernel
 def box_box(
-    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, ahead: float, manifolds: Manifolds, m: int
+    bodies: Bodies,
+    detection: Detection,
+    f: int,
+    s: int,
+    reach: float,
+    ahead: float,
+    advantage: float,
+    manifolds: Manifolds,
+    m: int,
 ) -> tuple[int, Vector]:
-    """Boxes f and s: up to four points of two faces, or one of two edges; ``ahead`` as in `collide`."""
+    """Boxes f and s: up to four points of two faces, or one of two edges; ``ahead``, ``advantage`` as in `collide`."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     extent = min(bodies.extent[f], bodies.extent[s])
     face_f, gap_f = best_face(bodies, f, s, between)
@@ -51,7 +61,7 @@ def box_box(
     if ahead > 0.0:
         gap, n = (gap_s, axis(bodies.axes, s, face_s)) if by_s else (gap_f, axis(bodies.axes, f, face_f))
         n = n if dot(n, between) >= 0.0 else scale(-1.0, n)
-        if gap_e > gap + EDGE_ADVANTAGE * extent:
+        if gap_e > gap + advantage * extent:
             gap, n = gap_e, normal_e
         face = lasting_face(bodies, f, s, between, n, gap, 2.0 * FACE_ADVANTAGE * extent, ahead)
         if face >= 3:
@@ -59,7 +69,7 @@ def box_box(
             return count, scale(-1.0, normal)
         if face != NO_FACE:
             return _clip_faces(bodies, detection, f, s, face, 0, reach, manifolds, m)
-    if gap_e <= (gap_s if by_s else gap_f) + EDGE_ADVANTAGE * extent:
+    if gap_e <= (gap_s if by_s else gap_f) + advantage * extent:
         if by_s:
             count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, manifolds, m)
             normal = scale(-1.0, normal)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.spatial.box_box import EDGE_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import (
@@ -44,7 +45,9 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
         bounces = options.restitution and detection.restitution[a, b] > 0.0
         # The textbook asks for gaps alone; it keeps its bits.
         ahead = options.dt if options.solver == BLOCK else 0.0
-        found = collide(bodies, detection, a, b, TOUCHING if bounces else options.margin, ahead, manifolds, m)
+        found = collide(
+            bodies, detection, a, b, TOUCHING if bounces else options.margin, ahead, EDGE_ADVANTAGE, manifolds, m
+        )
         if found > 0:
             sort_points(manifolds, m)
             set_frame(bodies, manifolds, m)

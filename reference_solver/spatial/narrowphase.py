@@ -36,19 +36,28 @@ SAME_SLOPE = 1e-9
 
 @inner_kernel
 def collide(
-    bodies: Bodies, detection: Detection, a: int, b: int, margin: float, ahead: float, manifolds: Manifolds, m: int
+    bodies: Bodies,
+    detection: Detection,
+    a: int,
+    b: int,
+    margin: float,
+    ahead: float,
+    advantage: float,
+    manifolds: Manifolds,
+    m: int,
 ) -> int:
     """Write the manifold of bodies a < b in row m; return its number of points (0: no contact).
 
     ``ahead``: time [s] within which axes that separate them are told apart by when they close; 0: by their gaps alone.
+    ``advantage``: by how much of the smaller half extent two edges must separate boxes better than any face.
     """
     reach = margin * min(bodies.extent[a], bodies.extent[b])
     manifolds.body_a[m] = a
     manifolds.body_b[m] = b
     if bodies.kind[a] <= bodies.kind[b]:
-        count, normal = _pair(bodies, detection, a, b, reach, ahead, manifolds, m)
+        count, normal = _pair(bodies, detection, a, b, reach, ahead, advantage, manifolds, m)
     else:
-        count, normal = _pair(bodies, detection, b, a, reach, ahead, manifolds, m)
+        count, normal = _pair(bodies, detection, b, a, reach, ahead, advantage, manifolds, m)
         normal = scale(-1.0, normal)
     manifolds.points[m] = count
     for d in range(3):
@@ -58,7 +67,15 @@ def collide(
 
 @inner_kernel
 def _pair(
-    bodies: Bodies, detection: Detection, f: int, s: int, reach: float, ahead: float, manifolds: Manifolds, m: int
+    bodies: Bodies,
+    detection: Detection,
+    f: int,
+    s: int,
+    reach: float,
+    ahead: float,
+    advantage: float,
+    manifolds: Manifolds,
+    m: int,
 ) -> tuple[int, Vector]:
     if bodies.kind[s] == CAPSULE:
         if bodies.kind[f] == HALF_SPACE:
@@ -78,7 +95,7 @@ def _pair(
         return sphere_sphere(bodies, f, s, reach, manifolds, m)
     if bodies.kind[s] == SPHERE:
         return box_sphere(bodies, f, s, reach, manifolds, m)
-    return box_box(bodies, detection, f, s, reach, ahead, manifolds, m)
+    return box_box(bodies, detection, f, s, reach, ahead, advantage, manifolds, m)
 
 
 @inner_kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.spatial.box_box import EDGE_ADVANTAGE, EXACT_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
@@ -30,6 +31,7 @@ def detect_touching(
         return -1
     n = len(bodies)
     m, old = 0, 0
+    advantage = EDGE_ADVANTAGE if clock[HELD] > 0.0 else EXACT_ADVANTAGE
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
@@ -37,7 +39,7 @@ def detect_touching(
         while old < detection.found[REMEMBERED] and memory.pair[old] < key:
             old += 1
         known = old if old < detection.found[REMEMBERED] and memory.pair[old] == key else -1
-        if collide(bodies, detection, key // n, key % n, options.margin, options.dt, manifolds, m) == 0:
+        if collide(bodies, detection, key // n, key % n, options.margin, options.dt, advantage, manifolds, m) == 0:
             continue
         sort_points(manifolds, m)
         set_world_points(bodies, manifolds, m)

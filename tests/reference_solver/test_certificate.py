@@ -92,13 +92,7 @@ def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
         assert cone_defect((pt, 0.0, pn + 0.01 * size), (off[1], 0.0, off[0]), 0.0, mu, step) > 1e-5 * size
 
 
-#: In space a step that jams goes by the fixed-step law (E28), which leaves overlaps: a defect, not an expectation.
-OVERLAPS_IN_SPACE = pytest.mark.xfail(reason="held steps in space leave overlaps of a hundredth", strict=True)
-
-
-@pytest.mark.parametrize(
-    ("dimension", "restitution"), [(2, 0.0), (2, 0.5), pytest.param(3, 0.0, marks=OVERLAPS_IN_SPACE), (3, 0.5)]
-)
+@pytest.mark.parametrize(("dimension", "restitution"), [(2, 0.0), (2, 0.5), (3, 0.0), (3, 0.5)])
 def test_the_reference_holds(dimension, restitution):
     certificate = pile(dimension, "reference", restitution=restitution).certificate
     assert certificate["holds"] and certificate["reasons"] == ()

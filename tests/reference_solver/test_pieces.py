@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere, simulation
-from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT
+from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, IMPULSE_LEVEL
 
 DT, G = 1.0 / 60.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ def test_pieces_join_and_explain_every_velocity(dimension, profile):
     assert then.pieces.step.min() == 20 and then.pieces.begin[0] == pytest.approx(20 * DT, abs=1e-15)
     pieces, last = first.pieces, {}
     assert set(pieces.kind) == ({FORCES, IMPACT} if profile == "reference" else {FORCES})
-    assert set(pieces.scheme) <= ({FROZEN, FIFTH_ORDER} if profile == "reference" else {FIXED})
+    assert set(pieces.scheme) <= ({FROZEN, FIFTH_ORDER, IMPULSE_LEVEL} if profile == "reference" else {FIXED})
     owner = np.repeat(np.arange(len(pieces)), np.diff(pieces.first_body))
     for i in (1, 2, 3):  # each has its pieces, of the island it is in
         assert pieces.length[owner[pieces.body == i]].sum() == pytest.approx(20 * DT, abs=1e-13)
