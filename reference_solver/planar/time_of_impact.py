@@ -80,11 +80,12 @@ def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int,
 
 @inner_kernel
 def hard_impact(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int, t: float, end: float) -> float:
-    """Time of the hard impact of a pair that meets at time t: then, or of another corner after that; inf if none is."""
+    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is."""
     if strikes_hard(bodies, sub, options, a, b, t):
         return t
     nx, ny = sub.probe.real[0, NX], sub.probe.real[0, NY]
-    t = next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, t, end)
+    deep = overlap_time(sub.meeting, a, b, end, DEEP * min_extent(sub, a, b))
+    t = min(next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, t, end), max(deep, t))
     return t if t < end and strikes_hard(bodies, sub, options, a, b, t) else math.inf
 
 

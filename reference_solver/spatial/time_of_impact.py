@@ -103,11 +103,12 @@ def strikes_hard(
 def hard_impact(
     bodies: Bodies, detection: Detection, sub_step: SubStep, options: Options, a: int, b: int, t: float, end: float
 ) -> float:
-    """Time of the hard impact of a pair that meets at time t: then, or of another corner after that; inf if none is."""
+    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is."""
     if strikes_hard(bodies, detection, sub_step, options, a, b, t):
         return t
     n: Vector = row(sub_step.probe.frame[0], 2, 0)
-    t = next_contact_of_held(sub_step.meeting, a, b, n[0], n[1], n[2], t, end)
+    deep = overlap_time(sub_step.meeting, a, b, end, DEEP * min(bodies.extent[a], bodies.extent[b]))
+    t = min(next_contact_of_held(sub_step.meeting, a, b, n[0], n[1], n[2], t, end), max(deep, t))
     return t if t < end and strikes_hard(bodies, detection, sub_step, options, a, b, t) else math.inf
 
 
