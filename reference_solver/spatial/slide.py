@@ -40,7 +40,22 @@ def press(
 ) -> None:
     """Velocities at the end of a sub-step of ``length``, out of ``left``: from ``first`` to ``twist`` (E20).
 
-    ``struck``: impacts came first, so that lasting contacts may part as well. v* is kept for the certificate.
+    v* is kept for the certificate.
+    """
+    begin_press(bodies, manifolds, options, length, left, struck)
+    accelerate(bodies, length)
+    copy_twists(bodies.twist, bodies.start)
+    warm_start(bodies, manifolds, options)
+    solve_velocities(bodies, manifolds, problem, options, tally)
+
+
+@inner_kernel
+def begin_press(
+    bodies: Bodies, manifolds: Manifolds, options: Options, length: float, left: float, struck: bool
+) -> None:
+    """Which points part, and targets and first impulses of all others; ``twist`` is ``first``.
+
+    ``struck``: impacts came first, so that lasting contacts may part as well.
     """
     copy_twists(bodies.first, bodies.twist)
     for m in range(len(manifolds)):
@@ -59,10 +74,6 @@ def press(
             gap = manifolds.gap[m, p] if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p) else 0.0
             last = manifolds.lasts[m, p] == 1
             manifolds.target[m, p] = closing_speed(gap, u[2] if last else 0.0, length, left if last else length)
-    accelerate(bodies, length)
-    copy_twists(bodies.twist, bodies.start)
-    warm_start(bodies, manifolds, options)
-    solve_velocities(bodies, manifolds, problem, options, tally)
 
 
 @inner_kernel
@@ -151,7 +162,8 @@ def press_until_stick(
 ) -> float:
     """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length.
 
-    Where rows turn the frozen solve is not what counts, and the first one is enough.
+    Where rows turn the frozen solve is not what counts, and the first one is enough; where they do at the velocities of
+    the start alone there is none, but for rebounds whose series may end.
     """
     left = sub_step.clock[LEFT]
     if len(manifolds) == 0:
@@ -159,6 +171,12 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
+    if not (struck and options.restitution):
+        begin_press(bodies, manifolds, options, left, left, struck)
+        copy_twists(bodies.first, bodies.last)
+        if not is_exact(bodies, manifolds, sub_step, left):
+            copy_twists(bodies.twist, bodies.start)
+            return left
     residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
     press(bodies, manifolds, problem, options, tally, left, left, struck)
     length, slipped = left, 0.0
