@@ -42,7 +42,7 @@ SOLVES = 19
 DIRECT, FACTORISATIONS = 20, 21
 #: Events located inside steps: impacts, ends of slides (E19).
 EVENTS_LOCATED = 22
-#: Steps with more events than are located; what was left of them went by the fixed-step law (E28).
+#: Steps with more events than are located; what was left of them went at impulse level (E28).
 STEPS_HELD = 23
 #: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
 RELEASED_SPEED = 24

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -17,9 +17,9 @@ from reference_solver.certification import Gate
 from reference_solver.certification.orders import RATES, fitted
 from reference_solver.certification.rotation import rotation_matrix
 from reference_solver.certification.space import GRAVITY
-from reference_solver.certification.turning import ALLOWED, HELD_BELOW, ORDER, TRUE_STEP, integrated
+from reference_solver.certification.turning import ALLOWED, HELD_BELOW, IMPULSE_ORDER, ORDER, TRUE_STEP, integrated
 from reference_solver.model import Array, Body, Model
-from reference_solver.settings import Settings
+from reference_solver.settings import Scheme, Settings
 from reference_solver.shapes import Box, Capsule, HalfSpace, Sphere
 from reference_solver.simulation import Simulation
 
@@ -48,10 +48,10 @@ class Case:
     time: float
     truth: Array
 
-    def error(self, rate: int) -> float:
+    def error(self, rate: int, scheme: Scheme = "located") -> float:
         """Largest difference from the truth at ``rate`` steps a second [m; quaternion]."""
         model = Model(3, list(self.bodies), (0.0, 0.0, -GRAVITY), 0.0, self.friction)
-        simulation = Simulation(model, Settings.reference(1.0 / rate))
+        simulation = Simulation(model, replace(Settings.reference(1.0 / rate), scheme=scheme))
         simulation.advance(round(self.time * rate))
         pose = simulation.pose[-1].copy()
         if not math.isnan(self.truth[3]) and pose[3:] @ self.truth[3:] < 0.0:
@@ -257,6 +257,15 @@ CASES: dict[str, Callable[[], Case]] = {
     "box spinning on a corner": top,
 }
 
+#: Cases without events.
+SMOOTH = (
+    "box pivoting on an edge",
+    "sphere rolling off a sphere",
+    "board rocking on a capsule",
+    "two boxes tipping as one",
+    "box spinning on a corner",
+)
+
 
 @cache
 def case(name: str) -> Case:
@@ -277,8 +286,17 @@ def order(name: str) -> Iterator[Gate]:
     yield Gate.at_least("turning contact: observed order", name, measured, ORDER, "spatial")
 
 
+def impulse_order(name: str) -> Iterator[Gate]:
+    """Yield the observed order of the impulse-level scheme in one case."""
+    found = fitted(tuple(case(name).error(rate, "midpoint") for rate in RATES))
+    measured = math.inf if found is None else found
+    yield Gate.at_least("impulse-level scheme: observed order", name, measured, IMPULSE_ORDER, "spatial")
+
+
 def gates() -> Iterator[Gate]:
     """Yield all rows."""
+    for name in SMOOTH:
+        yield from impulse_order(name)
     for name in CASES:
         yield from errors(name)
         yield from order(name)

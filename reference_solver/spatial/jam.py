@@ -10,7 +10,7 @@ from reference_solver.spatial.vector import length, row
 from reference_solver.stepping.clock import JAMMED, MOST_SOFT, PATIENCE, hold_rest, hurry, jams
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.noise import FROZEN
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.options import MIDPOINT, Options
 
 #: Columns of ``rate`` that hold the free bodies of a cluster, and its rows, until the flight begins.
 MEMBERS, ROWS = 0, 1
@@ -31,7 +31,7 @@ def near_rows(bodies: Bodies, manifolds: Manifolds, m: int, options: Options) ->
 def weigh_clusters(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, tally: Array) -> None:
     """Join all free bodies that touch, and weigh each cluster; uses up ``held`` and ``rate``.
 
-    Where one that jams turns, the whole step goes by the fixed-step law: otherwise its frozen solve is tried first.
+    Where one that jams turns, the whole step goes at impulse level: otherwise its frozen solve is tried first.
     """
     label = sub_step.held
     for i in range(len(bodies)):
@@ -47,6 +47,8 @@ def weigh_clusters(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, opti
         a = manifolds.body_a[m] if bodies.motion[manifolds.body_a[m]] == FREE else manifolds.body_b[m]
         bodies.rate[first_of(label, a), ROWS] += near_rows(bodies, manifolds, m, options)
     turns, largest = False, 0
+    if options.scheme == MIDPOINT:
+        sub_step.clock[JAMMED] = 1.0
     for i in range(len(bodies)):
         cluster = first_of(label, i)
         members = int(bodies.rate[cluster, MEMBERS])

@@ -269,3 +269,33 @@ def test_a_free_body_never_turns_faster_than_its_bound(moments, spin):
     assert np.linalg.norm(spins, axis=1).max() <= fastest * (1 + 1e-12)
     # A difference over dt is a mean of the derivative, and the splitting errs by (w dt)^2 < 1 % of it.
     assert np.linalg.norm(np.diff(spins, axis=0), axis=1).max() <= 1.01 * quickest * dt
+
+
+@pytest.mark.parametrize("spin", [(0.3, -0.2, 1.0), (2.0, 3.0, -4.0), (-5.0, 1.0, 0.5)])
+@pytest.mark.parametrize("gap", [1e-14, 1e-9])
+def test_edges_that_cross_and_part_are_not_met_though_both_turn(spin, gap):
+    """Two boxes on edge, across each other; along a fixed direction the ends of an edge that turns come up at once."""
+    on_edge = math.cos(math.pi / 8), math.sin(math.pi / 8)
+    lower, upper = Box((0.6, 0.2, 0.2)), Box((0.2, 0.7, 0.2))
+    reach = 0.2 * math.sqrt(2.0)
+    a = moving(lower, (0.0, 0.0, 0.0), spin=spin, turn=(on_edge[0], on_edge[1], 0.0, 0.0))
+    b_turn = (on_edge[0], 0.0, on_edge[1], 0.0)
+    start = np.array((0.02, 0.03, 2.0 * reach + gap))
+    # The point of contact on A moves with A; B goes with it, and up.
+    velocity = np.cross(spin, (0.02, 0.03, reach)) + np.cross((-1.0, 2.0, 0.7), (0.0, 0.0, reach)) + (0.0, 0.0, 1e-3)
+    b = moving(upper, start, velocity, (-1.0, 2.0, 0.7), b_turn)
+    end = 2e-3
+
+    def depth(t):
+        first = corners((0.6, 0.2, 0.2), (0, 0, 0), np.array(a.pose[3:]), (0, 0, 0), spin, (0, 0, 0), t)
+        return overlap_depth(
+            first, corners((0.2, 0.7, 0.2), start, np.array(b_turn), velocity, (-1.0, 2.0, 0.7), (0, 0, 0), t)
+        )
+
+    time = impact(a, b, end)
+    late = min((t for t in np.linspace(0.0, end, 400) if depth(t) < -1e-12), default=math.inf)
+    if math.isinf(late):
+        assert time == math.inf
+    else:  # turning brings them together again
+        assert depth(time) <= 1e-12 and time <= late
+        assert min(depth(t) for t in np.linspace(0.0, time, 200)) >= -1e-12
