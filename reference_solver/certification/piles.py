@@ -24,8 +24,10 @@ SMALL, LARGE, PLACE = 0.25, 0.4, {2: 1.2, 3: 1.4}
 #: Largest overlap, as a share of the smaller half width: what weight closes in a step, g h^2. And what share of runs
 #: may be refused. Which pile misses either is a matter of chance: piles multiply every last place.
 OVERLAP, REFUSED = GRAVITY / RATE**2 / SMALL, 0.05
-#: Share of all energy that may come from nowhere, in all steps together.
-GAINED = 1e-10
+#: Share of all energy that may come from nowhere, in all steps together: round-off in the plane; in space the mid-point
+#: rule misses some (w h)^3 / 24 of the spin energy of bodies with unequal moments in a step, 3e-6 at 10 rad/s, and that
+#: energy is a hundredth of all.
+GAINED = {2: 1e-10, 3: 1e-6}
 
 
 class Kind(NamedTuple):
@@ -63,7 +65,9 @@ def gates() -> Iterator[Gate]:
         worst = max(run.overlap for run in runs)
         yield Gate.at_most("pile: overlap, of a half width", case, worst, OVERLAP, kind.profile)
     share = refused / count
-    yield Gate.at_most("share of piles whose certificate does not hold", f"{count} piles", share, REFUSED, "planar, spatial")
+    yield Gate.at_most(
+        "share of piles whose certificate does not hold", f"{count} piles", share, REFUSED, "planar, spatial"
+    )
 
 
 def laws() -> Iterator[Gate]:
@@ -73,7 +77,7 @@ def laws() -> Iterator[Gate]:
         case = f"{name}, {len(kind.seeds)} piles"
         broken = sum(not reason.startswith("bodies overlap") for run in runs for reason in run.reasons)
         yield Gate.at_most("pile: laws broken, overlap apart", case, broken, 0, kind.profile)
-        yield Gate.at_most("pile: energy gained, of all", case, max(run.gained for run in runs), GAINED, kind.profile)
+        yield Gate.at_most("pile: energy gained, of all", case, max(run.gained for run in runs), GAINED[kind.dimension], kind.profile)
 
 
 class Fall(NamedTuple):

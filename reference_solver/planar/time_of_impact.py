@@ -15,7 +15,14 @@ from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, 
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
-from reference_solver.stepping.time_of_impact import DEEP, UNLIMITED, first_contact, next_contact_of_held, overlap_time
+from reference_solver.stepping.time_of_impact import (
+    DEEP,
+    TOO_DEEP,
+    UNLIMITED,
+    first_contact,
+    next_contact_of_held,
+    overlap_time,
+)
 
 
 @inner_kernel
@@ -80,12 +87,17 @@ def strikes_hard(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int,
 
 @inner_kernel
 def hard_impact(bodies: Bodies, sub: SubStep, options: Options, a: int, b: int, t: float, end: float) -> float:
-    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is."""
+    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is.
+
+    A pair that overlaps too deep in the end is told when it begins to: another feature of it touches.
+    """
     if strikes_hard(bodies, sub, options, a, b, t):
         return t
-    nx, ny = sub.probe.real[0, NX], sub.probe.real[0, NY]
-    deep = overlap_time(sub.meeting, a, b, end, DEEP * min_extent(sub, a, b))
-    t = min(next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, t, end), max(deep, t))
+    nx, ny, extent = sub.probe.real[0, NX], sub.probe.real[0, NY], min_extent(sub, a, b)
+    deep = max(overlap_time(sub.meeting, a, b, end, DEEP * extent), t)
+    if overlap_time(sub.meeting, a, b, end, TOO_DEEP * extent) < end:
+        return deep
+    t = min(next_contact_of_held(sub.meeting, a, b, nx, ny, 0.0, t, end), deep)
     return t if t < end and strikes_hard(bodies, sub, options, a, b, t) else math.inf
 
 

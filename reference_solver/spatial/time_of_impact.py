@@ -18,7 +18,14 @@ from reference_solver.spatial.vector import Vector, dot, row, sub
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS, Paths
-from reference_solver.stepping.time_of_impact import DEEP, UNLIMITED, first_contact, next_contact_of_held, overlap_time
+from reference_solver.stepping.time_of_impact import (
+    DEEP,
+    TOO_DEEP,
+    UNLIMITED,
+    first_contact,
+    next_contact_of_held,
+    overlap_time,
+)
 
 #: Overlap of bodies held in a phase, as a share of the smaller half width, at which their contact is another one: less
 #: than what a contact that is held may have (`phase.CLOSED`).
@@ -103,12 +110,18 @@ def strikes_hard(
 def hard_impact(
     bodies: Bodies, detection: Detection, sub_step: SubStep, options: Options, a: int, b: int, t: float, end: float
 ) -> float:
-    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is."""
+    """Time of the hard impact of a pair that meets at time t: then, or elsewhere after that; inf if none is.
+
+    A pair that overlaps too deep in the end is told when it begins to: another feature of it touches.
+    """
     if strikes_hard(bodies, detection, sub_step, options, a, b, t):
         return t
     n: Vector = row(sub_step.probe.frame[0], 2, 0)
-    deep = overlap_time(sub_step.meeting, a, b, end, DEEP * min(bodies.extent[a], bodies.extent[b]))
-    t = min(next_contact_of_held(sub_step.meeting, a, b, n[0], n[1], n[2], t, end), max(deep, t))
+    extent = min(bodies.extent[a], bodies.extent[b])
+    deep = max(overlap_time(sub_step.meeting, a, b, end, DEEP * extent), t)
+    if overlap_time(sub_step.meeting, a, b, end, TOO_DEEP * extent) < end:
+        return deep
+    t = min(next_contact_of_held(sub_step.meeting, a, b, n[0], n[1], n[2], t, end), deep)
     return t if t < end and strikes_hard(bodies, detection, sub_step, options, a, b, t) else math.inf
 
 

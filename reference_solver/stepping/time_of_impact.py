@@ -51,6 +51,8 @@ ON_FACE = 1e-9
 HASTY = 10.0
 #: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
 DEEP = 3e-5
+#: Overlap at the end of a sub-step with which they are held by the wrong features, however softly they meet.
+TOO_DEEP = 10.0 * DEEP
 #: Margin with which every pair of shapes answers with its points, however far apart they are.
 UNLIMITED = 1e300
 
