@@ -28,6 +28,8 @@ WORDS = {
     "kinetic_energy": "keeps {value} of motion",
     "impulse_scatter": "shakes: loads scatter by {value}",
     "rest_time": "rests after {value}",
+    "hop": "leaves the floor, up or down, by {value}",
+    "astray": "strays sideways by {value}",
 }
 #: Said of a time at which a value that was waited for did not come.
 NOT_PASSED = "it never gets there"

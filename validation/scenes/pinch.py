@@ -21,8 +21,8 @@ from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, block, floor, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, upward
 
 SIDE, PAD = 0.5, 2.0
 
@@ -118,8 +118,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("margin", 2.0, "1", "2 mu N/W: how much more the grip could hold", 1.0, 1e4),
         Parameter("mu", 0.5, "1", "friction of wall and pad", 0.0, 10.0, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the box"),
         Parameter("pad", 4.0, "kg", "mass of the pad; it stands on the floor", 0.0, 1e6, positive=True),
         Parameter("duration", 3.0, "s", "the second half is measured", 2.0, 1e3),
     ),

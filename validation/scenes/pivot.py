@@ -21,9 +21,9 @@ import numpy as np
 from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.pivoting import Pivot
-from validation.scenes.parts import along, block, floor, states, tilted, upward
+from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, states, tilted, upward
 
 #: Runs on for this long after the angle should be passed [s]: a step of 1/30 s at least.
 AFTERMATH = 0.05
@@ -153,8 +153,8 @@ SCENE = CanonicalScene(
         Parameter("aspect", 0.5, "1", "width over height", 0.02, 2.0),
         Parameter("height", 1.0, "m", "of the box", 0.0, 1e3, positive=True),
         Parameter("mu", 0.8, "1", "friction: must hold the edge, to the end", 0.0, 10.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the box"),
     ),
     make=make,
     exact=exact,

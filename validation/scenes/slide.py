@@ -20,8 +20,8 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import at, block, floor, heading, states, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import at, block, floor, heading, mass_of, standard_gravity, states, upward
 
 HEIGHT = 0.5
 #: Runs on for this long after it should have stopped, as a share of the time to stop.
@@ -160,8 +160,8 @@ SCENE = CanonicalScene(
         Parameter("mu", 0.4, "1", "friction; below aspect, so that the box does not tip", 0.0, 1.0, positive=True),
         Parameter("heading", 0.0, "degrees", "of the slide against the box's edges; spatial only", 0.0, 90.0),
         Parameter("aspect", 1.5, "1", "width over height of the box", 1.1, 20.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the box"),
     ),
     make=make,
     exact=exact,
@@ -191,8 +191,6 @@ SCENE = CanonicalScene(
         "stopping_distance": "stops after {value}",
         "braking": "is braked by {value}",
         "end_speed": "still moves with {value} when it should have stopped",
-        "hop": "leaves the floor, up or down, by {value}",
         "turned": "turns: its corners move by {value}",
-        "astray": "strays sideways by {value}",
     },
 )
