@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from adapters.law import Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
+from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
@@ -83,6 +84,16 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for profile in PROFILES
         for scene, metrics in _ROLLING.items()
         for metric in metrics
+    ),
+    *(
+        _deviation(profile, "far_origin", metric, on_a_plate(stopping_law(profile, metric), metric), "slide")
+        for profile in PROFILES
+        for metric in ("stopping_distance", "braking", "hop", "turned")
+    ),
+    *(
+        _deviation(profile, "pressed_box", metric, incline_law(profile, metric), "incline")
+        for profile in PROFILES
+        for metric in ("creep", "acceleration")
     ),
     _deviation("default", "incline", "creep", incline_law("default", "creep"), "incline"),
     *(

@@ -34,4 +34,10 @@ OURS = (
     "hilltop",
     "thin_wall",
     "overhang",
+    "pyramid",
+    "seam",
+    "far_origin",
+    "overlap",
+    "position_correction",
+    "pressed_box",
 )
