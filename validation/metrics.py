@@ -162,6 +162,15 @@ def astray(trajectory: Trajectory, line: Array, body: int = 1) -> float:
     return float(np.linalg.norm(way - np.outer(way @ line, line), axis=1).max())
 
 
+def turned(pose: Array) -> float:
+    """Largest angle of one body's poses, (s, 3) or (s, 7), against the first [rad]."""
+    if pose.shape[1] == 3:
+        return float(np.abs(pose[:, 2] - pose[0, 2]).max())
+    turns = rotation(pose)
+    off = np.linalg.norm(turns - turns[0], axis=(1, 2))  # Frobenius: 2 sqrt(2) |sin(angle/2)|
+    return float(2.0 * np.arcsin(np.clip(off / (2.0 * np.sqrt(2.0)), 0.0, 1.0)).max())
+
+
 def tilt(trajectory: Trajectory, body: int = 1) -> Array:
     """Angle of a body in the upright plane along the first axis, counter-clockwise, whole turns counted, (s,) [rad]."""
     pose = trajectory.pose[:, body]

@@ -16,10 +16,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from adapters.engine import Array
 from adapters.scene import Body, Scene
 from adapters.trajectory import Trajectory
-from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
 from validation.canonical import Check, Measured, Params, Track
 from validation.scenes.parts import along, at, block, heading
@@ -69,7 +67,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         "braking": _braking(scene, trajectory),
         "end_speed": (float(np.linalg.norm(trajectory.twist[-1, box, :d])), ""),
         "hop": (metrics.hop(trajectory, box), ""),
-        "turned": (_turned(pose) * metrics.reach(scene.bodies[box].shape), ""),
+        "turned": (metrics.turned(pose) * metrics.reach(scene.bodies[box].shape), ""),
     }
     if d == 3:
         measured["astray"] = (float(np.linalg.norm(moved - ahead * line)), "")
@@ -84,15 +82,6 @@ def _braking(scene: Scene, trajectory: Trajectory) -> Measured:
         return None, "the slide lasts less than two steps"
     speed = trajectory.twist[:, -1, : scene.dimension - 1] @ heading(scene)
     return float((speed[first] - speed[last]) / (trajectory.t[last] - trajectory.t[first])), ""
-
-
-def _turned(pose: Array) -> float:
-    """Largest angle against the start [rad]."""
-    if pose.shape[1] == 3:
-        return float(np.abs(pose[:, 2] - pose[0, 2]).max())
-    turns = rotation(pose)
-    off = np.linalg.norm(turns - turns[0], axis=(1, 2))  # Frobenius: 2 sqrt(2) |sin(angle/2)|
-    return float(2.0 * np.arcsin(np.clip(off / (2.0 * math.sqrt(2.0)), 0.0, 1.0)).max())
 
 
 def checks(scene: Scene, dt: float, truth: Mapping[str, float], place: float = 0.0) -> list[Check]:

@@ -103,4 +103,28 @@ ON_LOADS: tuple[Experiment, ...] = (
         )
         for metric in ("acceleration", "carried", "sheared")
     ),
+    *(
+        Experiment(
+            "tilt-table-residual",
+            "solved to the end (no residual stop, 1000 sweeps) it stays; drag has nothing to do with it",
+            "default",
+            "tilt_table",
+            "moved",
+            _SOLVED,
+            params,
+            dimension,
+            idle=(_NO_DRAG,),
+        )
+        for params, dimension in (({"aspect": 1.0}, 2), (_PLAIN, 3))
+    ),
+    Experiment(
+        "tilt-table-drag",
+        "without drag the block slides right; solving further does nothing",
+        "default",
+        "tilt_table",
+        "acceleration",
+        _NO_DRAG,
+        {"aspect": 1.0, "ratio": 1.1},
+        idle=(_SOLVED,),
+    ),
 )

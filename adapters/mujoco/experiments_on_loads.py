@@ -9,8 +9,9 @@ from adapters.mujoco.profiles import RIGID
 
 #: Rigid contacts that reflect velocities and do not push out.
 _NO_SPRING = {"solref": "reflect", "solimp": RIGID, "kappa_elastic": 0.0, "kappa_plastic": 0.0}
-#: Friction damped so slowly that it stops no slip in a step.
-_SLOW: dict[str, Any] = {"solreffriction": (1000.0, 1.0)}
+#: Friction damped so slowly that it stops no slip in a step, and so slowly that it hardly acts.
+_GENTLE: dict[str, Any] = {"solreffriction": (1.0, 1.0)}
+_NONE: dict[str, Any] = {"solreffriction": (1000.0, 1.0)}
 
 
 def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
@@ -40,25 +41,27 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
                 idle=(idle,),
             )
             for profile, off, idle in (
-                ("default", hold | _SLOW, {"tolerance": 0.0}),
-                ("tuned", _SLOW, {"margin": 0.0}),
+                ("default", hold | _GENTLE, {"tolerance": 0.0}),
+                ("tuned", _GENTLE, {"margin": 0.0}),
             )
         ),
-        *(
-            Experiment(
-                "overlap-soft-contact",
-                "a contact that reflects velocities and has no spring throws nothing; solving further does nothing",
-                "default",
-                "overlap",
-                metric,
-                _NO_SPRING,
-                params,
-                idle=({"tolerance": 0.0},),
-            )
-            for metric, params in (
-                ("thrown", dict[str, float]()),
-                ("centre_moved", {"depth": 0.01, "ratio": 100.0}),
-            )
+        Experiment(
+            "overlap-soft-contact",
+            "a contact that reflects velocities and has no spring throws nothing; solving further does nothing",
+            "default",
+            "overlap",
+            "thrown",
+            _NO_SPRING,
+            idle=({"tolerance": 0.0},),
+        ),
+        Experiment(
+            "overlap-soft-contact",
+            "solved to round-off the two forces cancel",
+            "default",
+            "overlap",
+            "centre_moved",
+            {"tolerance": 0.0},
+            {"depth": 0.01, "ratio": 100.0},
         ),
         Experiment(
             "position-correction-spring",
@@ -89,6 +92,33 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
                 {"load": 0.0},
                 idle=({"tolerance": 0.0},) if profile == "default" else ({"impratio": 1.0},),
             )
-            for profile, off in (("default", hold | _SLOW), ("tuned", _SLOW))
+            for profile, off in (("default", hold | _NONE), ("tuned", _NONE))
+        ),
+        *(
+            Experiment(
+                "tilt-table-soft-contact",
+                "with rigid contacts and stiff friction it stays; a round cone or solving further does not do it",
+                "default",
+                "tilt_table",
+                metric,
+                hold,
+                params,
+                idle=({"cone": "elliptic"}, {"tolerance": 0.0}),
+            )
+            for metric, params in (
+                ("moved", dict[str, float]()),
+                ("moved", {"aspect": 1.0}),
+                ("edge_moved", {"ratio": 1.1}),
+            )
+        ),
+        Experiment(
+            "tilt-table-soft-friction",
+            "with friction that is damped as the normal the edge stays; a smaller share of softness does nothing",
+            "tuned",
+            "tilt_table",
+            "edge_moved",
+            {"solreffriction": None},
+            {"ratio": 1.1},
+            idle=({"impratio": 1e4}, {"margin": 0.0}),
         ),
     )

@@ -95,6 +95,10 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for profile in PROFILES
         for metric in ("creep", "acceleration")
     ),
+    *(
+        _deviation(profile, "tilt_table", "acceleration", incline_law(profile, "acceleration"), "incline")
+        for profile in PROFILES
+    ),
     _deviation("default", "incline", "creep", incline_law("default", "creep"), "incline"),
     *(
         _deviation(profile, "incline", "acceleration", incline_law(profile, "acceleration"), "incline")

@@ -40,4 +40,6 @@ OURS = (
     "overlap",
     "position_correction",
     "pressed_box",
+    "tilt_table",
+    "long_rest",
 )
