@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.bullet.experiments_on_blows import on_blows
 from adapters.bullet.experiments_on_loads import ON_LOADS
 from adapters.experiment import Cured, Experiment
 
@@ -407,3 +408,5 @@ EXPERIMENTS += tuple(
 )
 
 EXPERIMENTS += ON_LOADS
+
+EXPERIMENTS += on_blows(_BARE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.experiment import Cured, Experiment
+from adapters.mujoco.experiments_on_blows import on_blows
 from adapters.mujoco.experiments_on_loads import on_loads
 
 #: Iterations are left alone: Newton's count is a limit that is not reached.
@@ -299,3 +300,5 @@ EXPERIMENTS += tuple(
 )
 
 EXPERIMENTS += on_loads(_HOLD)
+
+EXPERIMENTS += on_blows(_REFLECT)

@@ -45,6 +45,7 @@ _BLOWS = (
     ("default", "head_on", ("rebound_ratio", "first_speed", "second_speed", "impulse")),
     ("default", "flat_box", ("rebound_ratio", "impulse")),
     ("tuned", "flat_box", ("rebound_ratio", "impulse")),
+    ("tuned", "edge_drop", ("rise", "spin", "impulse")),
     ("tuned", "off_centre", ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost")),
 )
 _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver parameters, slow slippage"

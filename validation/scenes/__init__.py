@@ -42,4 +42,6 @@ OURS = (
     "pressed_box",
     "tilt_table",
     "long_rest",
+    "closing_wall",
+    "edge_drop",
 )
