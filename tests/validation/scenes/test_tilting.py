@@ -158,6 +158,14 @@ def test_blocks_that_do_two_things_at_once_are_refused_by_name(params, named):
         made("tilt_table", **params)
 
 
+@pytest.mark.parametrize(("aspect", "limit"), [(0.3, 0.3), (1.0, 0.5)])
+def test_gravity_is_turned_to_a_share_of_the_limit_that_is_met_first(aspect, limit):
+    for ratio in (0.98, 1.1):
+        _, scene = made("tilt_table", ratio=ratio, aspect=aspect)
+        across, up = scene.gravity
+        assert -across / up == pytest.approx(ratio * limit) and math.hypot(across, up) == pytest.approx(9.81)
+
+
 def test_what_is_told_of_a_toppling_block_comes_before_it_lands():
     _, scene = made("tilt_table", ratio=1.1)
     assert 0.5 * math.pi > TOLD and scene.duration < 1.2
@@ -184,9 +192,14 @@ def test_a_column_that_drifts_sinks_or_turns_slowly_fails_the_slower_the_longer_
     canonical, scene = made("long_rest", dimension, duration=duration)
     samples = round(scene.duration / DT / 60) + 1
     way = seen / 3600.0 * np.linspace(0.0, duration, samples)
-    for axis, metric in ((0, "drift_per_hour"), (dimension - 1, "sinking_per_hour")):
+    up = dimension - 1
+    for axis, sign, metric in (
+        (0, 1.0, "drift_per_hour"),
+        (up, 1.0, "sinking_per_hour"),
+        (up, -1.0, "sinking_per_hour"),
+    ):
         slow = recorded(scene, DT, 0.0, 0.5, 0.0, stride=60)
-        slow.pose[:, 3, axis] += way
+        slow.pose[:, 3, axis] += sign * way
         assert failing(canonical, scene, slow) == {metric}
     assert failing(canonical, scene, recorded(scene, DT, 0.0, 0.5, 2.0 * way, stride=60)) == {"turn_per_hour"}
     assert failing(canonical, scene, recorded(scene, DT, 0.0, 0.5, 0.1 * way, stride=60)) == set()
