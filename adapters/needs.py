@@ -32,7 +32,8 @@ class Needs:
         ``impact``: a pair that can meet has e > 0, or nothing but motion brings bodies together;
         ``rest``: gravity or a force acts and no e > 0; ``free``: no pair can meet.
     slide
-        Friction acts and a body starts with tangential motion or spin, or load acts along a fixed face.
+        Friction acts and a body starts with tangential motion or spin, or load acts along a fixed half-space; over a
+        fixed box what moves across gravity slides.
     smallest_size
         Smallest full extent of a free body [m].
     top_speed
@@ -87,13 +88,22 @@ def _regime(can_meet: bool, restitution: float, loaded: bool) -> Regime:
 
 
 def _tangential(scene: Scene) -> bool:
-    """True if a body moves along, or load acts along, the face of a half-space (1e-12: round-off)."""
+    """True if a body moves along, or load acts along, the face of a half-space, or moves level over a fixed box."""
     d = scene.dimension
+    motions = [body.twist[:d] for body in scene.bodies]
+    loads = [scene.gravity] + [body.force for body in scene.bodies]
     for face in (body.shape for body in scene.bodies if isinstance(body.shape, HalfSpace)):
-        vectors = [scene.gravity] + [b.twist[:d] for b in scene.bodies] + [b.force for b in scene.bodies]
-        for vector in vectors:
-            normal = sum(v * n for v, n in zip(vector, face.normal, strict=True))
-            along = math.sqrt(max(0.0, sum(v * v for v in vector) - normal * normal))
-            if along > 1e-12 * max(1.0, math.hypot(*vector)):
-                return True
-    return False
+        if any(_is_across(vector, face.normal) for vector in (*motions, *loads)):
+            return True
+    pull = math.hypot(*scene.gravity)
+    if pull == 0.0 or not any(isinstance(body.shape, Box) and body.motion == "fixed" for body in scene.bodies):
+        return False
+    down = tuple(g / pull for g in scene.gravity)
+    return any(_is_across(motion, down) for motion in motions)
+
+
+def _is_across(vector: tuple[float, ...], normal: tuple[float, ...]) -> bool:
+    """Whether ``vector`` has a part across the unit ``normal`` (1e-12: round-off)."""
+    along = sum(v * n for v, n in zip(vector, normal, strict=True))
+    across = math.sqrt(max(0.0, sum(v * v for v in vector) - along * along))
+    return across > 1e-12 * max(1.0, math.hypot(*vector))

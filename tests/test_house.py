@@ -122,6 +122,7 @@ OTHER_MEANINGS = {
     ("adapters/receipts.py", "impact"): "a regime of `Needs`",
     ("adapters/probes.py", "slide"): "a probe",
     ("adapters/receipts.py", "slide"): "a probe",
+    ("validation/bench/units.py", "pyramid"): "the pile on which iteration counts are timed",
     ("reports/command/certifying.py", "impact"): "a part of `reference_solver.certification`",
 }
 

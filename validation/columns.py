@@ -1,13 +1,16 @@
 """What columns of bodies at rest have in common: bodies 1, 2, ... stand on each other, body 0 is the floor.
 
 Truth, metrics and checks for a scene whose bodies start in equilibrium, each on the one before it: nothing moves, and
-interface i carries the weight of the bodies from i upwards.
+interface i carries the weight of the bodies from i upwards. Where several bodies stand side by side, an interface is
+all that lies between two ``layers`` (indices of bodies, from the floor up): how its contacts share the load is not
+determined, their sum is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise, product
 
 from adapters.scene import Scene
 from adapters.trajectory import Sampling, Trajectory
@@ -15,15 +18,20 @@ from validation import bounds, metrics
 from validation.bounds import WINDOW
 from validation.canonical import Check, Measured
 
+#: Bodies side by side, by their indices; the first layer is the floor.
+Layers = Sequence[Sequence[int]]
 
-def exact(scene: Scene) -> dict[str, float]:
+
+def exact(scene: Scene, layers: Layers = ()) -> dict[str, float]:
     """Equilibrium; loads are relative to the weight above."""
     truth = dict.fromkeys(("settle_time", "drift", "penetration", "kinetic_energy", "impulse_scatter"), 0.0)
-    return truth | {f"interface_impulse[{i}]": 1.0 for i in range(1, len(scene.bodies))}
+    return truth | {f"interface_impulse[{i}]": 1.0 for i in range(1, len(layers or scene.bodies))}
 
 
-def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+def measure(scene: Scene, trajectory: Trajectory, layers: Layers = ()) -> dict[str, Measured]:
     """Everything from poses and impulses, the same routine for every engine."""
+    layers = layers or [(i,) for i in range(len(scene.bodies))]
+    neighbours = [list(product(below, above)) for below, above in pairwise(layers)]
     g = math.hypot(*scene.gravity)
     speed = metrics.body_speeds(scene, trajectory)
     late = trajectory.t > trajectory.t[-1] - WINDOW
@@ -31,13 +39,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     measured: dict[str, Measured] = {
         "settle_time": metrics.last_motion(trajectory.t, speed.max(axis=1), bounds.STILL * g * trajectory.dt),
         "drift": (metrics.lateral_drift(trajectory), ""),
-        "penetration": (metrics.deepest_overlap(scene, trajectory), ""),
+        "penetration": (
+            metrics.deepest_overlap(scene, trajectory, [pair for pairs in neighbours for pair in pairs]),
+            "",
+        ),
         "kinetic_energy": (float(energy[late].mean()), ""),
     }
     scatter: list[float] = []
-    for i in range(1, len(scene.bodies)):
-        above = sum(body.mass for body in scene.bodies[i:]) * g * trajectory.dt
-        mean, deviation = metrics.interface_load(trajectory, i - 1, i, above, WINDOW)
+    for i, pairs in enumerate(neighbours, 1):
+        above = sum(scene.bodies[k].mass for layer in layers[i:] for k in layer) * g * trajectory.dt
+        mean, deviation = metrics.interface_load(trajectory, pairs, above, WINDOW)
         measured[f"interface_impulse[{i}]"] = mean
         if deviation is not None:
             scatter.append(deviation)
@@ -48,7 +59,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Positions add up along the column, overlaps do not: n g dt^2 of drift, g dt^2 of overlap however high it is."""
-    n, g, mass = len(scene.bodies) - 1, math.hypot(*scene.gravity), sum(body.mass for body in scene.bodies[1:])
+    loads = [name for name in truth if name.startswith("interface_impulse")]
+    n, g, mass = len(loads), math.hypot(*scene.gravity), sum(body.mass for body in scene.bodies[1:])
     top = scene.bodies[-1].pose[scene.dimension - 1]  # heights are rounded relative to the column's
     allowed = {
         "settle_time": ("s", bounds.settled(n, dt, scene.duration)),
@@ -59,7 +71,6 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     }
     source = "static equilibrium"
     found = [bound.check(name, unit, truth[name], source) for name, (unit, bound) in allowed.items()]
-    loads = [name for name in truth if name.startswith("interface_impulse")]
     return found + [bounds.carried(dt).check(name, "1", truth[name], "weight above the interface") for name in loads]
 
 

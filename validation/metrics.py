@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from adapters.engine import Array
@@ -28,6 +31,8 @@ WORDS = {
     "kinetic_energy": "keeps {value} of motion",
     "impulse_scatter": "shakes: loads scatter by {value}",
     "rest_time": "rests after {value}",
+    "hop": "leaves the floor, up or down, by {value}",
+    "astray": "strays sideways by {value}",
 }
 #: Said of a time at which a value that was waited for did not come.
 NOT_PASSED = "it never gets there"
@@ -41,6 +46,16 @@ def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None,
         return None, "contacts were not recorded"
     total = trajectory.contacts.impulse_between(a, b).sum(axis=0)
     return (None, UNAVAILABLE) if np.isnan(total).any() else (total, "")
+
+
+def late_impulses(trajectory: Trajectory, a: int, b: int, window: float) -> Array | None:
+    """Impulses on body b from body a, step by step over the last ``window`` s, (s, d) [N s]; None if not reported."""
+    contacts = trajectory.contacts
+    if contacts is None:
+        return None
+    late = trajectory.t[contacts.step] > trajectory.t[-1] - window
+    found = contacts.impulse_between(a, b)[late]
+    return None if len(found) == 0 or np.isnan(found).any() else found
 
 
 def apexes(t: Array, height: Array, velocity: Array, least: float = 0.0) -> tuple[Array, Array]:
@@ -147,6 +162,15 @@ def astray(trajectory: Trajectory, line: Array, body: int = 1) -> float:
     return float(np.linalg.norm(way - np.outer(way @ line, line), axis=1).max())
 
 
+def turned(pose: Array) -> float:
+    """Largest angle of one body's poses, (s, 3) or (s, 7), against the first [rad]."""
+    if pose.shape[1] == 3:
+        return float(np.abs(pose[:, 2] - pose[0, 2]).max())
+    turns = rotation(pose)
+    off = np.linalg.norm(turns - turns[0], axis=(1, 2))  # Frobenius: 2 sqrt(2) |sin(angle/2)|
+    return float(2.0 * np.arcsin(np.clip(off / (2.0 * np.sqrt(2.0)), 0.0, 1.0)).max())
+
+
 def tilt(trajectory: Trajectory, body: int = 1) -> Array:
     """Angle of a body in the upright plane along the first axis, counter-clockwise, whole turns counted, (s,) [rad]."""
     pose = trajectory.pose[:, body]
@@ -188,27 +212,25 @@ def crossing(t: Array, value: Array, rate: Array, level: float) -> tuple[Measure
     return (float(t[k] + s * h), ""), (float(np.polyval(np.polyder(np.array(cubic)), s) / h), "")
 
 
-def deepest_overlap(scene: Scene, trajectory: Trajectory) -> float:
-    """Deepest overlap of neighbouring bodies at any sample, >= 0 [m]."""
+def deepest_overlap(scene: Scene, trajectory: Trajectory, pairs: Sequence[tuple[int, int]] | None = None) -> float:
+    """Deepest overlap of ``pairs`` of bodies (by default of neighbours in the scene's list) at any sample, >= 0 [m]."""
     bodies, pose = scene.bodies, trajectory.pose
-    return max(
-        (deepest(bodies[i].shape, pose[:, i], bodies[i + 1].shape, pose[:, i + 1]) for i in range(len(bodies) - 1)),
-        default=0.0,
-    )
+    pairs = list(pairwise(range(len(bodies)))) if pairs is None else pairs
+    return max((deepest(bodies[i].shape, pose[:, i], bodies[j].shape, pose[:, j]) for i, j in pairs), default=0.0)
 
 
 def interface_load(
-    trajectory: Trajectory, a: int, b: int, weight_impulse: float, window: float
+    trajectory: Trajectory, pairs: Sequence[tuple[int, int]], weight_impulse: float, window: float
 ) -> tuple[Measured, float | None]:
-    """Mean and standard deviation over the last ``window`` seconds of the vertical impulse a -> b per step.
+    """Mean and standard deviation over the last ``window`` seconds of the vertical impulse of ``pairs`` per step.
 
-    Both are relative to ``weight_impulse`` [N s], the weight above times dt.
+    Summed over the pairs (a, b), of a on b; both are relative to ``weight_impulse`` [N s], the weight above times dt.
     """
     contacts = trajectory.contacts
     if contacts is None:
         return (None, "contacts were not recorded"), None
     late = trajectory.t[contacts.step] > trajectory.t[-1] - window
-    vertical = contacts.impulse_between(a, b)[late, -1] / weight_impulse
+    vertical = sum(contacts.impulse_between(a, b)[late, -1] for a, b in pairs) / weight_impulse
     if len(vertical) == 0 or np.isnan(vertical).any():
         return (None, UNAVAILABLE), None
     return (float(vertical.mean()), ""), float(vertical.std())

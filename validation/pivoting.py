@@ -14,9 +14,13 @@ step, towards the centre. Gravity takes back what is up; what is along the floor
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+
+from validation import bounds
+from validation.canonical import Check
 
 #: Nodes of the quadrature: the integrands are smooth, and twice as many change nothing at 1e-13.
 NODES = 64
@@ -76,6 +80,48 @@ class Pivot:
         s, weight = _nodes()
         speeds = [self.speed(start, spin, start + (angle - start) * float(each)) for each in s]
         return 0.5 * self.arm * dt * abs(angle - start) * float(weight @ np.array(speeds))
+
+
+def fall_checks(
+    on: Pivot, start: float, end: float, dt: float, truth: Mapping[str, float], tilted: float = 0.0
+) -> list[Check]:
+    """Checks of a box that falls from rest over an edge that stays: time and spin at ``end``, way of the edge.
+
+    Steps of first order: what they do of a fall whose contact may be found one step late. Half a step of acceleration
+    is what the order of a step shows, and a whole one is missing where a contact is found late, at the start or after
+    the edge was carried off the floor: 1.5 dt in time, and 1.5 steps in spin. What carries the edge away raises the
+    centre or moves its arm: energy m g times that, and the torque's share of it over the arm. A start that is told to
+    ``tilted`` [rad] only takes the time of another start.
+    """
+    g, spin = on.g, truth["passing_spin"]
+    carried = on.carried_away(start, 0.0, end, dt) + g * dt * dt
+    other = 0.0 if tilted == 0.0 else abs(on.time(max(start - tilted, 0.1 * start), 0.0, end) - truth["passing_time"])
+    moved = bounds.Bound(
+        carried + bounds.ROUND_OFF * on.arm,
+        "a step turns the box and moves its centre along the tangent: rho (w dt)^2/2 each; g dt^2",
+    )
+    time = bounds.Bound(
+        1.5 * dt + truth["passing_time"] * carried / on.arm + other,
+        "half a step by the order of a step, one for a contact found late, and the torque of an edge that moved",
+    )
+    speed = bounds.Bound(
+        1.5 * dt * on.rate * math.sin(end) + on.rate / (on.arm * spin) * carried,
+        "half a step of the acceleration by the order of a step, one for a contact found late, and an edge that moved",
+    )
+    source = "energy of a pendulum that is held by an edge; its integral"
+    return [
+        time.check("passing_time", "s", truth["passing_time"], source),
+        speed.check("passing_spin", "rad/s", truth["passing_spin"], source),
+        moved.check("edge_moved", "m", truth["edge_moved"], source),
+    ]
+
+
+#: What these metrics mean, in words.
+WORDS = {
+    "passing_time": "falls through the angle after {value}",
+    "passing_spin": "turns with {value} there",
+    "edge_moved": "its edge moves by {value}",
+}
 
 
 def _nodes() -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.bullet.experiments_on_blows import on_blows
+from adapters.bullet.experiments_on_loads import ON_LOADS
 from adapters.experiment import Cured, Experiment
 
 #: Iterations are left alone: they cost time, and any count is better than a lower one.
@@ -404,3 +406,7 @@ EXPERIMENTS += tuple(
         ("one", "drift", {"margin": 0.02}),
     )
 )
+
+EXPERIMENTS += ON_LOADS
+
+EXPERIMENTS += on_blows(_BARE)

@@ -18,8 +18,8 @@ from adapters.scene import Body, HalfSpace, Scene, Sphere
 
 #: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5
-#: A prescribed body outweighs the heaviest free one by this factor; its recoil is then 1e-9 of a velocity change.
-HEAVY = 1e9
+#: A prescribed body outweighs the heaviest free one by this factor; its recoil is then round-off of a velocity change.
+HEAVY = 1e15
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.chipmunk.experiments_on_loads import ON_LOADS
 from adapters.experiment import Cured, Experiment
 
 #: Iterations are left alone: they cost time, and any count is better than a lower one.
@@ -130,3 +131,5 @@ EXPERIMENTS += tuple(
     )
     for params in (dict[str, float](), {"margin": 0.02})
 )
+
+EXPERIMENTS += ON_LOADS

@@ -6,18 +6,20 @@ what the engine takes for A, the sum of the bodies' translational inverse masses
 force. Central blows have D = A; beside the centre the engine is softer by D/A than it should be, and a box that lands
 on four corners stiffer by 4. How far the law is from restitution is thus of order 1 - d.
 
-    head_on      D = A, n = 1         off_centre   D < A, n = 1         flat_box     D = A, n = 4
+    head_on      D = A, n = 1         off_centre   D < A, n = 1
+    flat_box     D = A, n = 4         edge_drop    D < A, n = 2
 
 Source: MuJoCo documentation, "Computation: constraint model", regulariser R and its estimate of the inverse inertia.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from adapters.mujoco.contact_law import ContactLaw
-from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 
 
@@ -55,6 +57,11 @@ def blow_of(scene: Scene) -> Blow | None:
     if len(scene.bodies) != 2 or any(scene.gravity):
         return None
     d, (first, second) = scene.dimension, scene.bodies
+    if isinstance(first.shape, HalfSpace) and isinstance(second.shape, Box) and any(second.pose[d if d == 2 else 4 :]):
+        arm, below = _edge(second)
+        own = 1.0 / second.mass
+        gap = second.pose[d - 1] - below - first.shape.offset
+        return Blow(gap, -second.twist[d - 1], own + arm * arm / _moment(second), own, 2)
     if isinstance(first.shape, HalfSpace) and isinstance(second.shape, Box):
         height, half = second.pose[d - 1], second.shape.half_extents[-1]
         return Blow(height - half - first.shape.offset, -second.twist[d - 1], 1.0 / second.mass, 1.0 / second.mass, 4)
@@ -65,8 +72,7 @@ def blow_of(scene: Scene) -> Blow | None:
     if isinstance(second.shape, Disc | Sphere) and isinstance(first.shape, Box):
         gap = second.pose[d - 1] - first.pose[d - 1] - first.shape.half_extents[-1] - second.shape.radius
         arm = second.pose[0] - first.pose[0]
-        moment = first.inertia[1] if isinstance(first.inertia, tuple) else first.inertia
-        return Blow(gap, first.twist[d - 1] - second.twist[d - 1], both + arm * arm / moment, both, 1)
+        return Blow(gap, first.twist[d - 1] - second.twist[d - 1], both + arm * arm / _moment(first), both, 1)
     return None
 
 
@@ -85,11 +91,16 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
             "second_speed": p["v2"] + impulse / (p["ratio"] * p["mass"]),
             "impulse": impulse,
         },
+        "edge_drop": lambda: {
+            "rise": impulse / p["mass"] - p["v"],
+            "spin": impulse * _edge(scene.bodies[1])[0] / _moment(scene.bodies[1]),
+            "impulse": impulse,
+        },
         "flat_box": lambda: {"rebound_ratio": after / blow.closing, "impulse": impulse},
         "off_centre": lambda: {
             "ball_speed": impulse / p["mass"] - p["v"],
             "bar_speed": p["rise"] - impulse / (p["ratio"] * p["mass"]),
-            "spin": impulse * p["offset"] / _moment(scene),
+            "spin": impulse * p["offset"] / _moment(scene.bodies[0]),
             "impulse": impulse,
             "energy_lost": 1.0 - (after / blow.closing) ** 2,
         },
@@ -97,6 +108,17 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
     return made[scene.name]() if scene.name in made else {}
 
 
-def _moment(scene: Scene) -> float:
-    moments = scene.bodies[0].inertia
-    return moments[1] if isinstance(moments, tuple) else moments
+def _moment(body: Body) -> float:
+    """Moment of inertia about the axis across the plane of motion [kg m^2]."""
+    return body.inertia[1] if isinstance(body.inertia, tuple) else body.inertia
+
+
+def _edge(box: Body) -> tuple[float, float]:
+    """Lowest edge of a box that is turned in the plane of motion: along the floor from the centre, and below it [m]."""
+    assert isinstance(box.shape, Box)
+    turn = box.pose[2] if len(box.pose) == 3 else -2.0 * math.atan2(box.pose[5], box.pose[3])
+    c, s = math.cos(turn), math.sin(turn)
+    half = box.shape.half_extents
+    corners = [(x * half[0], z * half[-1]) for x in (-1.0, 1.0) for z in (-1.0, 1.0)]
+    x, z = min(((c * x - s * z, s * x + c * z) for x, z in corners), key=lambda place: place[1])
+    return x, -z

@@ -76,7 +76,7 @@ class MujocoEngine(Engine):
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e12 times heavier than the rest, without gravity or load",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load",
                 f"{DOC}, modeling: mocap bodies",
             ),
         ),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.experiment import Cured, Experiment
+from adapters.mujoco.experiments_on_blows import on_blows
+from adapters.mujoco.experiments_on_loads import on_loads
 
 #: Iterations are left alone: Newton's count is a limit that is not reached.
 CANDIDATES: dict[str, tuple[Any, ...]] = {
@@ -296,3 +298,7 @@ EXPERIMENTS += tuple(
     )
     for params in (dict[str, float](), {"margin": 0.02})
 )
+
+EXPERIMENTS += on_loads(_HOLD)
+
+EXPERIMENTS += on_blows(_REFLECT)

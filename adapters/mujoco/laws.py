@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from adapters.law import Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
+from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
@@ -44,6 +45,7 @@ _BLOWS = (
     ("default", "head_on", ("rebound_ratio", "first_speed", "second_speed", "impulse")),
     ("default", "flat_box", ("rebound_ratio", "impulse")),
     ("tuned", "flat_box", ("rebound_ratio", "impulse")),
+    ("tuned", "edge_drop", ("rise", "spin", "impulse")),
     ("tuned", "off_centre", ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost")),
 )
 _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver parameters, slow slippage"
@@ -83,6 +85,20 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for profile in PROFILES
         for scene, metrics in _ROLLING.items()
         for metric in metrics
+    ),
+    *(
+        _deviation(profile, "far_origin", metric, on_a_plate(stopping_law(profile, metric), metric), "slide")
+        for profile in PROFILES
+        for metric in ("stopping_distance", "braking", "hop", "turned")
+    ),
+    *(
+        _deviation(profile, "pressed_box", metric, incline_law(profile, metric), "incline")
+        for profile in PROFILES
+        for metric in ("creep", "acceleration")
+    ),
+    *(
+        _deviation(profile, "tilt_table", "acceleration", incline_law(profile, "acceleration"), "incline")
+        for profile in PROFILES
     ),
     _deviation("default", "incline", "creep", incline_law("default", "creep"), "incline"),
     *(

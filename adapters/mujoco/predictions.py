@@ -172,7 +172,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
     face, body = scene.bodies
     if not (isinstance(face.shape, HalfSpace) and face.shape.normal[-1] == 1.0 and isinstance(body.shape, Box)):
         return None
-    if any(body.twist[scene.dimension - 1 :]) or any(body.force) or any(body.torque):
+    if any(body.twist[scene.dimension - 1 :]) or any(body.force[1:-1]) or any(body.torque):
         return None
     settings, law = settings_of(profile, scene, dt), law_of(profile, scene, dt)
     own = pair_solreffriction(settings, dt)
@@ -187,7 +187,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
         half[0],
         half[-1],
         (moments[1] if isinstance(moments, tuple) else moments) / body.mass,
-        (scene.gravity[0], scene.gravity[-1]),
+        (scene.gravity[0] + body.force[0] / body.mass, scene.gravity[-1] + body.force[-1] / body.mass),
     )
 
 

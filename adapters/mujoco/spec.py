@@ -13,9 +13,9 @@ from adapters.mujoco.pairs import pair_solref, pair_solreffriction
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
-#: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-12 of the free body's,
-#: the round-off that every check allows.
-PRESCRIBED_MASS = 1e12
+#: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
+#: below the round-off that every check allows.
+PRESCRIBED_MASS = 1e15
 
 
 def moments(body: Body) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Q
 from adapters.needs import Needs
 from adapters.reference.profiles import PROFILES, SOURCE
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
+from adapters.reference.start import overlap_at_the_start
 from adapters.scene import Scene
 
 #: Steps cut at events, with constant accelerations between them.
@@ -75,12 +76,15 @@ class ReferenceEngine(Engine):
         return f"{_package_version()}+{digest.hexdigest()[:8]}"
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Whatever the solver's own validation says about the model."""
+        """Whatever the solver's own validation says about the model.
+
+        And bodies that overlap at the start, where a profile promises a solution: rigid bodies have none there.
+        """
         try:
             solver_model(scene)
         except ValueError as error:
             return str(error).splitlines()[0]
-        return None
+        return overlap_at_the_start(scene) if self.facts.roles[profile] == "solution" else None
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.

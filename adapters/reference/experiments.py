@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.experiment import Experiment
+from adapters.reference.experiments_on_loads import ON_LOADS
 
 #: Profile `classical` is the textbook's and `reference` solves to the end: neither is tuned.
 CANDIDATES: dict[str, tuple[Any, ...]] = {}
@@ -79,3 +80,5 @@ EXPERIMENTS += tuple(
     )
     for params in (dict[str, float](), {"margin": 0.02})
 )
+
+EXPERIMENTS += ON_LOADS

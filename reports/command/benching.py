@@ -194,7 +194,7 @@ def profile_(
 ) -> None:
     """Say where the time of the reference solver's steps goes: the median time of each stage of a step.
 
-    SCENE is a scene of the catalogue, or pyramid (--param rows=13).
+    SCENE is a scene of the catalogue, such as pyramid (--param rows=13).
     """
     from reference_solver.timeline import timeline
 

@@ -69,7 +69,7 @@ def test_interface_load_is_signed_and_relative_to_the_weight():
     record = ContactRecord(np.arange(1, 11), np.arange(0, 22, 2), rows)
     trajectory = planar(t, np.zeros(11), np.zeros(11))
     trajectory = Trajectory(t, trajectory.pose, trajectory.twist, record, 0.1, "completed")
-    (mean, why), deviation = metrics.interface_load(trajectory, 0, 1, 0.5, 1.0)
+    (mean, why), deviation = metrics.interface_load(trajectory, [(0, 1)], 0.5, 1.0)
     assert (mean, why, deviation) == (pytest.approx(1.0), "", pytest.approx(0.0))
 
 
@@ -160,7 +160,7 @@ def test_the_total_impulse_is_the_sum_over_all_samples_and_contacts_of_the_pair(
 
 def test_impulses_that_were_not_recorded_are_none():
     assert metrics.total_impulse(resting(2), 0, 1) == (None, "contacts were not recorded")
-    assert metrics.interface_load(resting(2), 0, 1, 1.0, 1.0) == ((None, "contacts were not recorded"), None)
+    assert metrics.interface_load(resting(2), [(0, 1)], 1.0, 1.0) == ((None, "contacts were not recorded"), None)
 
 
 def test_one_component_that_is_not_reported_makes_the_impulse_none():
@@ -289,13 +289,13 @@ def test_the_load_of_an_interface_is_the_mean_and_scatter_of_its_last_window():
     """Samples at .1 to 1 s, the first half of them absurd; windows begin after their first instant."""
     impulses = [(0.0, 100.0)] * 5 + [(5.0, f) for f in (1.0, 2.0, 3.0, 2.0, 2.0)]
     trajectory = recorded(resting(11), [[(0, 1, impulse)] for impulse in impulses])
-    (mean, why), deviation = metrics.interface_load(trajectory, 0, 1, 0.5, 0.45)
+    (mean, why), deviation = metrics.interface_load(trajectory, [(0, 1)], 0.5, 0.45)
     assert (mean, why) == (pytest.approx(4.0), "")
     assert deviation == pytest.approx(2.0 * math.sqrt(0.4))
     with_a_gap = recorded(resting(11), [[(0, 1, (0.0, math.nan))] for _ in impulses])
-    assert metrics.interface_load(with_a_gap, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
+    assert metrics.interface_load(with_a_gap, [(0, 1)], 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
     too_early = recorded(resting(11), [[(0, 1, (0.0, 1.0))]])
-    assert metrics.interface_load(too_early, 0, 1, 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
+    assert metrics.interface_load(too_early, [(0, 1)], 0.5, 0.45) == ((None, metrics.UNAVAILABLE), None)
 
 
 @pytest.mark.parametrize(
@@ -332,7 +332,7 @@ def test_a_load_in_space_is_along_the_third_axis_and_a_window_leaves_out_its_fir
     t = np.arange(9) / 8
     still = spatial(t)
     trajectory = recorded(still, [[(0, 1, (7.0, 9.0, 64.0))]] * 4 + [[(0, 1, (7.0, 9.0, 3.0))]] * 4)
-    (mean, _), deviation = metrics.interface_load(trajectory, 0, 1, 1.0, 0.5)
+    (mean, _), deviation = metrics.interface_load(trajectory, [(0, 1)], 1.0, 0.5)
     assert (mean, deviation) == (3.0, 0.0)
 
 

@@ -20,8 +20,8 @@ class Timing:
     Parameters
     ----------
     slot
-        What was timed: scene, parameters, engine, profile, step, iterations. ``empty``, ``flight`` and ``pyramid``
-        are scenes of the bench, see `validation.bench.units`.
+        What was timed: scene, parameters, engine, profile, step, iterations. ``empty`` and ``flight`` are
+        scenes of the bench, see `validation.bench.units`.
     cell
         Cell of the catalogue whose error this is; empty for the bench's own scenes.
     bodies

@@ -2,17 +2,15 @@ r"""What is timed: scenes of the catalogue, at any size where they have one, and
 
 empty      only the floor: what a step costs before there is any physics
 flight     one free body that meets nothing
-pyramid            +---+
-                +---+ +---+          rows of r, r-1, ... 1 boxes, each on the two below it;
-             +---+ +---+ +---+       in equilibrium, nothing may move
-           =====================
+
+Piles are scenes of the catalogue: columns of n bodies, and the wall of r rows of boxes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -27,11 +25,9 @@ from validation.bench.timing import Purpose
 from validation.canonical import GRAVITY
 from validation.cells import Slot
 from validation.posed import primary_of, resolve
-from validation.scenes.parts import ball, cube, floor, upward
+from validation.scenes.parts import ball, floor, upward
 
 SIDE = 1.0
-#: Boxes of a row stand this far apart, centre to centre [sides]: they must not touch sideways.
-SPACING = 1.1
 #: A pile is timed after this much time in contact, for as long again [s]: 24 steps of 1/240 s.
 SETTLING = 0.1
 #: A body that has moved by half a side no longer stands where it stood: the pile has collapsed, or was pushed apart.
@@ -148,22 +144,12 @@ def scene_of(slot: Slot) -> Scene:
         return _scene(slot, (floor(slot.dimension),), {})
     if slot.scene == "flight":
         return _scene(slot, (ball("ball", slot.dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), {})
-    if slot.scene == "pyramid":
-        return _scene(slot, (floor(slot.dimension), *_pyramid(slot.dimension, int(params.get("rows", 4)))), params)
     return resolve(slot.scene).scene(slot.dimension, params)
 
 
 def _scene(slot: Slot, bodies: tuple[Body, ...], params: Mapping[str, float]) -> Scene:
     pairs = (Pair(restitution=0.0, friction=0.5),)
     return Scene(slot.scene, 1, slot.dimension, bodies, pairs, upward(slot.dimension, -GRAVITY), 1.0, params)
-
-
-def _pyramid(dimension: int, rows: int) -> Iterator[Body]:
-    for level in range(rows):
-        for k in range(rows - level):
-            box = cube(f"box{level}.{k}", dimension, 1.0, SIDE, (level + 0.5) * SIDE)
-            x = SPACING * SIDE * (k - 0.5 * (rows - level - 1))
-            yield replace(box, pose=(x, *box.pose[1:]))
 
 
 def _free(scene: Scene) -> int:

@@ -33,7 +33,7 @@ from validation.canonical import (
     Variation,
     halves,
 )
-from validation.scenes.parts import ball, floor, states, upward
+from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states, upward
 
 RADIUS = 0.5
 #: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
@@ -236,8 +236,8 @@ SCENE = CanonicalScene(
             positive=True,
         ),
         Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,

@@ -23,7 +23,7 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import PHASES, along, at, ball, delay, phases, states
+from validation.scenes.parts import PHASES, along, at, ball, delay, mass_of, phases, states
 
 RADIUS = 0.5
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
@@ -128,7 +128,7 @@ SCENE = CanonicalScene(
         Parameter("apart", 0.05, "s", "time between impacts, 12 steps of 1/240 s; 0: the row touches", 0.0, 1.0),
         Parameter("v", 2.0, "m/s", "of the striker", 0.0, 1e2, positive=True),
         delay("the first contact"),
-        Parameter("mass", 1.0, "kg", "of each ball", 0.0, 1e6, positive=True),
+        mass_of("each ball"),
     ),
     make=make,
     exact=exact,

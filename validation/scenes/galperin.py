@@ -20,7 +20,7 @@ from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, phases, states
+from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, mass_of, phases, states
 
 SMALL, LARGE = 0.1, 0.4
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
@@ -141,7 +141,7 @@ SCENE = CanonicalScene(
         Parameter("v", 1.0, "m/s", "of the large ball, towards the wall", 0.0, 1e2, positive=True),
         Parameter("gap", 1.0, "m", "of the small ball; sets the times between impacts", 0.0, 1e3, positive=True),
         delay("the balls first meet"),
-        Parameter("mass", 0.5, "kg", "of the small ball", 0.0, 1e6, positive=True),
+        mass_of("the small ball", 0.5),
     ),
     make=make,
     exact=exact,

@@ -17,7 +17,17 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, phases, states_and_impulses
+from validation.scenes.parts import (
+    PHASES,
+    along,
+    at,
+    ball,
+    between_impacts,
+    delay,
+    mass_of,
+    phases,
+    states_and_impulses,
+)
 
 RADIUS = 0.5
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
@@ -119,7 +129,7 @@ SCENE = CanonicalScene(
         Parameter("v1", 4.0, "m/s", "of the first ball, to the right", 0.0, 1e3, positive=True),
         Parameter("v2", -2.0, "m/s", "of the second ball; to the left, so that both move", -1e3, 0.0),
         delay(),
-        Parameter("mass", 0.5, "kg", "of the first ball", 0.0, 1e6, positive=True),
+        mass_of("the first ball", 0.5),
     ),
     make=make,
     exact=exact,

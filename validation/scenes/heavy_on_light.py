@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from adapters.scene import Pair, Scene
 from validation import columns
-from validation.canonical import GRAVITY, CanonicalScene, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import cube, floor, upward
+from validation.canonical import CanonicalScene, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
 
 SIDE = 1.0
 
@@ -52,8 +52,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("ratio", 100.0, "1", "mass of the upper box over that of the lower", 1e-3, 1e6),
         Parameter("mu", 0.5, "1", "friction of every pair", 0.0, 10.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the lower box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the lower box"),
         Parameter("duration", 5.0, "s", "long enough for a slow sinking to show", 1.0, 1e4),
     ),
     make=make,

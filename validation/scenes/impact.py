@@ -30,7 +30,17 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, phases, states_and_impulses, upward
+from validation.scenes.parts import (
+    PHASES,
+    ball,
+    between_impacts,
+    delay,
+    floor,
+    mass_of,
+    phases,
+    states_and_impulses,
+    upward,
+)
 
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.45
@@ -123,7 +133,7 @@ SCENE = CanonicalScene(
         Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
         delay(),
         Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
-        Parameter("mass", 0.5, "kg", "of the ball (worked example)", 0.0, 1e6, positive=True),
+        mass_of("the ball (worked example)", 0.5),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
     ),
     make=make,

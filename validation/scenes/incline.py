@@ -17,7 +17,6 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import (
-    GRAVITY,
     CanonicalScene,
     Check,
     Measured,
@@ -32,7 +31,7 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import cube, floor, states
+from validation.scenes.parts import cube, floor, mass_of, standard_gravity, states
 
 SIDE = 1.0
 RATIOS = (0.5, 0.9, 0.99, 0.999, 1.001, 1.01, 1.1, 2.0)
@@ -151,8 +150,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("ratio", 0.9, "1", "tan(theta)/mu; 1 is the edge of the cone", 0.0, 100.0, positive=True),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the box"),
         Parameter("duration", 2.0, "s", "the second half is measured", 0.1, 1e3),
     ),
     make=make,

@@ -20,9 +20,9 @@ from adapters.engine import Array
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.rolling import gyration, of_the_arm
-from validation.scenes.parts import ball, floor, states, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.rolling import gyration, of_the_arm, on_a_late_arm
+from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states, upward
 
 K = gyration(3)
 #: Runs for this many times the time until it rolls.
@@ -115,11 +115,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         return np.asarray(place + velocity * (scene.duration - time))
 
     def velocity(axis: int) -> bounds.Bound:
-        change = of_the_arm(lambda arm: float(_rolling(p, arm)[2][axis]), r, depth)
-        return bounds.Bound(
-            change + bounds.ROUND_OFF * fastest,
-            "exact at every dt but for the arm of friction, shorter by the depth at which a late contact is found",
-        )
+        return on_a_late_arm(lambda arm: float(_rolling(p, arm)[2][axis]), r, depth, fastest)
 
     def place(axis: int) -> bounds.Bound:
         because = "a contact found one step late is |u0| k/(1 + k) dt without friction, a step order shows half of it"
@@ -180,8 +176,8 @@ SCENE = CanonicalScene(
         Parameter("back", 1.0, "m/s", "of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2),
         Parameter("mu", 0.2, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,
@@ -210,6 +206,5 @@ SCENE = CanonicalScene(
         "end_x": "ends {value} along",
         "end_y": "ends {value} across",
         "turned": "turns the direction of its slip by {value}",
-        "hop": "leaves the floor, up or down, by {value}",
     },
 )

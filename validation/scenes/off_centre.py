@@ -34,6 +34,7 @@ from validation.scenes.parts import (
     between_impacts,
     block,
     delay,
+    mass_of,
     phases,
     states_and_impulses,
 )
@@ -191,7 +192,7 @@ SCENE = CanonicalScene(
         Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
         Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
         delay(),
-        Parameter("mass", 0.5, "kg", "of the ball", 0.0, 1e6, positive=True),
+        mass_of("the ball", 0.5),
     ),
     make=make,
     exact=exact,

@@ -23,7 +23,7 @@ from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.rolling import gyration, launched, struck
-from validation.scenes.parts import PHASES, along, at, ball, delay, floor, phases, states, upward
+from validation.scenes.parts import PHASES, along, at, ball, delay, floor, mass_of, phases, states, upward
 
 RADIUS, GAP, LANE = 0.5, 1.0, 5.0
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
@@ -143,7 +143,7 @@ SCENE = CanonicalScene(
         Parameter("v", 6.0, "m/s", "along the floor; fast enough to slip", 0.0, 1e3, positive=True),
         Parameter("fall", 2.0, "m/s", "of the approach", 0.0, 1e2, positive=True),
         delay("the floor"),
-        Parameter("mass", 1.0, "kg", "of each ball", 0.0, 1e6, positive=True),
+        mass_of("each ball"),
     ),
     make=make,
     exact=exact,

@@ -11,7 +11,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.trajectory import Sampling
-from validation.canonical import Parameter
+from validation.canonical import GRAVITY, Parameter
 
 #: Time until a first contact [s]: 12.6 steps of 1/240 s, so that it falls inside a step and not on its edge, where
 #: engines may differ by whether a touching contact counts.
@@ -105,6 +105,19 @@ def delay(until: str = "contact") -> Parameter:
     """The parameter that `phases` varies: time ``until`` something is met."""
     because = f"time until {until}: sets its phase within a step"
     return Parameter("delay", DELAY, "s", because, 0.0, 10.0, positive=True)
+
+
+# ---- parameters that many scenes have ----
+
+
+def standard_gravity() -> Parameter:
+    """Parameter ``g``."""
+    return Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True)
+
+
+def mass_of(what: str, default: float = 1.0) -> Parameter:
+    """Parameter ``mass`` [kg], of ``what`` it says."""
+    return Parameter("mass", default, "kg", f"of {what}", 0.0, 1e6, positive=True)
 
 
 # ---- what is recorded ----

@@ -16,13 +16,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from adapters.engine import Array
 from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, block, floor, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, upward
 
 SIDE, PAD = 0.5, 2.0
 
@@ -55,23 +54,13 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     sunk = metrics.mean_rate(trajectory.t, -trajectory.pose[:, 2, d - 1])
     spin = float(np.linalg.norm(trajectory.twist[-1, 2, d:]))
     measured: dict[str, Measured] = {"creep": sunk, "turned": (spin * 0.5 * SIDE, "")}
-    wall, pad = _late(trajectory, 1, 2), _late(trajectory, 2, 3)
+    wall, pad = (metrics.late_impulses(trajectory, *pair, WINDOW) for pair in ((1, 2), (2, 3)))
     if wall is None or pad is None:
         return measured | dict.fromkeys(("grip", "carried"), (None, metrics.UNAVAILABLE))
     weight = p["mass"] * p["g"]
     measured["grip"] = (float(wall[:, 0].mean() / (grip(p) * dt)), "")
     measured["carried"] = (float((wall[:, -1] - pad[:, -1]).mean() / (weight * dt)), "")
     return measured
-
-
-def _late(trajectory: Trajectory, a: int, b: int) -> Array | None:
-    """Impulses on body b from body a, step by step over the last second, (s, d) [N s]; None if not reported."""
-    contacts = trajectory.contacts
-    if contacts is None:
-        return None
-    late = trajectory.t[contacts.step] > trajectory.t[-1] - WINDOW
-    found = contacts.impulse_between(a, b)[late]
-    return None if len(found) == 0 or np.isnan(found).any() else found
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
@@ -118,8 +107,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("margin", 2.0, "1", "2 mu N/W: how much more the grip could hold", 1.0, 1e4),
         Parameter("mu", 0.5, "1", "friction of wall and pad", 0.0, 10.0, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the box"),
         Parameter("pad", 4.0, "kg", "mass of the pad; it stands on the floor", 0.0, 1e6, positive=True),
         Parameter("duration", 3.0, "s", "the second half is measured", 2.0, 1e3),
     ),

@@ -20,8 +20,8 @@ from adapters.engine import Array
 from adapters.scene import Body, Disc, Pair, Scene, SceneError, Sphere
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.scenes.parts import block, pose_at, states, tilted, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.scenes.parts import block, mass_of, pose_at, standard_gravity, states, tilted, upward
 
 #: Swings from side to side that are followed.
 SWINGS = 3
@@ -209,8 +209,8 @@ SCENE = CanonicalScene(
         Parameter("thickness", 0.1, "m", "of the board; less than twice the radius", 0.0, 1e3, positive=True),
         Parameter("length", 2.0, "m", "of the board", 0.0, 1e3, positive=True),
         Parameter("mu", 0.8, "1", "friction: must hold the contact", 0.0, 10.0, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the board", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the board"),
     ),
     make=make,
     exact=exact,

@@ -23,9 +23,9 @@ from adapters.engine import Array
 from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.pivoting import Pivot
-from validation.scenes.parts import block, floor, states, tilted, upward
+from validation.scenes.parts import block, floor, mass_of, standard_gravity, states, tilted, upward
 
 #: Landings that are judged, and the amplitudes after them.
 LANDINGS = 3
@@ -211,8 +211,8 @@ SCENE = CanonicalScene(
         Parameter("aspect", 0.25, "1", "width over height; below 1.41 it rocks", 0.05, 1.4),
         Parameter("height", 10.0, "m", "of the block, a column: the taller, the slower", 0.0, 1e3, positive=True),
         Parameter("mu", 0.6, "1", "friction: must hold the edges where it lands", 0.0, 10.0, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the block", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the block"),
     ),
     make=make,
     exact=exact,

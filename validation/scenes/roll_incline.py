@@ -16,9 +16,9 @@ from collections.abc import Callable, Mapping
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.rolling import forward, gyration, of_the_arm
-from validation.scenes.parts import along, ball, floor, states
+from validation.scenes.parts import along, ball, floor, mass_of, standard_gravity, states
 
 
 def angle(params: Params, dimension: int) -> float:
@@ -106,9 +106,9 @@ SCENE = CanonicalScene(
         Parameter("ratio", 0.5, "1", "tan(theta) k/((1 + k) mu); 1 is the limit of rolling", 0.0, 100.0, positive=True),
         Parameter("mu", 0.3, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        standard_gravity(),
         Parameter("duration", 1.0, "s", "of the run", 0.1, 100.0),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,
@@ -136,6 +136,5 @@ SCENE = CanonicalScene(
     words={
         "acceleration": "moves off with {value}",
         "turning": "its surface turns faster by {value}",
-        "hop": "leaves the floor, up or down, by {value}",
     },
 )

@@ -17,9 +17,9 @@ from dataclasses import replace
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.rolling import forward, gyration, launched, on_a_late_arm, struck
-from validation.scenes.parts import ball, floor, heading, states, upward
+from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -95,9 +95,9 @@ SCENE = CanonicalScene(
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("heading", 30.0, "degrees", "of the motion against the axes", 0.0, 90.0),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
+        standard_gravity(),
         Parameter("duration", 2.0, "s", "of the run", 0.1, 100.0),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,
@@ -124,7 +124,5 @@ SCENE = CanonicalScene(
     words={
         "spin": "spins about the vertical with {value}",
         "speed": "rolls on with {value}",
-        "hop": "leaves the floor, up or down, by {value}",
-        "astray": "strays sideways by {value}",
     },
 )

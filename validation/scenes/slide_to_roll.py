@@ -19,9 +19,9 @@ import numpy as np
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.rolling import forward, gyration, launched, of_the_arm, on_a_late_arm
-from validation.scenes.parts import ball, floor, heading, states, upward
+from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
 
 #: Runs for this many times the time until it rolls: two thirds of the run it rolls.
 RUNS = 3.0
@@ -166,8 +166,8 @@ SCENE = CanonicalScene(
         Parameter("mu", 0.3, "1", "friction of the pair: when rolling begins, not how fast", 0.0, 10.0, positive=True),
         Parameter("heading", 0.0, "degrees", "of the motion against the axes; spatial only", 0.0, 90.0),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,
@@ -197,7 +197,5 @@ SCENE = CanonicalScene(
         "slip": "goes on sliding with {value} where it should roll",
         "rolling_time": "rolls after {value}",
         "rolling_place": "rolls after a way of {value}",
-        "hop": "leaves the floor, up or down, by {value}",
-        "astray": "strays sideways by {value}",
     },
 )

@@ -14,7 +14,6 @@ from __future__ import annotations
 from adapters.scene import Pair, Scene
 from validation import columns
 from validation.canonical import (
-    GRAVITY,
     CanonicalScene,
     Parameter,
     Params,
@@ -24,7 +23,7 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import cube, floor, upward
+from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
 
 SIDE = 1.0
 HEIGHTS = (1, 2, 5, 10, 20)
@@ -68,8 +67,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("n", 5, "1", "number of boxes", 1, 1000, integer=True),
         Parameter("mu", 0.5, "1", "friction of every pair", 0.0, 10.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of each box", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("each box"),
         Parameter("duration", 5.0, "s", "long enough for a slow sway to show", 1.0, 1e4),
     ),
     make=make,

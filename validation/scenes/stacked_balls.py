@@ -21,7 +21,7 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, phases, states, upward
+from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, mass_of, phases, states, upward
 
 LARGE, SMALL = 0.5, 0.2
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
@@ -141,7 +141,7 @@ SCENE = CanonicalScene(
         Parameter("v", 2.0, "m/s", "of both balls, downwards", 0.0, 1e2, positive=True),
         Parameter("apart", 0.05, "s", "time between the impacts; 12 steps of 1/240 s", 0.0, 1.0, positive=True),
         delay("the floor"),
-        Parameter("mass", 0.5, "kg", "of the small ball", 0.0, 1e6, positive=True),
+        mass_of("the small ball", 0.5),
     ),
     make=make,
     exact=exact,

@@ -27,17 +27,7 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.scenes.parts import (
-    PHASES,
-    along,
-    at,
-    ball,
-    between_impacts,
-    delay,
-    phases,
-    pose_at,
-    states,
-)
+from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, mass_of, phases, pose_at, states
 
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
@@ -116,7 +106,7 @@ SCENE = CanonicalScene(
         Parameter("e", 0.5, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("radius", 0.1, "m", "of the ball", 0.0, 1.0, positive=True),
         delay(),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        mass_of("the ball"),
     ),
     make=make,
     exact=exact,

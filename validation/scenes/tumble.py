@@ -24,7 +24,7 @@ from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.scenes.parts import pose_at, states
+from validation.scenes.parts import mass_of, pose_at, states
 
 #: Sides of the box [m]: three different moments.
 SIDES = (1.0, 0.6, 0.2)
@@ -166,7 +166,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("spin", 3.0, "rad/s", "about the middle axis", 0.0, 1e3, positive=True),
         Parameter("delta", 0.1, "1", "spin about the largest axis, over that: the disturbance", 1e-6, 1.0),
-        Parameter("mass", 1.0, "kg", "of the box", 0.0, 1e6, positive=True),
+        mass_of("the box"),
     ),
     make=make,
     exact=exact,

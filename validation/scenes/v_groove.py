@@ -20,8 +20,8 @@ from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
-from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.scenes.parts import along, at, ball, upward
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, ball, mass_of, standard_gravity, upward
 
 RADIUS = 0.5
 
@@ -133,8 +133,8 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("left", 45.0, "degrees", "slope of the left plane", 5.0, 85.0),
         Parameter("right", 45.0, "degrees", "slope of the right plane", 5.0, 85.0),
-        Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("mass", 1.0, "kg", "of the ball", 0.0, 1e6, positive=True),
+        standard_gravity(),
+        mass_of("the ball"),
         Parameter("duration", 3.0, "s", "the last second is measured", 1.5, 1e4),
     ),
     make=make,

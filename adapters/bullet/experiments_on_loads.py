@@ -1,0 +1,130 @@
+"""Experiments on Bullet: what stands, is pressed or pushed, slides over plates, or starts inside something."""
+
+from __future__ import annotations
+
+from adapters.experiment import Experiment
+
+_NO_DRAG = {"linearDamping": 0.0, "angularDamping": 0.0}
+_SOLVED = {"solverResidualThreshold": 0.0, "iterations": 1000}
+#: Contact points are kept while they drift, and friction with them.
+_KEPT = _NO_DRAG | {"contactBreakingThreshold": 0.1}
+_PLAIN = dict[str, float]()
+
+ON_LOADS: tuple[Experiment, ...] = (
+    *(
+        Experiment(
+            "pyramid-sweeps",
+            "solved to the end (no residual stop, 1000 sweeps) the wall stands",
+            profile,
+            "pyramid",
+            metric,
+            _SOLVED,
+            params,
+            idle=(_NO_DRAG,) if profile == "default" else ({"warmStartingFactor": 0.95},),
+        )
+        for profile, metric, params in (
+            ("default", "settle_time", _PLAIN),
+            ("default", "drift", {"rows": 5.0}),
+            ("tuned", "settle_time", {"rows": 5.0}),
+        )
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-drag",
+            "without drag it stops where it should; solving further does nothing",
+            "default",
+            scene,
+            metric,
+            _NO_DRAG,
+            idle=(_SOLVED,),
+        )
+        for scene in ("seam", "far_origin")
+        for metric in ("stopping_distance", "braking")
+    ),
+    *(
+        Experiment(
+            "far-origin-drag",
+            "with a wider margin no contact point of the sliding face is lost; without drag alone they are",
+            "default",
+            "far_origin",
+            metric,
+            _KEPT,
+            idle=(_NO_DRAG, _SOLVED),
+        )
+        for metric in ("hop", "turned")
+    ),
+    *(
+        Experiment(
+            "overlap-push-out",
+            "without push-out nothing is thrown; drag has nothing to do with it",
+            profile,
+            "overlap",
+            "thrown",
+            {"contactERP": 0.0},
+            idle=(idle,),
+        )
+        for profile, idle in (("default", _NO_DRAG), ("one", {"iterations": 1000}))
+    ),
+    Experiment(
+        "position-correction-push-out",
+        "without push-out nothing is thrown; drag has nothing to do with it",
+        "default",
+        "position_correction",
+        "launched",
+        {"contactERP": 0.0, "contactSlop": 0.0},
+        idle=(_NO_DRAG,),
+    ),
+    *(
+        Experiment(
+            "position-correction-warm-start",
+            "without push-out by speed, or without warm starting, nothing goes sideways; more sweeps do nothing",
+            "tuned",
+            "position_correction",
+            "drift",
+            off,
+            idle=({"iterations": 1000},),
+        )
+        for off in (
+            {"contactERP": 0.0},
+            {"warmStartingFactor": 0.0},
+            {"useSplitImpulse": 1, "splitImpulsePenetrationThreshold": 0.0},
+        )
+    ),
+    *(
+        Experiment(
+            "pressed-box-drag",
+            "without drag and with a wider margin the box slides right; without drag alone points of it are lost",
+            "default",
+            "pressed_box",
+            metric,
+            _KEPT,
+            {"load": 0.0},
+            idle=(_NO_DRAG, _SOLVED),
+        )
+        for metric in ("acceleration", "carried", "sheared")
+    ),
+    *(
+        Experiment(
+            "tilt-table-residual",
+            "solved to the end (no residual stop, 1000 sweeps) it stays; drag has nothing to do with it",
+            "default",
+            "tilt_table",
+            "moved",
+            _SOLVED,
+            params,
+            dimension,
+            idle=(_NO_DRAG,),
+        )
+        for params, dimension in (({"aspect": 1.0}, 2), (_PLAIN, 3))
+    ),
+    Experiment(
+        "tilt-table-drag",
+        "without drag the block slides right; solving further does nothing",
+        "default",
+        "tilt_table",
+        "acceleration",
+        _NO_DRAG,
+        {"aspect": 1.0, "ratio": 1.1},
+        idle=(_SOLVED,),
+    ),
+)

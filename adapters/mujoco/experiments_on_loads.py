@@ -1,0 +1,124 @@
+"""Experiments on MuJoCo: what stands, is pressed or pushed, slides over plates, or starts inside something."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Experiment
+from adapters.mujoco.profiles import RIGID
+
+#: Rigid contacts that reflect velocities and do not push out.
+_NO_SPRING = {"solref": "reflect", "solimp": RIGID, "kappa_elastic": 0.0, "kappa_plastic": 0.0}
+#: Friction damped so slowly that it stops no slip in a step, and so slowly that it hardly acts.
+_GENTLE: dict[str, Any] = {"solreffriction": (1.0, 1.0)}
+_NONE: dict[str, Any] = {"solreffriction": (1000.0, 1.0)}
+
+
+def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
+    """Experiments with ``hold``: settings of rigid contacts that start with the touch."""
+    return (
+        *(
+            Experiment(
+                "pyramid-touching-start",
+                "with rigid contacts that start with the touch nothing sinks; solving further does nothing",
+                "default",
+                "pyramid",
+                "penetration",
+                hold,
+                params,
+                idle=({"tolerance": 0.0},),
+            )
+            for params in (dict[str, float](), {"rows": 5.0})
+        ),
+        *(
+            Experiment(
+                "seam-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing; solving further does nothing",
+                profile,
+                "seam",
+                "hop",
+                off,
+                idle=(idle,),
+            )
+            for profile, off, idle in (
+                ("default", hold | _GENTLE, {"tolerance": 0.0}),
+                ("tuned", _GENTLE, {"margin": 0.0}),
+            )
+        ),
+        Experiment(
+            "overlap-soft-contact",
+            "a contact that reflects velocities and has no spring throws nothing; solving further does nothing",
+            "default",
+            "overlap",
+            "thrown",
+            _NO_SPRING,
+            idle=({"tolerance": 0.0},),
+        ),
+        Experiment(
+            "overlap-soft-contact",
+            "solved to round-off the two forces cancel",
+            "default",
+            "overlap",
+            "centre_moved",
+            {"tolerance": 0.0},
+            {"depth": 0.01, "ratio": 100.0},
+        ),
+        Experiment(
+            "position-correction-spring",
+            "overdamped, the shipped spring throws nothing; solving further does nothing",
+            "default",
+            "position_correction",
+            "launched",
+            {"solref": (0.02, 5.0)},
+            idle=({"tolerance": 0.0},),
+        ),
+        Experiment(
+            "position-correction-spring",
+            "without the spring that carries loads nothing is thrown; without a margin it is",
+            "tuned",
+            "position_correction",
+            "launched",
+            {"kappa_plastic": 0.0},
+            idle=({"margin": 0.0},),
+        ),
+        *(
+            Experiment(
+                "pressed-box-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step takes nothing off the load",
+                profile,
+                "pressed_box",
+                "carried",
+                off,
+                {"load": 0.0},
+                idle=({"tolerance": 0.0},) if profile == "default" else ({"impratio": 1.0},),
+            )
+            for profile, off in (("default", hold | _NONE), ("tuned", _NONE))
+        ),
+        *(
+            Experiment(
+                "tilt-table-soft-contact",
+                "with rigid contacts and stiff friction it stays; a round cone or solving further does not do it",
+                "default",
+                "tilt_table",
+                metric,
+                hold,
+                params,
+                idle=({"cone": "elliptic"}, {"tolerance": 0.0}),
+            )
+            for metric, params in (
+                ("moved", dict[str, float]()),
+                ("moved", {"aspect": 1.0}),
+                ("edge_moved", {"ratio": 1.1}),
+            )
+        ),
+        Experiment(
+            "tilt-table-soft-friction",
+            "with friction that is damped as the normal the edge stays; a smaller share of softness does nothing",
+            "tuned",
+            "tilt_table",
+            "edge_moved",
+            {"solreffriction": None},
+            {"ratio": 1.1},
+            idle=({"impratio": 1e4}, {"margin": 0.0}),
+        ),
+    )

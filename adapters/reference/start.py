@@ -1,0 +1,43 @@
+"""What a scene must not ask of a profile that promises a solution: bodies that share space at the start."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from adapters.scene import Body, Box, Disc, Scene, Sphere
+
+
+def overlap_at_the_start(scene: Scene) -> str | None:
+    """Say which two bodies overlap at the start, by more than a rounded input explains; None if there are none.
+
+    Rigid bodies that share space have no motion that a law would give. The solver's certificate has a limit for it,
+    a share of the smaller half width; it is asked here, before a run that could only be INVALID.
+    """
+    from reference_solver.certificate import GATES
+    from reference_solver.certification.geometry import gap
+
+    limit = next(gate.limit for gate in GATES if gate.name == "start_overlap")
+    reach = [_reach(body) for body in scene.bodies]
+    place = np.array([body.pose[: scene.dimension] for body in scene.bodies])
+    for i, j in combinations(range(len(scene.bodies)), 2):
+        first, second = scene.bodies[i], scene.bodies[j]
+        if "free" not in (first.motion, second.motion):
+            continue
+        if float(np.linalg.norm(place[i] - place[j])) > reach[i] + reach[j]:
+            continue
+        poses = (np.array([first.pose]), np.array([second.pose]))
+        depth = -float(np.atleast_1d(gap(first.shape, poses[0], second.shape, poses[1]))[0])
+        if depth > limit * 0.5 * min(first.shape.smallest_size, second.shape.smallest_size):
+            return (
+                f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid bodies have no solution"
+            )
+    return None
+
+
+def _reach(body: Body) -> float:
+    """Distance of the outermost point from the centre [m]."""
+    if isinstance(body.shape, Box):
+        return float(np.linalg.norm(body.shape.half_extents))
+    return body.shape.radius if isinstance(body.shape, Disc | Sphere) else np.inf

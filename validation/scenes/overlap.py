@@ -1,0 +1,124 @@
+"""Two balls start inside each other in free space, moving side by side: an overlap is no spring.
+
+       ,---.---.    ^
+      (  o  ( ) o  ) | v    against each other 0 -> 0: no energy is in an overlap,
+       `---'---'    |       the common centre goes straight on,
+           |<>| depth       and the overlap does not grow
+
+Rigid bodies do not overlap, and no law of theirs says how fast they come apart; but nothing may be thrown. Whoever
+takes an overlap out by a velocity leaves the bodies flying: a share beta of the depth taken out within a step is a
+speed beta depth/dt, which depends on the step and on nothing physical. The motion that they share changes nothing: by
+it a run knows which speeds are large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.geometry import overlap
+from validation.scenes.parts import along, at, ball, mass_of, states, upward
+
+RADIUS = 0.5
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the first ball at the origin, the second ``depth`` radii too near."""
+    p = params
+    near = (2.0 - p["depth"]) * RADIUS
+    ahead = upward(dimension, p["v"])
+    first = ball("first", dimension, p["mass"], RADIUS, 0.0)
+    second = ball("second", dimension, p["mass"] * p["ratio"], RADIUS, 0.0)
+    bodies = (at(first, dimension, along(dimension, 0.0), ahead), at(second, dimension, along(dimension, near), ahead))
+    pairs = (Pair(restitution=0.0, friction=0.0),)
+    return Scene("overlap", 1, dimension, bodies, pairs, (0.0,) * dimension, p["duration"], p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Nothing acts: energy and momentum stay nothing."""
+    return {"thrown": 0.0, "centre_moved": 0.0, "grown": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Largest relative speed, way of the common centre along the line, growth of the overlap, and what is left."""
+    d = scene.dimension
+    masses = np.array([body.mass for body in scene.bodies])
+    relative = trajectory.twist[:, 1, :d] - trajectory.twist[:, 0, :d]
+    centre = trajectory.pose[:, :, 0] @ masses / masses.sum()
+    shapes, pose = [body.shape for body in scene.bodies], trajectory.pose
+    depth = overlap(shapes[0], pose[:, 0], shapes[1], pose[:, 1])
+    return {
+        "thrown": (float(np.linalg.norm(relative, axis=1).max()), ""),
+        "centre_moved": (float(np.abs(centre - centre[0]).max()), ""),
+        "grown": (float(np.maximum(0.0, depth - depth[0]).max()), ""),
+        "left": (float(depth[-1] / depth[0]), ""),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Conservation laws hold at every step; what is left is shown, for no law says when it has to be gone."""
+    deep = scene.params["depth"] * RADIUS
+    source = "conservation of energy and momentum: a contact that does not close does no work"
+    thrown = bounds.Bound(
+        bounds.ROUND_OFF * (deep / dt + scene.params["v"]),
+        "exact law at every dt: round-off of the speed that takes the depth out in a step",
+    )
+    reach = RADIUS + scene.params["v"] * scene.duration
+    placed = bounds.Bound(bounds.ROUND_OFF * reach, "exact law at every dt: round-off of places")
+    return [
+        thrown.check("thrown", "m/s", truth["thrown"], source),
+        placed.check("centre_moved", "m", truth["centre_moved"], source),
+        placed.check("grown", "m", truth["grown"], "bodies that overlap are not pulled together"),
+        Check("left", "1", None, None, "shown: no law of rigid bodies says how fast an overlap has to go", ""),
+    ]
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Speed that the overlap has given, over the speed that takes it out in one step."""
+    value, reason = found["thrown"]
+    return (None, reason) if value is None else (value * dt / (scene.params["depth"] * RADIUS), "")
+
+
+SCENE = CanonicalScene(
+    name="overlap",
+    version=1,
+    title="Two balls that start inside each other",
+    figure=__doc__ or "",
+    law="no speed comes of an overlap, the common centre stays; an overlap is no spring",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("depth", 0.5, "radii", "of the overlap at the start", 0.0, 1.0, positive=True),
+        Parameter("ratio", 1.0, "1", "mass of the second ball over that of the first", 1e-6, 1e6),
+        Parameter("v", 1.0, "m/s", "of both, across the line between them", 0.0, 1e3, positive=True),
+        mass_of("the first ball"),
+        Parameter("duration", 1.0, "s", "of the run", 0.1, 1e3),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    quick=(Variation({}), Variation({"depth": 0.01, "ratio": 100.0})),
+    full=tuple(Variation({"depth": a, "ratio": r}) for a in (1e-3, 0.01, 0.1, 0.5) for r in (1.0, 100.0)),
+    planted=({},),
+    primary=Primary(
+        "thrown",
+        "depth/dt",
+        "largest relative speed, over the speed that takes the overlap out in one step",
+        "the share of an overlap that an engine turns into motion, in the unit in which it does",
+        lambda dt: [{}],
+        error,
+        "the two balls coming apart",
+    ),
+    words={
+        "thrown": "throws them apart with {value}",
+        "centre_moved": "moves their common centre by {value}",
+        "grown": "lets the overlap grow by {value}",
+        "left": "leaves {value} of the overlap",
+    },
+)

@@ -1,0 +1,84 @@
+"""A box slides over plates that lie flush side by side: seams are not there.
+
+       +---+  v
+       |   | -->              stops after d = v^2/(2 mu g), as on one face:
+    +--+---+-+------+------+  no hop, no turn, no bump at any seam
+    +--------+------+------+
+
+Contacts of two flush faces with one box are those of one face. Whoever finds each plate's contacts by itself meets the
+sides of plates that lie inside the floor: edges that are not there stop or lift what slides over them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from adapters.scene import Body, Box, Pair, Scene
+from validation import sliding
+from validation.canonical import CanonicalScene, Check, Parameter, Params, Primary, Variation
+from validation.scenes.parts import along, mass_of, pose_at, standard_gravity, states, upward
+
+HEIGHT, THICKNESS = 0.5, 0.5
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: plates as long as ``plate``, the box in the middle of the first."""
+    p = params
+    width, half = p["aspect"] * HEIGHT, 0.5 * p["plate"]
+    # Far enough for whoever stops too late: half as much again, and the box itself.
+    count = math.ceil((half + 1.5 * sliding.way(p) + width) / p["plate"])
+    plates = tuple(_plate(f"plate{k + 1}", dimension, p["plate"], k * p["plate"]) for k in range(count))
+    box = sliding.launched(dimension, p, width, HEIGHT)
+    pairs = (Pair(restitution=0.0, friction=p["mu"]),)
+    bodies, gravity = (*plates, box), upward(dimension, -p["g"])
+    return Scene("seam", 1, dimension, bodies, pairs, gravity, sliding.lasts(p), p)
+
+
+def _plate(name: str, dimension: int, length: float, x: float) -> Body:
+    """A fixed plate whose upper face is level 0, as wide as it takes."""
+    half = (0.5 * length, *(2.0,) * (dimension - 2), 0.5 * THICKNESS)
+    return Body(name, Box(half), pose=pose_at(dimension, along(dimension, x, -0.5 * THICKNESS)), motion="fixed")
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """Those of a box on one face: a seam earns nothing."""
+    return sliding.checks(scene, dt, truth, abs(scene.bodies[-2].pose[0]))
+
+
+SCENE = CanonicalScene(
+    name="seam",
+    version=1,
+    title="Box that slides over the seams of flush plates",
+    figure=__doc__ or "",
+    law="d = v^2/(2 mu g), straight on and level, as on one face",
+    dimensions=(2, 3),
+    parameters=(
+        Parameter("v", 3.0, "m/s", "speed at the start", 0.0, 1e2, positive=True),
+        Parameter("mu", 0.4, "1", "friction; below aspect, so that the box does not tip", 0.0, 1.0, positive=True),
+        Parameter("plate", 1.0, "m", "length of a plate; the shorter, the more seams", 0.01, 1e2, positive=True),
+        Parameter("aspect", 1.5, "1", "width over height of the box", 1.1, 20.0),
+        standard_gravity(),
+        mass_of("the box"),
+    ),
+    make=make,
+    exact=sliding.exact,
+    measure=sliding.measure,
+    rule=checks,
+    sampling=states,
+    track=sliding.track,
+    quick=(Variation({}),),
+    full=tuple(Variation({"plate": a, "v": v}) for a in (0.3, 1.0) for v in (1.0, 3.0, 10.0)),
+    planted=({},),
+    primary=Primary(
+        "stopping error",
+        "way",
+        "distance of the place where it stops from where it should, over the way that it slides",
+        "an edge that is not there stops what slides over it, or throws it on",
+        lambda dt: [{}],
+        sliding.error,
+        "the sliding box",
+        0.1,
+        0.25,
+    ),
+    words=sliding.WORDS,
+)
