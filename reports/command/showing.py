@@ -278,7 +278,7 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
     if better:
         text = "; ".join(f"{c.name} {c.before} -> {c.after} ({_why(c)})" for c in differing)
         lines.append(("cure", f"profile {better} passes this row. It differs in: {text}."))
-        lines.append(("", how_measured(row["engine"], row["scene"], row["profile"], better)))
+        lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     lines.append(("again", reproduce(row["slot"])))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
