@@ -5,6 +5,7 @@ One module per group of subcommands; importing it registers them.
 
 from reports.command import (
     accepting,
+    asking,
     benching,
     certifying,
     comparing,
@@ -22,6 +23,7 @@ from reports.command.group import main
 
 __all__ = [
     "accepting",
+    "asking",
     "benching",
     "certifying",
     "comparing",
