@@ -26,6 +26,7 @@ from reports.terminal import terminal
 from reports.wording import LABELS, mark_of, measured, missing_text, number, params_text, quantity, reproduce, row_id
 from validation.bench import reading
 from validation.cells import Observation
+from validation.nulls import skill_of
 from validation.rows import rows_of
 from validation.store import Store
 
@@ -204,9 +205,20 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
             {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
             for c in differing
         ]
+        worth, against = skill_of(found)
         cure = {"profile": better, "changes": plain, "paste": paste}
         click.echo(
-            json.dumps({**found, "id": row_id(found), "command": reproduce(found["slot"]), "cure": cure}, indent=1)
+            json.dumps(
+                {
+                    **found,
+                    "id": row_id(found),
+                    "command": reproduce(found["slot"]),
+                    "cure": cure,
+                    "skill": worth,
+                    "skill_against": against,
+                },
+                indent=1,
+            )
         )
         return
     _print_explanation(found, better, paste, differing, terminal())
@@ -251,6 +263,14 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
     return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
 
 
+def skill_text(row: Plain) -> str:
+    """``0.98: 1 - error/error of the best null, which is: did nothing``; or why there is none."""
+    value, said = skill_of(row)
+    if value is None:
+        return f"none: {said}"
+    return f"{number(value, 4)} = 1 - error/error of the best answer without an engine, {said}"
+
+
 def _why(change: Change) -> str:
     return f"{change.because}; {change.role}" if change.role else change.because
 
@@ -273,6 +293,7 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
+        ("skill", skill_text(row)),
         ("standing", row["reason"] or "-"),
     ]
     if better:

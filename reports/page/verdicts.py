@@ -14,6 +14,7 @@ from reports.matrix import UNJUDGED, Field, Matrix
 from reports.page.source import Source
 from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
+from validation.nulls import skill_of
 
 Plain = Mapping[str, Any]
 #: Mark -> how a cell of the page says it: a sign and a word, so that no meaning hangs on colour.
@@ -153,6 +154,7 @@ class Worst:
     ratio: str
     passing: str
     why: str
+    skill: str
     command: str
 
 
@@ -276,6 +278,7 @@ def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
         times(ratio),
         f"{sum(r['physics'] == 'pass' for r in judged)}/{len(judged)}" if judged else "",
         why_anchor(mark, row["engine"], row["profile"], row["reason"]) if mark in LISTED and row["reason"] else "",
+        times(skill_of(row)[0]) if mark != "pass" else "",
         reproduce(row["slot"]),
     )
 
