@@ -11,20 +11,18 @@ is no fault of its engine. Where the map itself rounds coarser (far away), the m
 from __future__ import annotations
 
 import math
-import multiprocessing
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.foreign import checked_refusal, said_by
-from adapters.registry import load, load_engines_here
+from adapters.registry import load
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
+from validation.apart import Apart
 from validation.cells import Slot, settings_of
 from validation.posed import resolve
 
@@ -36,8 +34,6 @@ FACTOR = 10.0
 LAST_DIGITS = 64.0 * float(np.finfo(float).eps)
 #: How far a scene is moved, in its own sizes.
 FAR = 1e3
-#: Longest wait for one run [s].
-PATIENCE = 300.0
 
 Metrics = Mapping[str, Measured]
 
@@ -367,45 +363,13 @@ def unit_of(scene: Scene, shift: float) -> float:
 def compare(slot: Slot, relations: Sequence[str] = ()) -> list[Change]:
     """Ask one cell everything, in processes of their own: an engine that aborts costs one answer."""
     wanted = [each for each in RELATIONS if not relations or each.name in relations]
-    asker = _Asker()
-    try:
-        return _changes(slot, wanted, asker)
-    finally:
-        asker.stop()
+    with Apart() as apart:
+        return _changes(slot, wanted, apart)
 
 
-class _Asker:
-    """A process that runs cells; a fresh one where it is asked for or the last one died."""
-
-    def __init__(self) -> None:
-        self._pool: ProcessPoolExecutor | None = None
-
-    def ask(self, slot: Slot, relation: str, moves: float = 0.0, fresh: bool = False) -> Metrics | str:
-        """Metrics, or why there are none."""
-        if fresh:
-            self.stop()
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=load_engines_here)
-        answer: Future[Metrics | str] = self._pool.submit(measured, slot, relation, moves)
-        try:
-            return answer.result(PATIENCE)
-        except (BrokenProcessPool, TimeoutError) as error:
-            self.stop()
-            return f"no answer: {type(error).__name__}"
-
-    def stop(self) -> None:
-        """End the process."""
-        if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
-                process.kill()
-            self._pool.shutdown(wait=False, cancel_futures=True)
-            self._pool = None
-
-
-def _changes(slot: Slot, wanted: Sequence[Relation], asker: _Asker) -> list[Change]:
+def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Change]:
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    base = asker.ask(slot, "again")
+    base = apart.ask(measured, slot, "again")
     if isinstance(base, str):
         return [Change(each.name, refused=base) for each in wanted]
     floors: dict[float, Mapping[str, float]] = {}
@@ -417,8 +381,10 @@ def _changes(slot: Slot, wanted: Sequence[Relation], asker: _Asker) -> list[Chan
             continue
         unit = unit_of(scene, posed.shift)
         if unit not in floors:
-            floors[unit] = floor(base, [asker.ask(slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)])
-        answer = asker.ask(slot, relation.name, fresh=relation.fresh)
+            floors[unit] = floor(
+                base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
+            )
+        answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
         found.append(judged(relation.name, base, answer, floors[unit]))
     return found
 

@@ -19,6 +19,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.engine import Array
 from adapters.scene import Scene
@@ -93,7 +94,11 @@ def _blank(scene: Scene, dt: float) -> tuple[Array, Array, Array]:
     """Times, and poses and twists that are those of the start."""
     count = step_count(scene.duration, dt) + 1
     pose, twist = np.array([b.pose for b in scene.bodies]), np.array([b.twist for b in scene.bodies])
-    return np.arange(count) * dt, np.repeat(pose[None], count, axis=0), np.repeat(twist[None], count, axis=0)
+    return (
+        np.asarray(np.arange(count) * dt, dtype=float),
+        np.repeat(pose[None], count, axis=0),
+        np.repeat(twist[None], count, axis=0),
+    )
 
 
 def _loads(scene: Scene) -> Array:
@@ -138,7 +143,7 @@ def _first_touch(scene: Scene, pose: Array, i: int, j: int, at: int, close: floa
     return len(pose)
 
 
-def _join(members: Array, mass: Array, loads: Array, twist: Array, d: int) -> None:
+def _join(members: NDArray[np.int64], mass: Array, loads: Array, twist: Array, d: int) -> None:
     """Bodies that move on as one: with their common momentum and load, or with what is fixed among them."""
     held = members[~np.isfinite(mass[members])]
     if len(held):

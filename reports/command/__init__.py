@@ -19,6 +19,7 @@ from reports.command import (
     running,
     showing,
     tuning,
+    weighing,
 )
 from reports.command.group import main
 
@@ -39,4 +40,5 @@ __all__ = [
     "running",
     "showing",
     "tuning",
+    "weighing",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import click
 from rich.table import Table
@@ -28,7 +29,7 @@ def nulls(scenes: tuple[str, ...], param: tuple[str, ...], dim: tuple[int, ...],
 
     An engine's skill in a check is 1 - error/error of the best of them; `explain` and the report say it of a row.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for scene in dict.fromkeys(scene.name for pattern in scenes or ("*",) for scene in matching(pattern)):
         (canonical,) = matching(scene)
         params = dict(map(parameter, param)) or dict(canonical.representative)
