@@ -21,9 +21,16 @@ PATIENCE = 300.0
 
 
 class Apart:
-    """A process that answers one question at a time; use as a context, so that it ends."""
+    """A process that answers one question at a time; use as a context, so that it ends.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    patience
+        Longest wait for an answer [s].
+    """
+
+    def __init__(self, patience: float = PATIENCE) -> None:
+        self.patience = patience
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> Apart:
@@ -41,7 +48,7 @@ class Apart:
             self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=load_engines_here)
         answer: Future[T] = self._pool.submit(question, *args)
         try:
-            return answer.result(PATIENCE)
+            return answer.result(self.patience)
         except (BrokenProcessPool, TimeoutError) as error:
             self.stop()
             return f"no answer: {type(error).__name__}"

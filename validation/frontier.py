@@ -12,19 +12,27 @@ logarithmic scale. All searches go on side by side: every round asks one cell of
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from types import TracebackType
 
-from adapters.registry import find
+from adapters.foreign import checked_refusal, said_by
+from adapters.registry import find, load
+from adapters.stepping import posed_for, run
+from validation.apart import Apart
 from validation.canonical import Frontier
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Outcome, Slot, format_dt
+from validation.cells import Observation, Outcome, Slot, format_dt, settings_of
 from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
-from validation.switching import observe
 
 #: Ratio of the two ends of a bracket at which a search stops, quick and full.
 QUICK_RATIO, FULL_RATIO = 1.3, 1.03
+#: Longest wait for one cell [s]: an engine that needs longer no longer simulates it.
+LONGEST = 120.0
 #: What became of a cell that is no answer: the word for it.
 FATES = {
     Outcome.DIVERGED: "NaN or exploded",
@@ -119,7 +127,10 @@ def search(
     found: Sequence[Bracket], ratio: float, jobs: int = 1, look: Observe | None = None
 ) -> Iterator[tuple[int, Sequence[Bracket]]]:
     """Close in on all brackets; yields after each round how many are still open, and all of them."""
-    look = look or (lambda slots: observe(slots, jobs))
+    if look is None:
+        with Looking(jobs) as looking:
+            yield from search(found, ratio, jobs, looking.look)
+        return
     while True:
         asked = [(bracket, value) for bracket in found if (value := following(bracket, ratio)) is not None]
         yield len(asked), found
@@ -129,6 +140,64 @@ def search(
         answers = look(list(slots.values()))
         for bracket, value in asked:
             tell(bracket, value, answers[slots[id(bracket)]])
+
+
+class Looking:
+    """Runs cells without what a verdict needs (receipts, certificates): here only what becomes of a scene is asked.
+
+    Each of ``jobs`` processes answers one cell at a time; one that hangs or dies costs its cell.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        self._aparts = [Apart(LONGEST) for _ in range(jobs)]
+
+    def __enter__(self) -> Looking:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for apart in self._aparts:
+            apart.stop()
+
+    def look(self, slots: Sequence[Slot]) -> dict[Slot, Observation]:
+        """Observations of cells, each once."""
+        waiting, found = deque(dict.fromkeys(slots)), {}
+
+        def work(apart: Apart) -> None:
+            while waiting:
+                with suppress(IndexError):  # another one was faster
+                    slot = waiting.popleft()
+                    found[slot] = _looked(slot, apart)
+
+        with ThreadPoolExecutor(len(self._aparts)) as threads:
+            list(threads.map(work, self._aparts))
+        return found
+
+
+def _looked(slot: Slot, apart: Apart) -> Observation:
+    answer = apart.ask(run_only, slot)
+    if isinstance(answer, str):
+        lost = Outcome.TIMED_OUT if "Timeout" in answer else Outcome.CRASHED
+        return Observation(slot, "", 0, "", lost, answer)
+    return answer
+
+
+def run_only(slot: Slot) -> Observation:
+    """Run and measure a cell in this process, and nothing else."""
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    blank = Observation(slot, "", canonical.version, find(slot.engine).version, Outcome.CRASHED)
+    try:
+        engine = load(slot.engine)
+        refusal = checked_refusal(engine.refuses(posed_for(engine, scene), slot.profile))
+        if refusal:
+            return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal)
+        settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
+        found = run(engine, scene, slot.dt, settings, canonical.sampling(scene))
+        if found.finish == "diverged":
+            return replace(blank, outcome=Outcome.DIVERGED, reason=found.reason)
+        return replace(blank, outcome=Outcome.OK, metrics=dict(canonical.measure(scene, found)))
+    except BaseException as error:  # whatever an engine raises costs this cell only
+        return replace(blank, reason=said_by(error))
 
 
 def following(bracket: Bracket, ratio: float) -> float | None:
