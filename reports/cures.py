@@ -101,20 +101,25 @@ def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int],
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
     """What was measured to mend a scene in each of ``dimensions``, with this release, from the committed table."""
     listed = [cures_of(engine).get((scene, d)) for d in dimensions]
-    return [cure_text(c) for c in listed if c is not None and (c.version, c.shipped) == (version, shipped)]
+    known = [c for c in listed if c is not None and (c.version, c.shipped) == (version, shipped)]
+    if len(known) == 2 and known[0].helps and known[0].changes == known[1].changes:  # one that is worse is told
+        worse = max(known, key=lambda cure: (cure.left, cure.times or 0.0))
+        return [cure_text(worse, "2-D and 3-D")]
+    return [cure_text(cure) for cure in known]
 
 
-def cure_text(cure: Cure) -> str:
-    """``2-D by cone=elliptic with solimp=..., creep 0.016 -> 1e-6 m/s (truth 0), at 1.7 times the cost``."""
+def cure_text(cure: Cure, where: str = "") -> str:
+    """``2-D by cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
+    where = where or f"{cure.dimension}-D"
     if not cure.helps:
-        return f"{cure.dimension}-D: none of {cure.tried} changes of its settings that were tried helps"
+        return f"{where}: none of {cure.tried} changes of its settings that were tried helps"
     settings = ", ".join(f"{name}={setting_text(value)}" for name, value in cure.changes.items())
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
     numbers = f"{cure.metric}{f' at {at}' if at else ''} {number(cure.before, 3)} -> {number(cure.after, 3)}{unit}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
     cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
-    return f"{cure.dimension}-D by {settings}: {numbers}{left}{cost}"
+    return f"{where} by {settings}: {numbers}{left}{cost}"
 
 
 def cure_paste(cure: Cure) -> str:

@@ -46,6 +46,15 @@ def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
     assert planar and decided_by("mujoco", "4.0.1", "pinch", [2, 3], "default", "tuned") == f"{planar} (2-D)"
 
 
+def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
+    both = {("pinch", 2): CURE, ("pinch", 3): replace(CURE, dimension=3, cost_after=4.5e-5)}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: both)
+    (text,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
+    assert text.startswith("2-D and 3-D by cone=elliptic") and text.endswith("at 3 times the cost")
+    both["pinch", 3] = replace(CURE, dimension=3, changes={"tolerance": 0.0})
+    assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 2
+
+
 def test_a_cure_is_pasted_with_the_values_of_its_own_cell():
     pytest.importorskip("mujoco")
     assert 'cone="elliptic"' in cure_paste(CURE) and 'solimp="0.9999 0.9999 0.001 0.5 1"' in cure_paste(CURE)
