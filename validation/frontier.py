@@ -28,11 +28,10 @@ from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, format_dt, settings_of
 from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
+from validation.workers import TIMEOUT
 
 #: Ratio of the two ends of a bracket at which a search stops, quick and full.
 QUICK_RATIO, FULL_RATIO = 1.3, 1.03
-#: Longest wait for one cell [s]: an engine that needs longer no longer simulates it.
-LONGEST = 120.0
 #: What became of a cell that is no answer: the word for it.
 FATES = {
     Outcome.DIVERGED: "NaN or exploded",
@@ -149,7 +148,7 @@ class Looking:
     """
 
     def __init__(self, jobs: int) -> None:
-        self._aparts = [Apart(LONGEST) for _ in range(jobs)]
+        self._aparts = [Apart(TIMEOUT) for _ in range(jobs)]
 
     def __enter__(self) -> Looking:
         return self
