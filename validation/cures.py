@@ -58,7 +58,8 @@ class Cure:
     failing, left, judged
         Checks of these cells that fail as shipped and with the cure, and all of them.
     metric, unit, params
-        The check that is told: of those that fail, the first that the scene states, where it is farthest off.
+        The check that is told: of those that the cure mends (or that fail, if it mends none), the first that the scene
+        states, where it was farthest off.
     truth, tolerance, before, after
         Its numbers; a value is None where the engine gave no answer.
     changes
@@ -256,7 +257,7 @@ def _smallest(trials: _Trials, engine: str, whole: _Found) -> _Found:
 def _cure(
     engine: str, trials: _Trials, failing: Sequence[Reading], best: _Found | None, singles: Sequence[_Found]
 ) -> Cure:
-    told = max((each for each in failing if each.check.metric == failing[0].check.metric), key=lambda e: e.badness)
+    told = _told(trials, failing, best)
     place = trials.slots.index(told.slot)
     changes: Changes = best.changes[place] if best else {}
     if best and not changes:  # what is told was mended by nothing; tell the values of a cell in which something is set
@@ -273,6 +274,17 @@ def _cure(
         len(trials.start), check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value,
         after.value, changes, _profile_of(engine, trials.slots, best), others, trials.tried, before_cost, after_cost,
     )  # fmt: skip
+
+
+def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
+    """The check that stands for a cure: the first that the scene states of those it mends, where it was worst."""
+    mended = []
+    for slot, changes in zip(trials.slots, best.changes if best else (), strict=False):
+        after = {each.check.metric: each for each in trials.seen[switched(slot, changes)]}
+        mended += [each for each in failing if each.slot == slot and after[each.check.metric].badness <= 1.0]
+    shown = mended or failing
+    first = next(each.check.metric for each in failing if each.check.metric in {one.check.metric for one in shown})
+    return max((each for each in shown if each.check.metric == first), key=lambda each: each.badness)
 
 
 def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:

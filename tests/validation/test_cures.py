@@ -82,7 +82,7 @@ class Toy:
         self.off = off
 
 
-def trials_of(monkeypatch, off, candidates, whole=None):
+def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
     """Trials on one cell of which the first checks are off by ``off(settings)`` tolerances, the others by 0."""
     from validation.cells import Observation, Outcome, Slot
 
@@ -108,7 +108,8 @@ def trials_of(monkeypatch, off, candidates, whole=None):
     monkeypatch.setattr(cures, "changes_of", lambda slot, name: dict(whole or {}))
     trials = _Trials([slot], 1)
     failing = sum(each.badness > 1.0 for each in trials.start)
-    return _best("toy", trials, [slot], failing)
+    found = _best("toy", trials, [slot], failing)
+    return (found, trials) if handed else found
 
 
 def test_one_setting_that_mends_all_is_found_and_its_equals_are_named(monkeypatch):
@@ -147,6 +148,17 @@ def test_a_profile_is_cut_down_to_what_cannot_be_left_out(monkeypatch):
 def test_where_nothing_helps_nothing_is_said_to(monkeypatch):
     best, singles = trials_of(monkeypatch, lambda s: (9.0, 9.0), {"a": (1, 2)}, {"b": 1})
     assert best is None and singles == []
+
+
+def test_what_is_told_is_a_check_that_the_cure_mends(monkeypatch):
+    def off(s):
+        return (8.0, 0.5) if s.get("b") else (9.0, 5.0)  # the first check stays wrong
+
+    (best, _), trials = trials_of(monkeypatch, off, {"b": (1,)}, handed=True)
+    failing = [each for each in trials.start if each.badness > 1.0]
+    assert [each.check.metric for each in failing] == ["creep", "turned"]
+    assert cures._told(trials, failing, best).check.metric == "turned"
+    assert cures._told(trials, failing, None).check.metric == "creep"
 
 
 def test_a_real_engine_is_cured_by_what_its_sheet_says():
