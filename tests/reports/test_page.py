@@ -21,6 +21,7 @@ from reports.page import Source, as_data, load_source, policy, render
 from reports.page.choosing import choices, cures
 from reports.page.conclusions import findings, sentences
 from reports.page.explorer import explorer
+from reports.page.families import families, sentence
 from reports.page.replay import replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import slug
@@ -212,6 +213,34 @@ def test_findings_hold_every_failing_value_once(page_source):
     failing = [r for r in page_source.rows if r["physics"] == "fail" or r["outcome"] == "crashed"]
     assert sum(count for _, count, _ in findings(page_source)) == len(failing)
     assert sum(f.count for _, _, families in findings(page_source) for f in families) == len(failing)
+
+
+# ---- families ----
+
+
+def test_every_scene_stands_in_one_family_and_unknown_ones_in_the_last(page_source):
+    found = families(page_source)
+    assert sorted(scene for family in found for scene in family.scenes) == sorted(page_source.scenes)
+    assert found[0].name == "rebound" and found[0].scenes == ("impact", "bounce") and found[-1].name == "others"
+    lines = [(line.scene, line.kind) for family in found for line in family.lines if "swept" not in line.kind]
+    assert sorted(lines) == sorted((scene, f"{dimension}-D") for scene, dimension in page_source.lines)
+
+
+def test_a_familys_marks_count_the_rows_of_its_scenes(page_source):
+    (rebound, *_) = families(page_source)
+    column = page_source.columns.index(("bullet", "default"))
+    judged = [
+        row for row in page_source.of(engine="bullet", profile="default")
+        if row["scene"] in rebound.scenes and row["iterations"] is None and row["physics"]
+    ]  # fmt: skip
+    failing = sum(row["physics"] == "fail" for row in judged)
+    assert failing and rebound.marks[column].text == f"{failing}/{len(judged)}"
+
+
+def test_the_sentence_of_a_family_changes_when_the_physics_of_the_data_flips():
+    base, flipped = (sentence(golden(name), ["bounce"]) for name in ("base", "flip"))
+    assert "a profile that passes everything" in base and "has none for" not in base
+    assert "has none for bounce" in flipped
 
 
 # ---- choice, cures, explorer ----
