@@ -123,7 +123,7 @@ def test_one_setting_that_mends_all_is_found_and_its_equals_are_named(monkeypatc
 
 def test_what_breaks_a_check_that_passed_is_no_cure(monkeypatch):
     def off(s):
-        return (0.5, 0.5, 7.0) if s.get("a") else (9.0, 0.5) if s.get("b") else (9.0, 9.0)
+        return (0.0, 0.0, 1.5) if s.get("a") else (9.0, 0.5) if s.get("b") else (9.0, 9.0)
 
     best, _ = trials_of(monkeypatch, off, {"a": (1,), "b": (1,)})
     assert dict(best.changes[0]) == {"b": 1} and best.failing == 1

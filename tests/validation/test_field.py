@@ -41,7 +41,8 @@ def observed(slot, value):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "says"), [(3.0, 0.5, CURED), (3.0, 2.0, REPRODUCED), (0.5, 0.5, NOT_SEEN), (0.5, 3.0, NOT_SEEN)]
+    ("before", "after", "says"),
+    [(3.0, 0.5, CURED), (3.0, 2.0, REPRODUCED), (1.1, 1.1, REPRODUCED), (0.5, 0.5, NOT_SEEN), (0.5, 3.0, NOT_SEEN)],
 )
 def test_what_is_said_follows_from_the_check_with_and_without_the_cure(monkeypatch, before, after, says):
     from validation import field

@@ -1,11 +1,14 @@
 """What must not matter: maps that come back as they went, and engines of which each kind of dependence is seen."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from adapters.trajectory import Trajectory
+from adapters.engine import Contacts
+from adapters.scene import Body, Box, Scene
+from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.invariance import RELATIONS, Change, compare, floor, judged, measured, unit_of
@@ -57,6 +60,54 @@ def test_a_map_of_space_keeps_distances_from_every_face(name):
                 after = np.dot(moved.shape.normal, other.pose[:3]) - moved.shape.offset
                 assert after == pytest.approx(before, abs=1e-12)
     assert math.hypot(*posed.gravity) == pytest.approx(math.hypot(*scene.gravity))
+
+
+def corner(pose, twist, d, own):
+    """Place and velocity of a point ``own`` that is fixed in a body, off its axes."""
+    if d == 2:
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        arm = np.array([[c, -s], [s, c]]) @ own
+        return pose[:2] + arm, twist[:2] + twist[2] * np.array([-arm[1], arm[0]])
+    w, v = pose[3], pose[4:]
+    arm = own + 2.0 * np.cross(v, np.cross(v, own) + w * own)
+    return pose[:3] + arm, twist[:3] + np.cross(twist[3:], arm)
+
+
+@pytest.mark.parametrize("name", ["turned 33", "mirrored"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_points_of_turning_bodies_move_as_the_world_was_mapped(name, dimension):
+    """A wrong sign of a spin that goes forth and back would cancel: here it does not."""
+    if dimension == 2:
+        body = Body("box", Box((0.5, 0.25)), 1.0, 0.1, (1.0, 2.0, 0.7), (0.5, -0.25, 3.0))
+    else:
+        half = 0.35
+        attitude = (math.cos(half), 0.6 * math.sin(half), 0.0, 0.8 * math.sin(half))
+        body = Body("box", Box((0.5, 0.25, 0.1)), 1.0, (0.1, 0.1, 0.1), (1.0, 2.0, 3.0, *attitude),
+                    (0.5, -0.25, 1.0, 3.0, -2.0, 1.0))  # fmt: skip
+    posed = BY_NAME[name].pose(Scene("toy", 1, dimension, (body,), (), (0.0,) * dimension, 1.0))
+    if isinstance(posed, str):
+        assert dimension == 2 and name == "turned 33"
+        return
+    place, speed = corner(np.array(body.pose), np.array(body.twist), dimension, np.array([0.3, 0.2, 0.1][:dimension]))
+    mapped = posed.scene.bodies[0]
+    own = np.array([-0.3 if name == "mirrored" else 0.3, 0.2, 0.1][:dimension])
+    angle = math.radians(33.0)
+    world = np.diag([-1.0, 1.0, 1.0][:dimension]) if name == "mirrored" else np.array(
+        [[math.cos(angle), -math.sin(angle), 0.0], [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]]
+    )  # fmt: skip
+    found = corner(np.array(mapped.pose), np.array(mapped.twist), dimension, own)
+    assert found[0] == pytest.approx(world @ place) and found[1] == pytest.approx(world @ speed)
+
+
+def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
+    scene = CATALOGUE["head_on"].scene(2)
+    posed = BY_NAME["renumbered"].pose(scene)
+    rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (1.0, 0.0), (2.0, 0.5), -1e-3)], 2)
+    record = ContactRecord(np.array([0]), np.array([0, 1]), rows)
+    found = posed.back(replace(start_of(posed.scene)[0], contacts=record)).contacts.rows
+    last = len(scene.bodies) - 1
+    assert (found.a[0], found.b[0]) == (last - 1, last)
+    assert found.normal[0].tolist() == [-1.0, 0.0] and found.impulse[0].tolist() == [-2.0, -0.5]
 
 
 BASE = {"speed": (2.0, ""), "count": (0.0, ""), "absent": (None, "why")}
