@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 
-.PHONY: run test soak lint setup publish releases tune mutants mutants-check detection clean
+.PHONY: run test soak lint setup publish releases tune cures mutants mutants-check detection clean
 
 setup: $(STAMP)
 
@@ -73,6 +73,10 @@ releases: $(STAMP)
 tune: $(STAMP)
 	@test -n "$(ENGINE)" || { echo "which engine? make tune ENGINE=bullet"; exit 2; }
 	$(BIN)/crosscheck tune $(ENGINE) --jobs 2
+
+# What mends each engine as shipped, scene by scene, and at what cost: adapters/<engine>/cures.csv; minutes of CPU each.
+cures: $(STAMP)
+	for engine in chipmunk mujoco bullet; do $(BIN)/crosscheck cure $$engine --keep || exit 2; done
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

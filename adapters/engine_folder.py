@@ -11,6 +11,7 @@
         experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
         findings/         families.toml and members.csv (`validation.findings`)
         decisive.csv      which settings of its cures matter, as measured (`validation.decisive`)
+        cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.cures`)
 
 All but the first may be missing; an entry point that names a plain module brings an adapter only. Ours stand in
 ``adapters/<engine>/`` and are found in the same way.
@@ -42,6 +43,7 @@ from adapters.plain import one_line
 from adapters.scene import Scene
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE = "laws", "experiments", "findings", "decisive.csv"
+CURES = "cures.csv"
 
 
 def located(module: str) -> Path | None:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from reports.cures import decided_by
+from reports.cures import decided_by, told_cures
 from reports.findings import severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
@@ -154,22 +154,28 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
     others = {name: group for name, group in own.items() if name != profile}
     good = [name for name, group in others.items() if not _failing(group)]
+    failed = _failing(own[profile])
+    row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
+    listed = told_cures(row["engine"], row["engine_version"], row["scene"], profile, dimensions)
     if good:
-        row = own[profile][0]
-        which = (row["engine"], row["engine_version"], row["scene"], profile)
-        by = {name: decided_by(*which, name) for name in good}
+        which = (row["engine"], row["engine_version"], row["scene"], dimensions, profile)
+        by = {name: decided_by(*which, name) for name in good} if not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
-        return ", ".join([f"{' or '.join(good)} cures it", *said])
+        return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
+    unlisted = [] if listed else [f"crosscheck cure {row['engine']} {row['scene']} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):
-        return "no other profile does better"
+        return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])
-    return f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
+    nearer = f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
+    return "; ".join([nearer, *listed, *unlisted])
 
 
 # ---- in words ----
 
+#: Kinds of metric of which people ask how fast: that it should be nothing at all is said of them.
+RATES = ("creep",)
 #: What is smaller than this share of the truth is nothing, in words.
 NOTHING = 1e-6
 
@@ -249,6 +255,8 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
     nothing = bool(row["truth"]) and abs(row["value"]) < NOTHING * abs(row["truth"])
     value = "0" if nothing else measured(row, _digits(row))
     text = "never settles" if value == NEVER else spoken(row["scene"], kind, value)
+    if row["truth"] == 0.0 and kind in RATES and row["value"]:
+        text += " instead of 0"
     if row["truth"] and text != SILENT:
         text += f" instead of {quantity(row['truth'], row['unit'], _digits(row))}"
     where = params_text(row["slot"]["params"])

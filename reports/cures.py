@@ -8,10 +8,14 @@ from typing import Any
 
 from adapters import registry
 from adapters.engine_folder import belongs_of
-from reports.wording import params_text
-from validation.cells import Observation
+from reports.wording import number, params_text
+from validation.cells import Observation, Slot
+from validation.cells import settings_of as settings_in
+from validation.cures import Cure, cures_of
 from validation.decisive import ALONE, COMPLETES, NEEDED, decisive
+from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.switching import switched
 
 #: What a setting's part in a cure is called.
 ROLES = {
@@ -70,7 +74,7 @@ def changes(
     """Settings that profile ``after`` sets otherwise than ``before``, on this scene."""
     old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
     new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
-    measured = decisive(engine, scene, before, after)
+    measured = decisive(engine, scene, dimension, before, after)
     roles = {part.setting: ROLES[part.decides] for part in measured.parts} if measured else {}
     belongs = belongs_of(engine)
     found = []
@@ -82,15 +86,57 @@ def changes(
     return found
 
 
-def decided_by(engine: str, version: str, scene: str, before: str, after: str) -> str:
-    """Settings that decide a cure, as `validation.decisive` measured them; empty if nobody did with this release."""
-    measured = decisive(engine, scene, before, after)
-    return measured.text if measured is not None and measured.version == version else ""
+def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
+    """Settings that decide a cure, as `validation.decisive` measured them; empty if nobody did with this release.
+
+    What was measured in one dimension is said with it where rows of another fail as well.
+    """
+    measured = {d: decisive(engine, scene, d, before, after) for d in dimensions}
+    texts = {d: m.text for d, m in measured.items() if m is not None and m.version == version}
+    if len(texts) == len(dimensions) and len(set(texts.values())) == 1:
+        return texts[dimensions[0]]
+    return ", ".join(f"{text} ({d}-D)" for d, text in texts.items())
 
 
-def how_measured(engine: str, scene: str, before: str, after: str) -> str:
+def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
+    """What was measured to mend a scene in each of ``dimensions``, with this release, from the committed table."""
+    listed = [cures_of(engine).get((scene, d)) for d in dimensions]
+    known = [c for c in listed if c is not None and (c.version, c.shipped) == (version, shipped)]
+    if len(known) == 2 and known[0].helps and known[0].changes == known[1].changes:  # one that is worse is told
+        worse = max(known, key=lambda cure: (cure.left, cure.times or 0.0))
+        return [cure_text(worse, "2-D and 3-D")]
+    return [cure_text(cure) for cure in known]
+
+
+def cure_text(cure: Cure, where: str = "") -> str:
+    """``2-D by cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
+    where = where or f"{cure.dimension}-D"
+    if not cure.helps:
+        return f"{where}: none of {cure.tried} changes of its settings that were tried helps"
+    settings = ", ".join(f"{name}={setting_text(value)}" for name, value in cure.changes.items())
+    unit = "" if cure.unit == "1" else f" {cure.unit}"
+    at = params_text(cure.params)
+    numbers = f"{cure.metric}{f' at {at}' if at else ''} {number(cure.before, 3)} -> {number(cure.after, 3)}{unit}"
+    left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
+    cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
+    return f"{where} by {settings}: {numbers}{left}{cost}"
+
+
+def cure_paste(cure: Cure) -> str:
+    """The settings of a cure as lines of the engine's own language; empty if its adapter knows none."""
+    loaded = registry.adapter(cure.engine)
+    if loaded is None or not cure.changes:
+        return ""
+    params = tuple(sorted(cure.params.items()))
+    slot = Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, QUICK_DT)
+    scene = resolve(cure.scene).scene(cure.dimension, dict(params))
+    settings = {s.name: s.value for s in settings_in(loaded, switched(slot, cure.changes), scene)}
+    return loaded.snippet(settings, list(cure.changes), scene, QUICK_DT)
+
+
+def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
     """One sentence: what decides a cure, on which checks and cells, with which release; or that nobody measured."""
-    measured = decisive(engine, scene, before, after)
+    measured = decisive(engine, scene, dimension, before, after)
     if measured is None:
         return "Which of these matters was not measured, setting by setting: they are the profiles' difference."
     cells = "; ".join(params_text(cell) or "defaults" for cell in measured.cells)

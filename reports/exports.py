@@ -55,20 +55,27 @@ def as_jsonl(rows: Sequence[Plain]) -> str:
 def as_csv(rows: Sequence[Plain]) -> str:
     """Flat table: parameters as ``e=0.8 height=1``, lists joined by ``;``."""
     stream = StringIO()
-    names = [name for name in Row.__dataclass_fields__ if name not in ("slot", "log")]
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(names)
+    writer.writerow(COLUMNS)
     for row in rows:
-        writer.writerow([cell(_flat(row[name])) for name in names])
+        flat = flattened(row).values()
+        writer.writerow([cell(repr(value) if isinstance(value, float) else value) for value in flat])
     return stream.getvalue()
+
+
+#: What a row has in a flat table.
+COLUMNS = tuple(name for name in Row.__dataclass_fields__ if name not in ("slot", "log"))
+
+
+def flattened(row: Plain) -> dict[str, Any]:
+    """A row without anything nested."""
+    return {name: _flat(row[name]) for name in COLUMNS}
 
 
 def _flat(value: Any) -> Any:
     if isinstance(value, Mapping):
         return " ".join(f"{k}={v:.12g}" for k, v in value.items())
-    if isinstance(value, list):
-        return ";".join(str(item) for item in value)
-    return repr(value) if isinstance(value, float) else value
+    return ";".join(str(item) for item in value) if isinstance(value, list) else value
 
 
 def as_markdown(rows: Sequence[Plain]) -> str:

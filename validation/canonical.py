@@ -102,6 +102,11 @@ class Track:
     position: Callable[[float], tuple[float, ...]]
 
 
+#: Families of scenes in the order in which they are shown; others follow by name.
+FAMILIES = (
+    "rebound", "materials", "grip and force", "stacks and statics", "friction", "turning", "many impacts", "hard",
+)  # fmt: skip
+
 Suite = Literal["quick", "full"]
 #: Parameters of a cell, as what differs from the scene's defaults.
 Params = Mapping[str, float]
@@ -261,6 +266,41 @@ class Restitution:
     heights: int = 0
 
 
+@dataclass(frozen=True)
+class Frontier:
+    """How far a scene can be driven until an engine gives up on it (`validation.frontier`).
+
+    Parameters
+    ----------
+    name, unit
+        What is driven, as people say it: ``impact speed`` in m/s.
+    axis
+        The scene's parameter, or ``dt``, or ``iterations``.
+    easy, hard, hardest
+        Values between which the quick search looks, and how far the full one goes. Hard may be below easy.
+    fate
+        ``fate(scene, metrics)`` of a cell that ran: how it ended, as one word, or empty if it survived. It asks whether
+        the engine still does what the scene is about, with room to be wrong, not whether it is exact.
+    survives
+        What surviving means, with its numbers.
+    params
+        Other parameters, as what differs from the scene's defaults.
+    whole
+        Whether only whole numbers make sense.
+    """
+
+    name: str
+    unit: str
+    axis: str
+    easy: float
+    hard: float
+    hardest: float
+    fate: Callable[[Scene, Mapping[str, Measured]], str]
+    survives: str
+    params: Params = field(default_factory=dict)
+    whole: bool = False
+
+
 @dataclass(frozen=True, kw_only=True)
 class CanonicalScene:
     """A scene of the catalogue; see the module's docstring.
@@ -289,6 +329,8 @@ class CanonicalScene:
         What has to be recorded.
     track
         Exact motion for the replay's ghost, or None.
+    family
+        What people would look for it under: one of `FAMILIES`, or a name of its own.
     quick, full
         Cells of the suites; without ``full`` both are the same.
     representative
@@ -305,6 +347,8 @@ class CanonicalScene:
         What several of its cells say together.
     searched
         What tuning runs of it.
+    frontiers
+        How far it can be driven.
     words
         What a value of a metric means, in words with ``{value}`` for it, where `metrics.WORDS` does not say so; names
         without their index. ``"rebound_ratio=0"`` is said of a value that is nothing.
@@ -329,6 +373,7 @@ class CanonicalScene:
     rule: Callable[[Scene, float, dict[str, float]], list[Check]]
     sampling: Callable[[Scene], Sampling]
     track: Callable[[Scene], Track | None] = lambda scene: None
+    family: str = "others"
     quick: tuple[Variation, ...] = (Variation({}),)
     full: tuple[Variation, ...] = ()
     representative: Params = field(default_factory=dict)
@@ -339,6 +384,7 @@ class CanonicalScene:
     smooth: tuple[str, ...] = ()
     studies: tuple[Study, ...] = ()
     searched: Searched | None = None
+    frontiers: tuple[Frontier, ...] = ()
     words: Mapping[str, str] = field(default_factory=dict)
     seen_as: Mapping[str, Callable[[Params, float], float]] = field(default_factory=dict)
     restitution: Restitution | None = None

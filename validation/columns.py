@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise, product
 
-from adapters.scene import Scene
+from adapters.scene import Box, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
@@ -77,6 +77,29 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 def sampling(scene: Scene) -> Sampling:
     """Every step; contacts over the last second."""
     return Sampling(1, max(0.0, scene.duration - WINDOW))
+
+
+#: A column stands while no body is off by half a side, overlaps by a tenth of one, or moves as if it had fallen one.
+OFF, DEEP = 0.5, 0.1
+STANDS = (
+    "stood: no body half a side off its place at the end, none a tenth of a side inside another, and the kinetic "
+    "energy of the last second below that of a fall by a side"
+)
+
+
+def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
+    """``exploded``, ``toppled``, ``sank``; empty of a column of boxes that stood, however inexactly."""
+    shape = scene.bodies[1].shape
+    side = 2.0 * (shape.half_extents[-1] if isinstance(shape, Box) else math.nan)
+    drift, overlap, energy = (found.get(name, (None, ""))[0] for name in ("drift", "penetration", "kinetic_energy"))
+    fall = sum(body.mass for body in scene.bodies[1:]) * math.hypot(*scene.gravity) * side
+    if energy is None or drift is None or overlap is None:
+        return "NaN"
+    if energy > fall:
+        return "exploded"
+    if drift > OFF * side:
+        return "toppled"
+    return "sank" if overlap > DEEP * side else ""
 
 
 def displacement(found: Mapping[str, Measured], size: float) -> Measured:

@@ -193,10 +193,10 @@ def measured_of(engine: str) -> tuple[Decisive, ...]:
         return ()
 
 
-def decisive(engine: str, scene: str, shipped: str, better: str) -> Decisive | None:
-    """What was measured of one cure; None where nothing was."""
-    wanted = (scene, shipped, better)
-    return next((e for e in measured_of(engine) if (e.scene, e.shipped, e.better) == wanted), None)
+def decisive(engine: str, scene: str, dimension: int, shipped: str, better: str) -> Decisive | None:
+    """What was measured of one cure in this dimension; None where nothing was."""
+    wanted = (scene, dimension, shipped, better)
+    return next((e for e in measured_of(engine) if (e.scene, e.dimension, e.shipped, e.better) == wanted), None)
 
 
 def read(path: Path) -> list[Decisive]:

@@ -5,9 +5,13 @@ One module per group of subcommands; importing it registers them.
 
 from reports.command import (
     accepting,
+    asking,
     benching,
     certifying,
     comparing,
+    curing,
+    driving,
+    guessing,
     inspecting,
     keeping,
     releasing,
@@ -15,14 +19,19 @@ from reports.command import (
     running,
     showing,
     tuning,
+    weighing,
 )
 from reports.command.group import main
 
 __all__ = [
     "accepting",
+    "asking",
     "benching",
     "certifying",
     "comparing",
+    "curing",
+    "driving",
+    "guessing",
     "inspecting",
     "keeping",
     "main",
@@ -31,4 +40,5 @@ __all__ = [
     "running",
     "showing",
     "tuning",
+    "weighing",
 ]

@@ -18,6 +18,7 @@ from reports import exports
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.posing import cells_of, compare_and_show
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
 from reports.stages import warm_up
@@ -37,6 +38,7 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--invariance", is_flag=True, help="Ask instead what must not change an answer: order, heading, place.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
@@ -44,6 +46,10 @@ from validation.workers import TIMEOUT, run_cells
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run SCENES (names, globs or files; all by default) and judge them.
+
+    With --invariance nothing is stored or judged against a truth: the representative cell of each scene, engine and
+    profile is run again with bodies renumbered, the world turned, mirrored, carried along or moved away, with a body
+    out of reach, in the same and in a fresh process; exits with 1 if that changes an answer.
 
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
     if not all of it ran.
@@ -60,6 +66,9 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
+    if options["invariance"]:
+        cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
+        sys.exit(statuses.verdict(not compare_and_show(cells, as_json), True))
     folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:

@@ -18,7 +18,7 @@ from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
-from reports.cures import Change, changes, how_measured, pasteable
+from reports.cures import Change, changes, how_measured, pasteable, told_cures
 from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
@@ -26,6 +26,7 @@ from reports.terminal import terminal
 from reports.wording import LABELS, mark_of, measured, missing_text, number, params_text, quantity, reproduce, row_id
 from validation.bench import reading
 from validation.cells import Observation
+from validation.nulls import skill_of
 from validation.rows import rows_of
 from validation.store import Store
 
@@ -204,9 +205,20 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
             {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
             for c in differing
         ]
+        worth, against = skill_of(found)
         cure = {"profile": better, "changes": plain, "paste": paste}
         click.echo(
-            json.dumps({**found, "id": row_id(found), "command": reproduce(found["slot"]), "cure": cure}, indent=1)
+            json.dumps(
+                {
+                    **found,
+                    "id": row_id(found),
+                    "command": reproduce(found["slot"]),
+                    "cure": cure,
+                    "skill": worth,
+                    "skill_against": against,
+                },
+                indent=1,
+            )
         )
         return
     _print_explanation(found, better, paste, differing, terminal())
@@ -251,6 +263,14 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
     return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
 
 
+def skill_text(row: Plain) -> str:
+    """``0.98: 1 - error/error of the best null, which is: did nothing``; or why there is none."""
+    value, said = skill_of(row)
+    if value is None:
+        return f"none: {said}"
+    return f"{number(value, 4)} = 1 - error/error of the best answer without an engine, {said}"
+
+
 def _why(change: Change) -> str:
     return f"{change.because}; {change.role}" if change.role else change.because
 
@@ -273,12 +293,15 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
+        ("skill", skill_text(row)),
         ("standing", row["reason"] or "-"),
     ]
     if better:
         text = "; ".join(f"{c.name} {c.before} -> {c.after} ({_why(c)})" for c in differing)
         lines.append(("cure", f"profile {better} passes this row. It differs in: {text}."))
-        lines.append(("", how_measured(row["engine"], row["scene"], row["profile"], better)))
+        lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
+    told = told_cures(row["engine"], row["engine_version"], row["scene"], row["profile"], [row["dimension"]])
+    lines += [("smallest" if better else "cure", text) for text in told if mark_of(row) != "pass"]
     lines.append(("again", reproduce(row["slot"])))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))

@@ -21,9 +21,11 @@ from markupsafe import Markup
 
 from reports.answers import answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
+from reports.page.families import families
 from reports.page.scenes import scene_sections
+from reports.page.slimming import small_html
 from reports.page.source import Bench, Source, load_source
-from reports.page.styling import engine_style, symbol, symbols
+from reports.page.styling import engine_style, symbols
 from reports.speed import duration
 from reports.wording import missing_text, number
 from validation.cells import format_dt
@@ -36,23 +38,26 @@ SCRIPTS = ("page.js", "replay.js", "explorer.js")
 
 def render(source: Source) -> str:
     """Return the page of ``source`` as HTML text."""
-    style = Markup(_text("page.css") + engine_style(source.engines))  # ours: nothing in it comes from a run
+    style = Markup(
+        _text("page.css") + engine_style(source.engines) + symbols(source.columns)
+    )  # ours: nothing in it comes from a run
     script = Markup("\n".join(_text(name) for name in SCRIPTS))
-    return (
+    return small_html(
         _environment()
         .get_template("page.html.j2")
         .render(
             source=source,
+            places={column: k for k, column in enumerate(source.columns)},
             policy=policy(style, script),
             style=style,
             script=script,
-            symbols=symbols(source.columns),
             facts=facts(source),
             cite=cite(source),
             sentences=conclusions.sentences(source),
-            matrix=verdicts.matrix(source),
+            families=families(source),
             answers=answers(source.rows),
             findings=conclusions.findings(source),
+            by_reason=conclusions.by_reason,
             choices=choosing.choices(source),
             scenes=scene_sections(source),
             replays=replay.replays(source),
@@ -93,7 +98,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "dt": format_dt, "duration": duration, "data": as_data}
-    environment.globals |= {"slug": verdicts.slug, "symbol": symbol, "missing_text": missing_text}
+    environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text}
     return environment
 
 

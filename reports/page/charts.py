@@ -18,6 +18,7 @@ import pandas as pd
 import vl_convert
 from markupsafe import Markup
 
+from reports.page.slimming import small_svg
 from reports.palette import colours_of, dash_of, shape_of
 
 WIDTH, HEIGHT = 330, 250
@@ -56,7 +57,7 @@ def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     text = _LONG.sub(lambda m: f"{float(m.group()):.2f}".rstrip("0").rstrip("."), text)
     name = Markup.escape(title)
     head = f'<svg role="img" aria-label="{name}" '
-    return Markup(text.replace("<svg ", head, 1).replace(' class="marks"', "", 1))
+    return Markup(small_svg(text.replace("<svg ", head, 1).replace(' class="marks"', "", 1)))
 
 
 def log_axis(low: float, high: float) -> list[float]:

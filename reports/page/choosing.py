@@ -227,7 +227,7 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
         sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # what matters stands first
         pasteable(source.observations, scene, dimension, engine, shipped, better),
-        how_measured(engine, scene, shipped, better),
+        how_measured(engine, scene, dimension, shipped, better),
     )  # fmt: skip
 
 

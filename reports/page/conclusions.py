@@ -11,9 +11,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from reports.answers import answers as answers_of
 from reports.page.source import Source
-from reports.page.verdicts import ALARMS, SAID, family_of, ratio_of, severity, slug, times
-from reports.wording import mark_of, measured, number, params_text, quantity, reproduce
+from reports.page.verdicts import (
+    ALARMS,
+    SAID,
+    family_of,
+    ratio_of,
+    severity,
+    slug,
+    times,
+    why_anchor,
+    without_prediction,
+)
+from reports.wording import mark_of, measured, number, params_text, quantity
 
 Plain = Mapping[str, Any]
 
@@ -173,9 +184,35 @@ class FindingFamily:
     count: int
     href: str
     text: str
-    because: str
     reason: str
-    command: str
+
+
+@dataclass(frozen=True)
+class Reasoned:
+    """Findings of one engine and profile that have one reason, with what cures each scene of theirs."""
+
+    anchor: str
+    engine: str
+    profile: str
+    reason: str
+    cures: tuple[tuple[str, str], ...]
+    members: tuple[FindingFamily, ...]
+
+
+def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list[Reasoned]:
+    """Findings that have the same reason, together, in the order in which the first of each stands."""
+    cured = {(answer.engine, answer.profile, answer.scene): answer.cure for answer in answers_of(source.rows)}
+    groups: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
+    for finding in found:
+        groups[finding.engine, finding.profile, without_prediction(finding.reason)].append(finding)
+    said = []
+    for (engine, profile, reason), members in groups.items():
+        by_cure: dict[str, list[str]] = defaultdict(list)
+        for scene in dict.fromkeys(member.scene for member in members):
+            by_cure[cured.get((engine, profile, scene), "")].append(scene)
+        told = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
+        said.append(Reasoned(why_anchor(mark, engine, profile, reason), engine, profile, reason, told, tuple(members)))
+    return said
 
 
 def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
@@ -206,6 +243,5 @@ def _finding(key: tuple[Any, ...], rows: Sequence[Plain]) -> FindingFamily:
     )
     href = "#" + slug(scene, dimension, "check", family)
     return FindingFamily(
-        engine, profile, scene, dimension, family, len(rows), href, text, worst["because"], worst["reason"],
-        reproduce(worst["slot"]),
+        engine, profile, scene, dimension, family, len(rows), href, text, worst["reason"],
     )  # fmt: skip

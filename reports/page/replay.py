@@ -1,6 +1,6 @@
 """Replays: recordings of all engines on one scene, packed for the page's player, with the truth as a ghost.
 
-    header (JSON): times, bodies, series          one block of 16-bit integers, differenced along time, deflated
+    header (JSON): times, bodies, series      16-bit integers, differenced along time, low bytes first, deflated
 
 The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
 `validation.tracks` were computed from the full trajectory when the cell ran.
@@ -49,7 +49,8 @@ class Replay:
     settings: str
     data: dict[str, Any]
     figure: Figure | None
-    departures: list[tuple[str, str, float | None, str, str]]
+    command: str
+    departures: list[tuple[str, str, float | None, str]]
 
 
 def replays(source: Source) -> list[Replay]:
@@ -58,10 +59,13 @@ def replays(source: Source) -> list[Replay]:
     for slot, recording in source.replays:
         groups[slot.scene, slot.dimension].append((slot, recording))
     order = [line for line in source.lines if line in groups]
-    return [_replay(source, *line, groups[line]) for line in order]
+    drawn = {scene: dimension for scene, dimension in reversed(order)}  # a motion is drawn once, in the plane if it can
+    return [_replay(source, *line, groups[line], drawn[line[0]] == line[1]) for line in order]
 
 
-def _replay(source: Source, name: str, dimension: int, members: Sequence[tuple[Slot, Recording]]) -> Replay:
+def _replay(
+    source: Source, name: str, dimension: int, members: Sequence[tuple[Slot, Recording]], drawn: bool
+) -> Replay:
     slot = members[0][0]
     canonical = resolve(name)
     scene = canonical.scene(dimension, dict(slot.params))
@@ -75,8 +79,9 @@ def _replay(source: Source, name: str, dimension: int, members: Sequence[tuple[S
         title,
         f"{params_text(scene.params)}, dt = {format_dt(slot.dt)} s",
         _data(source, scene, members, t, exact, tracked),
-        _figure(title, scene, members, exact, tracked),
-        [(s.engine, s.profile, r.departure, r.finish, reproduce(s.as_dict())) for s, r in members],
+        _figure(title, scene, members, exact, tracked) if drawn else None,
+        reproduce(slot.as_dict() | {"engine": "ENGINE", "profile": "PROFILE"}),
+        [(s.engine, s.profile, r.departure, r.finish) for s, r in members],
     )  # fmt: skip
 
 
@@ -104,15 +109,24 @@ def _data(
         })  # fmt: skip
     if exact is not None:
         blocks.append(_differenced(np.round(exact / unit)))
-    raw = np.concatenate([block.ravel() for block in blocks]).astype("<i2").tobytes()
+    # Low bytes, then high ones: of small steps the high bytes are nearly all alike, which deflates to nothing.
+    levels = np.concatenate([block.ravel() for block in blocks]).astype("<i2")
+    raw = levels.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {
-        "dimension": d, "t": [round(float(s), 6) for s in t], "bodies": [_body(scene, i) for i in free],
+        "dimension": d, "t": _times(t), "bodies": [_body(scene, i) for i in free],
         "fixed": [_body(scene, i) for i in range(len(scene.bodies)) if i not in free],
         "tracked": None if tracked is None else free.index(tracked), "low": _plain(low), "high": _plain(high),
         "unit": unit, "angle": 1.0 / ANGLES, "arrow": strongest / ARROWS, "gravity": list(scene.gravity),
         "static": exact is not None and bool(np.ptp(exact, axis=0).max() == 0.0), "series": series,
         "packed": base64.b64encode(zlib.compress(raw, 9)).decode(),
     }  # fmt: skip
+
+
+def _times(t: NDArray[np.float64]) -> list[float] | dict[str, float]:
+    """Times of the frames [s]: all of them, or the last one and how many where they are evenly spaced from zero."""
+    if len(t) > 2 and np.allclose(t, np.linspace(0.0, t[-1], len(t)), rtol=0.0, atol=1e-6):
+        return {"last": round(float(t[-1]), 6), "count": len(t)}
+    return [round(float(s), 6) for s in t]
 
 
 def _plain(values: NDArray[np.float64]) -> list[float]:

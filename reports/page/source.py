@@ -59,10 +59,15 @@ class Source:
     scenes_kept: Mapping[str, str] = field(default_factory=dict)
     columns: tuple[tuple[str, str], ...] = field(init=False)
     lines: tuple[tuple[str, int], ...] = field(init=False)
+    _by_scene: Mapping[str, Sequence[Plain]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         columns = dict.fromkeys((row["engine"], row["profile"]) for row in self.rows)
         lines = dict.fromkeys((row["scene"], row["dimension"]) for row in self.rows)
+        by_scene: dict[str, list[Plain]] = {}
+        for row in self.rows:
+            by_scene.setdefault(row["scene"], []).append(row)
+        object.__setattr__(self, "_by_scene", by_scene)
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "lines", tuple(lines))
 
@@ -78,7 +83,8 @@ class Source:
 
     def of(self, **wanted: Any) -> list[Plain]:
         """Rows whose fields have the wanted values."""
-        return [row for row in self.rows if all(row[name] == value for name, value in wanted.items())]
+        rows = self._by_scene.get(wanted.pop("scene"), ()) if "scene" in wanted else self.rows
+        return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
 
 def load_source(folder: Path, run: str = "latest") -> Source:

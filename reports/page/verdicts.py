@@ -1,18 +1,20 @@
-"""Verdicts for the page: the matrix of the first screen, the checks of each scene, every value of every check."""
+"""Verdicts for the page: lines of the matrix, the checks of each scene, every value of every check."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Any
 
-from reports.matrix import Field, matrix_of
+from reports.matrix import UNJUDGED, Field, Matrix
 from reports.page.source import Source
 from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
+from validation.nulls import skill_of
 
 Plain = Mapping[str, Any]
 #: Mark -> how a cell of the page says it: a sign and a word, so that no meaning hangs on colour.
@@ -111,11 +113,10 @@ class MatrixLine:
     marks: list[Mark]
 
 
-def matrix(source: Source) -> list[MatrixLine]:
-    """Verdict matrix: a line per scene and dimension, and one for its sweep over iterations where there is one."""
-    found = matrix_of(source.rows)
+def matrix_lines(source: Source, found: Matrix, wanted: Sequence[tuple[str, int]]) -> list[MatrixLine]:
+    """Lines of the verdict matrix: one per scene and dimension, and one for its sweep over iterations, if any."""
     lines = []
-    for line in source.lines:
+    for line in wanted:
         scene, dimension = line
         for fields, label in ((found.fields, ""), (found.swept, ", swept")):
             own = [fields.get((line, column)) for column in source.columns]
@@ -126,13 +127,16 @@ def matrix(source: Source) -> list[MatrixLine]:
 
 
 def _matrix_mark(field: Field | None, line: tuple[str, int], column: tuple[str, str]) -> Mark:
-    if field is None:
-        return Mark("unsupported", "")
-    mark = field.mark
+    return family_mark(field, slug(*line, *column))
+
+
+def family_mark(field: Field | None, anchor: str) -> Mark:
+    """A field of the matrix: its worst mark, how many rows do not pass, and where it leads."""
+    if field is None or field.mark in ("unsupported", "not_installed"):
+        return Mark(field.mark if field else "unsupported", "")
     text = "" if not field.judged else f"{field.missed}/{field.judged}" if field.missed else str(field.judged)
     said = ", ".join(f"{n} {SAID[m][1]}" for m, n in field.marks.most_common())
-    where = f"{line[0]} {line[1]}-D, {column[0]}/{column[1]}"
-    return Mark(mark, text, "#" + slug(*line, *column), f"{where}: {said}")
+    return Mark(field.mark, text, "#" + anchor, said if len(field.marks) > 1 else "")
 
 
 @dataclass(frozen=True)
@@ -146,21 +150,25 @@ class Worst:
     where: str
     value: str
     truth: str
-    error: str
     tolerance: str
     ratio: str
     passing: str
+    why: str
+    skill: str
     command: str
 
 
 @dataclass(frozen=True)
 class GridLine:
-    """One parameter set of a check: truth and tolerance once, then the error of each engine and profile."""
+    """One parameter set of a check: truth and tolerance once, then the error of each engine and profile.
+
+    ``options`` are its own words of the command; None if they are its label's.
+    """
 
     label: str
     truth: str
     tolerance: str
-    options: str
+    options: str | None
     cells: list[tuple[str, str]]
 
 
@@ -173,17 +181,22 @@ class CheckBlock:
     unit: str
     becauses: list[str]
     sources: list[str]
+    marks: Mapping[tuple[str, str], Mark]
     worst: list[Worst]
+    command: tuple[str, str]
     grid: list[GridLine]
 
 
 @dataclass(frozen=True)
 class SceneVerdicts:
-    """Checks of a scene in one dimension: an overview (engines x checks) and a block per check."""
+    """Checks of a scene in one dimension: its worst mark, an overview (engines x checks) and a block per check."""
 
     scene: str
     dimension: int
     anchor: str
+    mark: Mark
+    asked: list[tuple[str, str]]
+    refused: str
     overview: list[tuple[tuple[str, str], str, list[Mark]]]
     blocks: list[CheckBlock]
 
@@ -191,42 +204,59 @@ class SceneVerdicts:
 def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
     """Overview and blocks of one scene and dimension."""
     rows = source.of(scene=scene, dimension=dimension)
+    seen: dict[tuple[str, str], bool] = {}
+    for row in rows:
+        column = row["engine"], row["profile"]
+        seen[column] = seen.get(column, False) or mark_of(row) not in ("unsupported", "not_installed")
+    asked = [column for column in source.columns if seen.get(column)]
+    refused = dict.fromkeys(engine for engine, profile in seen if not any(c[0] == engine for c in asked))
     families: dict[str, list[Plain]] = defaultdict(list)
     for row in rows:
         families[family_of(row["metric"])].append(row)
-    blocks = [_block(source, scene, dimension, name, group) for name, group in families.items()]
+    blocks = [_block(asked, scene, dimension, name, group) for name, group in families.items()]
     overview = []
-    for column in source.columns:
-        own = [_overview_mark(block, column) for block in blocks]
+    for column in asked:
+        own = [block.marks.get(column) for block in blocks]
         if any(mark is not None for mark in own):
             marks = [mark or Mark("unsupported", "") for mark in own]
             overview.append((column, slug(scene, dimension, *column), marks))
-    return SceneVerdicts(scene, dimension, slug(scene, dimension), overview, blocks)
+    anchor = slug(scene, dimension)
+    return SceneVerdicts(scene, dimension, anchor, _summed(rows), asked, ", ".join(refused), overview, blocks)
 
 
-def _overview_mark(block: CheckBlock, column: tuple[str, str]) -> Mark | None:
-    worst = next((w for w in block.worst if (w.engine, w.profile) == column), None)
-    if worst is None:
-        return None
-    title = f"worst of {block.family}: {worst.where}, error {worst.error}, tolerance {worst.tolerance}"
-    return Mark(worst.mark.mark, worst.ratio, "#" + block.anchor, title)
+def _summed(rows: Sequence[Plain]) -> Mark:
+    """Worst mark at the profiles' own iteration counts, and how many engines' profiles pass everything."""
+    own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        if row["iterations"] is None and mark_of(row) not in UNJUDGED:
+            own[row["engine"], row["profile"]][mark_of(row)] += 1
+    if not own:
+        return Mark("unsupported", "not judged")
+    good = sum(set(marks) == {"pass"} for marks in own.values())
+    return Mark(Field(sum(own.values(), Counter())).mark, f"{good} of {len(own)} profiles pass")
 
 
-def _block(source: Source, scene: str, dimension: int, family: str, rows: Sequence[Plain]) -> CheckBlock:
+def _block(
+    columns: Sequence[tuple[str, str]], scene: str, dimension: int, family: str, rows: Sequence[Plain]
+) -> CheckBlock:
     by_column: dict[tuple[str, str], list[Plain]] = defaultdict(list)
     for row in rows:
         by_column[row["engine"], row["profile"]].append(row)
-    worst = [_worst(column, by_column[column]) for column in source.columns if by_column[column]]
+    worst = [_worst(column, by_column[column]) for column in columns if by_column[column]]
+    anchor = slug(scene, dimension, "check", family)
+    command, lines = grid(columns, rows)
     units = dict.fromkeys(row["unit"] for row in rows)
     becauses = dict.fromkeys(row["because"] for row in rows)
     return CheckBlock(
-        slug(scene, dimension, "check", family),
+        anchor,
         family,
         " / ".join(unit_text(unit) for unit in units),
         list(becauses)[:4] + ([f"and {len(becauses) - 4} more, each beside its row"] if len(becauses) > 4 else []),
         [text for text in dict.fromkeys(row["source"] for row in rows) if text],
-        worst,
-        grid(source.columns, rows),
+        {(w.engine, w.profile): Mark(w.mark.mark, w.ratio, "#" + anchor) for w in worst},
+        [w for w in worst if w.mark.mark not in ("pass", "unsupported", "not_installed")],
+        command,
+        lines,
     )
 
 
@@ -244,12 +274,28 @@ def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
         (where.strip() or "defaults") + own,
         NEVER if measured(row) == NEVER else number(row["value"], 6),
         number(row["truth"], 6),
-        number(row["error"], 3),
         number(row["tolerance"], 2),
         times(ratio),
         f"{sum(r['physics'] == 'pass' for r in judged)}/{len(judged)}" if judged else "",
+        why_anchor(mark, row["engine"], row["profile"], row["reason"]) if mark in LISTED and row["reason"] else "",
+        times(skill_of(row)[0]) if mark != "pass" else "",
         reproduce(row["slot"]),
     )
+
+
+#: Marks that are listed by their reason.
+LISTED = (*ALARMS, "fail", "known", "explained")
+
+
+def why_anchor(mark: str, engine: str, profile: str, reason: str) -> str:
+    """Where the findings say why: the same for all rows of an engine and profile that have the same reason."""
+    said = "|".join((mark, engine, profile, without_prediction(reason)))
+    return f"why-{hashlib.sha256(said.encode()).hexdigest()[:8]}"
+
+
+def without_prediction(reason: str) -> str:
+    """A law's reason without the numbers of one row."""
+    return re.sub(r" \(predicted [^()]*\)", "", reason)
 
 
 def unit_text(unit: str) -> str:
@@ -262,8 +308,11 @@ def varied(row: Plain) -> dict[str, float]:
     return dict(row["slot"]["params"])
 
 
-def grid(columns: Sequence[tuple[str, str]], rows: Iterable[Plain]) -> list[GridLine]:
-    """One line per parameter set, step, iteration count and index; one error per engine and profile."""
+def grid(columns: Sequence[tuple[str, str]], rows: Iterable[Plain]) -> tuple[tuple[str, str], list[GridLine]]:
+    """One line per parameter set, step, iteration count and index; one error per engine and profile.
+
+    Before the lines, what all of their commands begin and end with; a line's ``options`` stand between the two.
+    """
     rows = list(rows)
     names = list(dict.fromkeys(name for row in rows for name in row["slot"]["params"]))
     steps = {row["dt"] for row in rows}
@@ -272,16 +321,27 @@ def grid(columns: Sequence[tuple[str, str]], rows: Iterable[Plain]) -> list[Grid
         shown = tuple((name, row["params"][name]) for name in names if name in row["params"])
         key = (shown, row["dt"], row["iterations"], row["metric"].partition("[")[2])
         table[key][row["engine"], row["profile"]] = row
-    lines = []
+    lines, commands = [], []
     for (shown, dt, iterations, index), found in table.items():
         first = next(iter(found.values()))
         label = params_text(dict(shown)) + (f" [{index}" if index else "")
         label += f" dt={format_dt(dt)}" if len(steps) > 1 else ""
         label += f" it={iterations}" if iterations is not None else ""
         cells = [_cell(found.get(column)) for column in columns]
-        options = reproduce({**first["slot"], "engine": "@", "profile": "@"})
-        lines.append(GridLine(label.strip(), number(first["truth"], 6), number(first["tolerance"], 2), options, cells))
-    return lines
+        commands.append(reproduce({**first["slot"], "engine": "@", "profile": "@"}).split(" "))
+        lines.append(GridLine(label.strip(), number(first["truth"], 6), number(first["tolerance"], 2), None, cells))
+    head = _shared(commands)
+    tail = _shared([words[len(head) :][::-1] for words in commands])[::-1]
+    said = [" ".join(words[len(head) :][: -len(tail) or None]) for words in commands]
+    labels = [" --param ".join(line.label.split()) for line in lines]
+    own = [None if text == label else text for text, label in zip(said, labels, strict=True)]
+    lines = [replace(line, options=options) for line, options in zip(lines, own, strict=True)]
+    return (" ".join(head), " ".join(tail)), lines
+
+
+def _shared(lists: Sequence[Sequence[str]]) -> list[str]:
+    """Words with which all lists begin."""
+    return [words[0] for words in takewhile(lambda words: len(set(words)) == 1, zip(*lists, strict=False))]
 
 
 def _cell(row: Plain | None) -> tuple[str, str]:

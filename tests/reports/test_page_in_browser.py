@@ -1,11 +1,13 @@
 """The report in a real browser, offline: no request, no error, complete without JavaScript, usable by keyboard."""
 
-import json
+import csv
 import re
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+from reports.wording import reproduce
 
 WIDTHS = {"phone": 390, "laptop": 1280, "wide": 1920}
 
@@ -65,13 +67,14 @@ def test_a_scene_named_like_a_script_is_shown_as_text(browser, page_file):
 
 def test_without_javascript_verdicts_plots_and_tables_are_there(browser, page_file):
     with opened(browser, page_file, java_script_enabled=False) as page:
-        assert page.locator(".matrix tbody tr").count() >= 5
-        assert "pass" in page.locator(".matrix").inner_text()
+        assert page.locator(".matrix.overall tbody tr").count() >= 3
+        assert "pass" in page.locator(".matrix.overall").inner_text()
+        page.locator("details.scene", has=page.locator("#scene-impact")).locator("summary").first.click()
         plots = page.locator("#scene-impact figure.plot svg")
         assert plots.count() >= 2
         assert plots.first.bounding_box()["height"] > 100
         assert page.locator("#explorer-still svg").bounding_box()["height"] > 100
-        assert page.locator("a[download='rows.csv.gz']").get_attribute("href").startswith("data:application/gzip")
+        assert page.locator("a[download='rows.json.gz']").get_attribute("href").startswith("data:application/gzip")
         for id in ("player", "explorer-live"):
             assert not page.locator(f"#{id}").is_visible()
         assert page.locator("button:visible").count() == 0  # a button without JavaScript would do nothing
@@ -90,11 +93,26 @@ def test_every_link_of_the_page_leads_somewhere(browser, page_file):
 
 def test_a_field_of_the_matrix_leads_to_its_row_and_the_row_to_its_opened_check(browser, page_file):
     with opened(browser, page_file) as page:
-        page.locator(".matrix a.m", has_text="explained").first.click()
+        page.locator(".matrix.overall a.m", has_text="✗").first.click()
+        page.locator("div:target .matrix a.m", has_text="✗").first.click()
         row = page.locator("tr:target")
-        assert row.is_visible()
-        row.locator("a.m").first.click()
+        assert row.is_visible() and "✗" in row.inner_text()
+        page.locator(".overview", has=row).locator("thead a").first.click()
         assert page.locator("details:target").evaluate("node => node.open")
+
+
+def test_what_a_link_leads_to_opens_without_javascript(browser, page_file):
+    for anchor in ("#family-friction", "#incline-2", "#impact-2"):
+        with opened(browser, page_file, anchor, java_script_enabled=False) as page:
+            assert page.locator(anchor).is_visible()
+
+
+def test_the_reason_of_a_worst_value_stands_in_the_findings_with_what_cures_it(browser, page_file):
+    with opened(browser, page_file, "#bounce-2") as page:
+        page.locator("#bounce-2 details.check").first.evaluate("node => node.open = true")
+        page.locator("#bounce-2 .worst li", has_text="bullet/default").first.locator("a").click()
+        target = page.locator("tr:target")
+        assert target.is_visible() and "bullet/default" in target.inner_text() and "tuned" in target.inner_text()
 
 
 def picture(page):
@@ -214,9 +232,7 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
 
 def test_a_chart_point_says_what_it_is(browser, page_file):
     with opened(browser, page_file, "#scene-impact") as page:
-        point = page.locator(
-            "#fig-work-impact-2 path[role='graphics-symbol'][aria-label*='per simulated second']"
-        ).first
+        point = page.locator("#fig-work-impact-2 path[data-is*='per simulated second']").first
         point.hover()
         hint = page.locator("#hint")
         assert hint.is_visible()
@@ -228,7 +244,7 @@ def test_a_chart_point_says_what_it_is(browser, page_file):
 @pytest.mark.parametrize("kind", ["CSV", "SVG", "PNG"])
 def test_tables_and_plots_can_be_saved(browser, page_file, kind):
     selector = "#choose button.save" if kind == "CSV" else f"#scene-impact button.save:has-text('{kind}')"
-    with opened(browser, page_file) as page:
+    with opened(browser, page_file, "#impact-2") as page:
         with page.expect_download() as found:
             page.locator(selector).first.click()
         content = Path(found.value.path()).read_bytes()
@@ -236,14 +252,28 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
     assert content.startswith(heads[kind])
 
 
-def test_rows_come_out_as_json_with_numbers_as_numbers(browser, page_file, page_source):
+def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file, page_source):
     with opened(browser, page_file, "#tables") as page:
         with page.expect_download() as found:
-            page.locator("#as-json button").click()
-        rows = json.loads(Path(found.value.path()).read_bytes())
+            page.locator("#as-csv button").click()
+        rows = list(csv.DictReader(Path(found.value.path()).read_text().splitlines()))
     assert len(rows) == len(page_source.rows)
-    assert [row["value"] for row in rows] == [row["value"] for row in page_source.rows]
+    values = [None if row["value"] == "" else float(row["value"]) for row in rows]
+    assert values == [row["value"] for row in page_source.rows]
     assert [row["because"] for row in rows] == [row["because"] for row in page_source.rows]
+
+
+def test_a_field_of_a_table_of_errors_gives_the_command_of_its_cell(browser, page_file, page_source):
+    """Each line holds only what its command does not share with the others of its table."""
+    with opened(browser, page_file, "#impact-2") as page:
+        page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+        said = []
+        for line in range(3):
+            page.locator("#impact-2 .grid").first.locator("tbody tr").nth(line).locator("td").nth(2).click()
+            said.append(page.locator("#hint").inner_text().removeprefix("copied: "))
+    rows = [r for r in page_source.rows if (r["scene"], r["dimension"]) == ("impact", 2) and r["outcome"] == "ok"]
+    wanted = dict.fromkeys(reproduce(r["slot"]) for r in rows if (r["engine"], r["profile"]) == ("chipmunk", "default"))
+    assert said == list(wanted)[:3]
 
 
 @pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
@@ -287,7 +317,7 @@ def test_on_a_phone_the_matrix_stands_before_the_filter_and_the_facts(browser, p
     with opened(browser, page_file, width=390) as page:
         places = [
             page.locator(f"#verdicts > {part}").first.bounding_box()["y"]
-            for part in ("h1", ".scroll", ".legend", "#filter", ".facts")
+            for part in ("h1", ".scroll", ".families", ".legend", "#filter", ".facts")
         ]
     assert places == sorted(places)
 

@@ -55,6 +55,7 @@ RUN = {
     "crosscheck list scenes|engines|checks|runs": ["list scenes", "list engines", "list checks", "list runs"],
     "crosscheck describe bounce": ["describe bounce", "describe bullet"],
     "crosscheck doctor": ["doctor"],
+    "crosscheck nulls impact": ["nulls impact"],
     "crosscheck check-adapter NAME": ["check-adapter chipmunk"],
 }  # fmt: skip
 #: What each of them must say of that folder.
@@ -80,10 +81,16 @@ SAID = {
     "describe bounce": "coefficient of restitution",
     "describe bullet": "contactBreakingThreshold",
     "doctor": "no problem found",
+    "nulls impact": "perfectly",
     "check-adapter chipmunk": "receipt turn: as declared",
 }
 #: Command of the README -> why it is not run here.
 NOT_RUN = {
+    "crosscheck cure mujoco pinch": "seconds of search: run by tests/validation/test_cures.py on a smaller engine",
+    "crosscheck frontier thin_wall": "a minute on all engines: run by tests/validation/test_frontier.py",
+    "crosscheck run pinch --invariance": "a minute on all engines: run by tests/validation/test_invariance.py",
+    "crosscheck residuals pinch": "runs every engine: run by tests/validation/test_residuals.py",
+    "crosscheck field": "all its notes are asked by tests/validation/test_field.py",
     "crosscheck releases mujoco 3.2.7,3.12.0 stack": "installs releases: run by tests/validation/releases",
     "crosscheck bisect mujoco 3.4.0..3.12.0 stack --check drift": "installs releases: run by tests/validation/releases",
     "crosscheck run": "minutes: every continuous-integration run makes it by `make run`",

@@ -101,7 +101,7 @@ def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
     rows = [row("bounce", 2, "bullet", "default", "known", 0.25, 0.64, e=0.8, height=1.0)]
     (answer,) = answers(rows)
     assert answer.wrong == "rebounds at 0.5 instead of 0.8 (e=0.8 height=1)"
-    assert answer.cure == "no other profile does better"
+    assert answer.cure == "no other profile does better; crosscheck cure bullet bounce searches for settings"
 
 
 def test_what_is_nearer_is_no_cure():

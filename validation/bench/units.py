@@ -23,7 +23,7 @@ from adapters.scene import Body, Pair, Scene
 from adapters.stepping import posed_for, step_count
 from validation.bench.timing import Purpose
 from validation.canonical import GRAVITY
-from validation.cells import Slot
+from validation.cells import Slot, settings_of
 from validation.posed import primary_of, resolve
 from validation.scenes.parts import ball, floor, upward
 
@@ -159,7 +159,7 @@ def _free(scene: Scene) -> int:
 def prepared(slot: Slot) -> tuple[Engine, Scene, dict[str, Any], bool]:
     """Engine, scene as the engine gets it, setting values, and whether that scene was lifted."""
     engine, scene = load(slot.engine), scene_of(slot)
-    settings = engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations)
+    settings = settings_of(engine, slot, scene)
     posed = posed_for(engine, scene)
     return engine, posed, {setting.name: setting.value for setting in settings}, posed.dimension != scene.dimension
 

@@ -221,6 +221,7 @@ SCENE = CanonicalScene(
     name="bounce",
     version=1,
     title="Dropped ball, from the first bounce to rest",
+    family="rebound",
     figure=__doc__ or "",
     law="h_n = e^(2n) h0,  t_rest = sqrt(2 h0/g) (1 + e)/(1 - e)",
     dimensions=(2, 3),

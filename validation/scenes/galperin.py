@@ -133,6 +133,7 @@ SCENE = CanonicalScene(
     name="galperin",
     version=1,
     title="Collisions that count the digits of pi",
+    family="many impacts",
     figure=__doc__ or "",
     law="N = ceil(pi/t) - 1,  V_j = V cos(2 j t),  v_j = sqrt(M/m) V sin(2 j t),  t = atan(sqrt(m/M))",
     dimensions=(2, 3),

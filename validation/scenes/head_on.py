@@ -120,6 +120,7 @@ SCENE = CanonicalScene(
     name="head_on",
     version=1,
     title="Two balls meet head-on, of any ratio of masses",
+    family="rebound",
     figure=__doc__ or "",
     law="v1' = v1 - (1 + e) r/(1 + r) (v1 - v2),  v2' = v2 + (1 + e)/(1 + r) (v1 - v2)",
     dimensions=(2, 3),

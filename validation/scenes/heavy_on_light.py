@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from adapters.scene import Pair, Scene
 from validation import columns
-from validation.canonical import CanonicalScene, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Frontier, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
 
 SIDE = 1.0
@@ -46,6 +46,7 @@ SCENE = CanonicalScene(
     name="heavy_on_light",
     version=1,
     title="Heavy box on a light one, in equilibrium",
+    family="stacks and statics",
     figure=__doc__ or "",
     law="nothing moves; each interface carries the weight above it, whatever the ratio of masses",
     dimensions=(2, 3),
@@ -62,6 +63,7 @@ SCENE = CanonicalScene(
     rule=columns.checks,
     sampling=columns.sampling,
     track=track,
+    frontiers=(Frontier("mass ratio", "", "ratio", 1.0, 1e6, 1e6, columns.fate, columns.STANDS),),
     quick=(Variation({}), Variation({"ratio": 1e4})),
     full=tuple(Variation({"ratio": 10.0**k}, (None, 1, 10, 100)) for k in range(6)),
     planted=({},),

@@ -180,6 +180,7 @@ SCENE = CanonicalScene(
     name="hilltop",
     version=1,
     title="Disc that leaves a round hill",
+    family="turning",
     figure=__doc__ or "",
     law="leaves where N = 0: cos(phi) = 2/3 + v^2/(3 g (R + r)) without friction",
     dimensions=(2,),

@@ -125,6 +125,7 @@ SCENE = CanonicalScene(
     name="impact",
     version=1,
     title="Ball against an immovable floor, no gravity",
+    family="rebound",
     figure=__doc__ or "",
     law="v+ = -e v-,  J = m (1 + e) v",
     dimensions=(2, 3),

@@ -144,6 +144,7 @@ SCENE = CanonicalScene(
     name="incline",
     version=1,
     title="Box on an incline, from sticking to sliding",
+    family="friction",
     figure=__doc__ or "",
     law="sticks if tan(theta) <= mu, else a = g (sin(theta) - mu cos(theta))",
     dimensions=(2, 3),

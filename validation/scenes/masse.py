@@ -167,6 +167,7 @@ SCENE = CanonicalScene(
     name="masse",
     version=1,
     title="Ball pushed and spun askew: a parabola until it rolls",
+    family="friction",
     figure=__doc__ or "",
     law="x = v0 t - mu g t^2 u/2 until t = |u0| k/((1 + k) mu g), then v_f = v0 - u0 k/(1 + k)",
     dimensions=(3,),

@@ -182,6 +182,7 @@ SCENE = CanonicalScene(
     name="off_centre",
     version=1,
     title="Ball strikes a free bar beside its centre",
+    family="rebound",
     figure=__doc__ or "",
     law="J = (1 + e) (v - V)/(1/m + 1/M + d^2/I),  spin' = d J/I",
     dimensions=(2, 3),

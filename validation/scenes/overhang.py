@@ -71,6 +71,7 @@ SCENE = CanonicalScene(
     name="overhang",
     version=1,
     title="Blocks stacked as far out as they stand",
+    family="stacks and statics",
     figure=__doc__ or "",
     law="stands if each block reaches less than L/(2 k) beyond the next, k blocks on the edge",
     dimensions=(2,),

@@ -101,6 +101,7 @@ SCENE = CanonicalScene(
     name="pinch",
     version=1,
     title="Box held between a wall and a pad that presses on it",
+    family="grip and force",
     figure=__doc__ or "",
     law="sticks if W <= 2 mu N: creep 0, the wall carries N, wall and pad carry W",
     dimensions=(2, 3),

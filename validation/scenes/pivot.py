@@ -122,6 +122,7 @@ SCENE = CanonicalScene(
     name="pivot",
     version=1,
     title="Box that falls over its edge",
+    family="turning",
     figure=__doc__ or "",
     law="phi'' = p^2 sin(phi), p^2 = 3 g/(4 rho), about an edge that stays where it is",
     dimensions=(2, 3),

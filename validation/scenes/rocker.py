@@ -200,6 +200,7 @@ SCENE = CanonicalScene(
     name="rocker",
     version=1,
     title="Board that rocks on a log",
+    family="turning",
     figure=__doc__ or "",
     law="(h^2 + R^2 theta^2 + i^2) theta'^2/2 + g ((R + h) cos(theta) + R theta sin(theta)) is kept",
     dimensions=(2, 3),

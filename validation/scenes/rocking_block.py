@@ -203,6 +203,7 @@ SCENE = CanonicalScene(
     name="rocking_block",
     version=1,
     title="Block that rocks from edge to edge",
+    family="hard",
     figure=__doc__ or "",
     law="w+ = eta w-, eta = 1 - 3/2 sin(alpha)^2 at each landing; a pendulum about its edge in between",
     dimensions=(2,),

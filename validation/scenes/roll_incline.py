@@ -99,6 +99,7 @@ SCENE = CanonicalScene(
     name="roll_incline",
     version=1,
     title="Ball that rolls down an incline",
+    family="friction",
     figure=__doc__ or "",
     law="a = g sin(theta)/(1 + k) if mu >= tan(theta) k/(1 + k), else g (sin(theta) - mu cos(theta))",
     dimensions=(2, 3),

@@ -32,6 +32,7 @@ SCENE = CanonicalScene(
     name="slide",
     version=1,
     title="Box that slides to a stop, in any heading",
+    family="friction",
     figure=__doc__ or "",
     law="d = v^2/(2 mu g), straight on; friction does not know the heading",
     dimensions=(2, 3),

@@ -158,6 +158,7 @@ SCENE = CanonicalScene(
     name="slide_to_roll",
     version=1,
     title="Ball that slides until it rolls",
+    family="friction",
     figure=__doc__ or "",
     law="v' = v/(1 + k) after t = v k/((1 + k) mu g), then no loss",
     dimensions=(2, 3),

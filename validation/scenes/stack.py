@@ -15,6 +15,7 @@ from adapters.scene import Pair, Scene
 from validation import columns
 from validation.canonical import (
     CanonicalScene,
+    Frontier,
     Parameter,
     Params,
     Primary,
@@ -61,6 +62,7 @@ SCENE = CanonicalScene(
     name="stack",
     version=1,
     title="Column of boxes in equilibrium",
+    family="stacks and statics",
     figure=__doc__ or "",
     law="nothing moves; interface i carries the weight above it",
     dimensions=(2, 3),
@@ -97,5 +99,12 @@ SCENE = CanonicalScene(
     steps=Steps((1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0), quick_iterations=(50,), full_iterations=(4, 10, 30, 100)),
     size="n",
     smooth=("penetration",),
+    frontiers=(
+        Frontier("stack height", "boxes", "n", 1.0, 40.0, 200.0, columns.fate, columns.STANDS, whole=True),
+        Frontier("step", "s", "dt", 1.0 / 480.0, 1.0 / 5.0, 1.0, columns.fate, columns.STANDS),
+        Frontier(
+            "iterations", "", "iterations", 100.0, 1.0, 1.0, columns.fate, columns.STANDS, {"n": 10.0}, whole=True
+        ),
+    ),
     searched=Searched("stand", ({"n": 1.0}, {"n": 2.0}, {"n": 10.0}), ({}, {"n": 20.0}), (1, 10)),
 )

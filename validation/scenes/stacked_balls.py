@@ -132,6 +132,7 @@ SCENE = CanonicalScene(
     name="stacked_balls",
     version=1,
     title="Small ball on a large one: thrown back up to three times as fast",
+    family="rebound",
     figure=__doc__ or "",
     law="v_m = v (M e + M e (1 + e) - m)/(M + m)",
     dimensions=(2, 3),

@@ -19,6 +19,7 @@ from validation import bounds
 from validation.canonical import (
     CanonicalScene,
     Check,
+    Frontier,
     Measured,
     Parameter,
     Params,
@@ -68,6 +69,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     }
 
 
+def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
+    """``tunnelled``, ``stuck``; empty of a ball that came back, however slowly."""
+    back, beyond = found["rebound_ratio"][0], found["beyond"][0]
+    if back is None or beyond is None:
+        return "NaN"
+    if beyond > scene.params["thickness"] + scene.params["radius"]:
+        return "tunnelled"
+    return "" if back > 0.0 or scene.params["e"] == 0.0 else "stuck"
+
+
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """The law is exact at every step; what is found late is v dt deep, whatever is behind the face."""
     p = scene.params
@@ -97,6 +108,7 @@ SCENE = CanonicalScene(
     name="thin_wall",
     version=1,
     title="Fast ball against a thin plate",
+    family="hard",
     figure=__doc__ or "",
     law="v+ = -e v- at any speed and thickness",
     dimensions=(2, 3),
@@ -114,6 +126,18 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     track=track,
+    frontiers=(
+        Frontier(
+            "impact speed",
+            "m/s",
+            "v",
+            1.0,
+            1e3,
+            1e4,
+            fate,
+            "came back: the ball moves away from the plate, on the side that it came from",
+        ),
+    ),
     quick=(Variation({}), Variation({"v": 200.0})),
     full=tuple(Variation({"v": v, "thickness": d}) for v in (5.0, 20.0, 50.0, 200.0, 1000.0) for d in (0.02, 0.2)),
     planted=({}, {"delay": LATEST}),

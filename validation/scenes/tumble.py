@@ -23,7 +23,7 @@ from adapters.scene import Body, Box, Scene
 from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import mass_of, pose_at, states
 
 #: Sides of the box [m]: three different moments.
@@ -88,6 +88,20 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         "momentum_drift": (float(np.linalg.norm(momentum - momentum[0], axis=1).max()) / start, ""),
         "energy_drift": (float(np.abs(energy / energy[0] - 1.0).max()), ""),
     }
+
+
+#: Share of energy or angular momentum that may be gained or lost while a body still spins on.
+HALF = 0.5
+
+
+def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
+    """``exploded``, ``changed its spin``; empty of a body that spun on, however inexactly."""
+    momentum, energy = found["momentum_drift"][0], found["energy_drift"][0]
+    if momentum is None or energy is None:
+        return "NaN"
+    if max(momentum, energy) > 1.0:
+        return "exploded"
+    return "changed its spin" if max(momentum, energy) > HALF else ""
 
 
 def _euler(own: Array, spin: Array) -> Array:
@@ -160,6 +174,7 @@ SCENE = CanonicalScene(
     name="tumble",
     version=1,
     title="Box that turns over its middle axis in free space",
+    family="turning",
     figure=__doc__ or "",
     law="L and E are kept; spin about the middle axis turns over after K(m)/n",
     dimensions=(3,),
@@ -173,6 +188,18 @@ SCENE = CanonicalScene(
     measure=measure,
     rule=checks,
     sampling=states,
+    frontiers=(
+        Frontier(
+            "spin",
+            "rad/s",
+            "spin",
+            1.0,
+            1e3,
+            1e3,
+            fate,
+            "spun on: at no time more than half of its energy, or of its angular momentum, was gained or lost",
+        ),
+    ),
     quick=(Variation({}), Variation({"delta": 0.01, "spin": 6.0})),
     full=tuple(Variation({"spin": s, "delta": d}) for s in (1.0, 3.0, 10.0) for d in (0.01, 0.1, 1.0)),
     planted=({},),

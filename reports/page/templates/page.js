@@ -12,18 +12,18 @@ function showHint(text, x, y) {
   hint.style.top = (y + 18 + box.height > innerHeight ? y - box.height - 10 : y + 18) + "px";
 }
 document.addEventListener("pointerover", (event) => {
-  const point = event.target.closest?.(".canvas [role='graphics-symbol'][aria-label]");
-  if (point && !point.getAttribute("aria-roledescription")?.includes("axis")) {
-    showHint(point.getAttribute("aria-label"), event.clientX, event.clientY);
+  const point = event.target.closest?.(".canvas [data-is]");
+  if (point) {
+    showHint(point.dataset.is, event.clientX, event.clientY);
   } else hint.hidden = true;
 });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") hint.hidden = true; });
 
 /* Copy buttons stand beside every command; without a clipboard they select the text. */
-for (const button of $$("button.copy")) {
-  button.hidden = false;
+for (const command of $$(".cmd")) {
+  const code = command.firstElementChild, button = command.appendChild(document.createElement("button"));
+  Object.assign(button, { type: "button", className: "copy", textContent: "copy" });
   button.addEventListener("click", async () => {
-    const code = button.previousElementSibling;
     try {
       await navigator.clipboard.writeText(code.textContent);
       button.textContent = "copied";
@@ -79,14 +79,17 @@ if (filter && names.length > 1) {
     const owner = row && who.closest("th") === row.cells[0] ? row : item;
     if (owner && names.includes(name)) owner.dataset.who = name;
   }
+  for (const table of $$("table.matrix")) {
+    $$(".sub", table).forEach((head, k) => { for (const row of table.tBodies[0].rows) row.cells[k + 1].dataset.who = head.dataset.who; });
+  }
   for (const table of $$("table:not(.matrix)")) {
     [...(table.tHead?.rows[0]?.cells ?? [])].forEach((cell, k) => {
       const name = cell.textContent.trim();
       if (names.includes(name)) for (const row of table.rows) if (row.cells[k]) row.cells[k].dataset.who = name;
     });
   }
-  for (const mark of $$(".canvas [role='graphics-symbol'][aria-label]")) {
-    const name = nameIn(mark.getAttribute("aria-label"));
+  for (const mark of $$(".canvas [data-is]")) {
+    const name = nameIn(mark.dataset.is);
     if (name) mark.dataset.who = name;
   }
   filter.addEventListener("change", (event) => {
@@ -173,44 +176,28 @@ document.addEventListener("click", async (event) => {
   const line = cell?.parentElement;
   if (!line || cell.cellIndex < 3 || !cell.textContent) return;
   const head = line.closest("table").tHead.rows[0].cells[cell.cellIndex].textContent.split("/");
-  const command = line.dataset.run.replace("--engine @", "--engine " + head[0]).replace("--profile @", "--profile " + head[1]);
+  const { run: start, end } = line.closest("table").dataset;
+  const own = line.dataset.run ?? line.cells[0].textContent.trim().split(" ").join(" --param ");
+  const command = [start, own, end].filter(Boolean).join(" ").replace("--engine @", "--engine " + head[0]).replace("--profile @", "--profile " + head[1]);
   let said = command;
   try { await navigator.clipboard.writeText(command); said = "copied: " + command; } catch { /* shown instead */ }
   showHint(said, event.clientX, event.clientY);
 });
 
-/* All rows as JSON, from the CSV that is inside the page. */
-const asJson = document.getElementById("as-json");
-if (asJson && "DecompressionStream" in window) {
-  asJson.hidden = false;
-  asJson.querySelector("button").addEventListener("click", async () => {
-    const link = document.querySelector("a[download='rows.csv.gz']");
-    const [names, ...lines] = parseCsv(await inflate(link.href.split(",")[1], "gzip").then((buffer) => new TextDecoder().decode(buffer)));
-    const number = /^-?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
-    const text = new Set(["run", "cells", "state_hash", "engine_version"]);
-    const rows = lines.map((line) => Object.fromEntries(names.map((name, k) => {
-      const value = line[k];
-      return [name, value === "" ? null : !text.has(name) && number.test(value) ? Number(value) : value];
-    })));
-    save("rows.json", JSON.stringify(rows, null, 1), "application/json");
+/* All rows as CSV, from the columns that are inside the page; a spreadsheet must not take text for a formula. */
+const asCsv = document.getElementById("as-csv");
+if (asCsv && "DecompressionStream" in window) {
+  asCsv.hidden = false;
+  asCsv.querySelector("button").addEventListener("click", async () => {
+    const link = document.querySelector("a[download='rows.json.gz']");
+    const columns = JSON.parse(await inflate(link.href.split(",")[1], "gzip").then((buffer) => new TextDecoder().decode(buffer)));
+    const names = Object.keys(columns), quoted = (value) => {
+      const text = typeof value === "string" && /^[=+\-@\t\r]/.test(value) ? "'" + value : String(value ?? "");
+      return /[",\r\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
+    };
+    const lines = (columns[names[0]] ?? []).map((_, k) => names.map((name) => quoted(columns[name][k])).join(","));
+    save("rows.csv", [names.join(","), ...lines].join("\n") + "\n", "text/csv");
   });
-}
-function parseCsv(text) {
-  const rows = [[]];
-  let field = "", quoted = false;
-  for (let i = 0; i < text.length; i++) {
-    const c = text[i];
-    if (quoted) {
-      if (c === '"' && text[i + 1] === '"') { field += c; i++; }
-      else if (c === '"') quoted = false;
-      else field += c;
-    } else if (c === '"') quoted = true;
-    else if (c === ",") { rows.at(-1).push(field); field = ""; }
-    else if (c === "\n") { rows.at(-1).push(field); field = ""; rows.push([]); }
-    else field += c;
-  }
-  rows.pop();
-  return rows;
 }
 async function inflate(base64, format) {
   const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));

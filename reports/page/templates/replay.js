@@ -15,7 +15,10 @@
   async function load(id) {
     if (loaded.has(id)) return loaded.get(id);
     const data = JSON.parse(document.querySelector(`.replay-data[data-id="${CSS.escape(id)}"]`).textContent);
-    const levels = new Int16Array(await inflate(data.packed, "deflate"));
+    const bytes = new Uint8Array(await inflate(data.packed, "deflate")), half = bytes.length / 2;
+    const levels = new Int16Array(half).map((_, i) => bytes[i] | (bytes[half + i] << 8));
+    const { last: end, count } = data.t;
+    if (count) data.t = Array.from({ length: count }, (_, k) => (end * k) / (count - 1));
     const d = data.dimension, parts = d === 2 ? 3 : 7, bodies = data.bodies.length;
     let at = 0;
     const take = (count) => levels.slice(at, (at += count));

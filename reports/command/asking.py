@@ -1,0 +1,82 @@
+"""``field``: public questions and bug reports, run again."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import click
+from rich.table import Table
+from rich.text import Text
+
+from reports.command import statuses
+from reports.command.group import AS_JSON, main
+from reports.terminal import terminal
+from reports.wording import number, reproduce
+from validation.field import Finding, ask, matching
+from validation.switching import Reading
+
+
+@main.command("field")
+@click.argument("words", nargs=-1)
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--commands", is_flag=True, help="Print the command of every note.")
+@AS_JSON
+def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:
+    """Run what people asked or reported in public, and say whether it is so on the engines that are installed.
+
+    WORDS choose notes by repository, engine or scene; all by default. Exits with 1 if a note is no longer true.
+    """
+    chosen = matching(words)
+    if not chosen:
+        raise click.BadParameter(f"no note has {' or '.join(words)}", param_hint="WORDS")
+    found = ask(chosen, jobs)
+    if as_json:
+        click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
+    else:
+        _show(found, commands)
+    sys.exit(statuses.verdict(not all(each.as_said for each in found), True))
+
+
+def _show(found: list[Finding], commands: bool) -> None:
+    console = terminal()
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("who asked, of what", "what was seen", "on this machine"):
+        table.add_column(heading, overflow="fold")
+    for each in found:
+        note = each.note
+        who = f"{note.source}\n{note.about}" + ("" if note.about == note.engine else f", asked of {note.engine}")
+        table.add_row(Text(who), Text(note.symptom), Text(_said(each)))
+        table.add_row("", "", "")
+    console.print(table, highlight=False)
+    for each in found if commands else ():
+        console.print(Text(f"{each.note.source}: {reproduce(each.note.slot.as_dict())}"), soft_wrap=True)
+    if not commands:
+        console.print(Text("--commands prints the command of every note", style="dim"))
+
+
+def _said(each: Finding) -> str:
+    note = each.note
+    text = each.now + ("" if each.as_said else f" (the note says: {note.said})")
+    if each.before is not None:
+        text += f"\n{note.engine}/{note.profile} {note.scene} {note.dimension}-D: {note.metric} {_number(each.before)}"
+    if each.after is not None:
+        text += f"; with {note.cure_text}: {_number(each.after)}"
+    return text
+
+
+def _number(found: Reading) -> str:
+    if found.value is None:
+        return found.reason
+    unit = "" if found.check.unit == "1" else f" {found.check.unit}"
+    return f"{number(found.value, 3)}{unit} (truth {number(found.check.truth, 3)})"
+
+
+def _as_plain(each: Finding) -> dict[str, object]:
+    note = each.note
+    return {
+        "source": note.source, "about": note.about, "symptom": note.symptom, "slot": note.slot.as_dict(),
+        "metric": note.metric, "command": reproduce(note.slot.as_dict()), "cure": note.cure_text, "said": note.said,
+        "now": each.now, "as_said": each.as_said,
+        "value": each.before.value if each.before else None, "cured": each.after.value if each.after else None,
+    }  # fmt: skip

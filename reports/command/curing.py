@@ -1,0 +1,109 @@
+"""``cure``: which stock settings mend what an engine gets wrong on a scene, and at what cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from adapters.engine import EngineError
+from adapters.engine_folder import CURES, folder_of
+from adapters.registry import load, profile_of
+from reports.command.completion import engine_names, scene_names
+from reports.command.group import AS_JSON, main
+from reports.cures import cure_paste, cure_text, setting_text
+from reports.speed import duration
+from reports.terminal import terminal
+from reports.wording import number, params_text
+from validation.catalogue import matching
+from validation.cures import Changes, Cure, cures_of, search, write
+
+
+@main.command()
+@click.argument("engine", shell_complete=engine_names)
+@click.argument("scenes", nargs=-1, shell_complete=scene_names)
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--keep", is_flag=True, help="Write what is found into cures.csv of the engine's folder.")
+@AS_JSON
+def cure(engine: str, scenes: tuple[str, ...], dim: tuple[int, ...], jobs: int, keep: bool, as_json: bool) -> None:
+    """Search which stock settings of ENGINE mend what it gets wrong as shipped on SCENES (all by default).
+
+    Each setting alone, pairs with the best one, other profiles with what can be left out of them: what mends most
+    checks and breaks none is shown with error and cost before and after, and as lines to paste. Seconds to a minute a
+    scene. With --keep the table of the engine is kept, which `run`, `show`, `explain` and the report read.
+    """
+    if profile_of(engine, "shipped") is None:
+        load(engine)  # says that there is no such engine, if so
+        raise EngineError(f"cure: {engine} has no profile as shipped that could be mended")
+    version = load(engine).version()
+    names = list(dict.fromkeys(scene.name for pattern in scenes or ("*",) for scene in matching(pattern)))
+    console, progress = terminal(), terminal(stderr=True)
+    listed = {key: old for key, old in cures_of(engine).items() if old.version == version}
+    found: list[Cure] = []
+    for name in names:
+        (canonical,) = matching(name)
+        for dimension in canonical.dimensions:
+            if dim and dimension not in dim:
+                continue
+            progress.print(f"{engine} {name} {dimension}-D", style="dim", markup=False, highlight=False)
+            result = search(engine, name, dimension, jobs)
+            listed.pop((name, dimension), None)
+            if result is not None:
+                listed[name, dimension] = result
+                found.append(result)
+            if keep:
+                _keep(engine, listed)
+            if not as_json:
+                _show(engine, name, dimension, result, console)
+    if as_json:
+        click.echo(json.dumps([{**asdict(each), "paste": cure_paste(each)} for each in found], indent=1, default=str))
+
+
+def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
+    """Write the table after every scene: a search of all takes long, and what is found is not lost."""
+    folder = folder_of(engine)
+    if folder is None:
+        raise EngineError(f"cure: {engine} has no folder of its own to keep {CURES} in")
+    write([listed[key] for key in sorted(listed)], folder / CURES)
+
+
+def _show(engine: str, scene: str, dimension: int, found: Cure | None, console: Console) -> None:
+    head = Text(f"{engine} {scene} {dimension}-D: ", style="bold")
+    if found is None:
+        console.print(head + Text("as shipped it fails no check of it, or it cannot be asked of it", style=""))
+        return
+    console.print(head + Text(f"{found.failing} of {found.judged} checks fail as shipped"), soft_wrap=True)
+    if not found.helps:
+        console.print(f"  {cure_text(found)}", markup=False, highlight=False, soft_wrap=True)
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
+    for heading in ("", "as shipped", "cured", "truth"):
+        table.add_column(heading)
+    where = params_text(found.params)
+    what = f"{found.metric}{f' at {where}' if where else ''}" + ("" if found.unit == "1" else f" [{found.unit}]")
+    truth = f"{number(found.truth, 4)} ± {number(found.tolerance, 2)}"
+    table.add_row(what, number(found.before, 4), number(found.after, 4), truth)
+    table.add_row("checks that fail", str(found.failing), str(found.left), "")
+    costs = [duration(cost) if cost else "-" for cost in (found.cost_before, found.cost_after)]
+    table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
+    console.print(table, highlight=False)
+    for name, value in found.changes.items():
+        console.print(f"  {name} = {setting_text(value)}", markup=False, highlight=False, soft_wrap=True)
+    if found.profile:
+        console.print(f"  profile {found.profile} has all of it", markup=False, highlight=False)
+    if found.others:
+        console.print(f"  or alone: {_alternatives(found.others)}", markup=False, highlight=False, soft_wrap=True)
+    paste = cure_paste(found)
+    if paste:
+        console.print("to paste:", style="bold")
+        console.print(Text(paste), soft_wrap=True)
+
+
+def _alternatives(others: Sequence[Changes]) -> str:
+    return "; ".join(", ".join(f"{name} = {setting_text(value)}" for name, value in each.items()) for each in others)

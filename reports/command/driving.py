@@ -1,0 +1,123 @@
+"""``frontier``: how far each engine can be driven, with the two cells that prove it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from adapters import registry
+from reports.command import statuses
+from reports.command.completion import engine_names, scene_names
+from reports.command.group import AS_JSON, main
+from reports.command.selection import missing
+from reports.terminal import terminal
+from reports.wording import reproduce
+from validation.catalogue import matching
+from validation.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
+
+#: So few brackets have their commands below them without being asked.
+FEW = 6
+
+
+@main.command()
+@click.argument("scenes", nargs=-1, shell_complete=scene_names)
+@click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
+@click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
+@click.option("--quick/--full", "quick", default=True, help="Ends a factor 1.3 or 1.03 apart; quick is the default.")
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--commands", is_flag=True, help="Print the commands of both ends of every bracket.")
+@AS_JSON
+def frontier(
+    scenes: tuple[str, ...],
+    engine: tuple[str, ...],
+    profile: tuple[str, ...],
+    dim: tuple[int, ...],
+    quick: bool,
+    jobs: int,
+    commands: bool,
+    as_json: bool,
+) -> None:
+    """Bisect how far each engine and profile can be driven until a scene no longer happens.
+
+    Largest step, stack height, mass ratio, spin and impact speed, fewest iterations: each as a bracket of one cell
+    that survives and one that does not, with how it ended and the commands that run both again. SCENES that declare
+    no such axis are refused. Exits with 4 if a named engine is not here.
+    """
+    names = list(dict.fromkeys(scene.name for pattern in scenes for scene in matching(pattern)))
+    known = dict.fromkeys(name for name, _ in axes())
+    for name in names:
+        if name not in known:
+            raise click.BadParameter(f"{name} cannot be driven; {', '.join(known)} can", param_hint="SCENES")
+    engines = list(engine) or registry.names()
+    for name in engines:
+        registry.find(name)
+    found = brackets(names, engines, profile, dim, quick)
+    console, progress = terminal(), terminal(stderr=True)
+    for still, _ in search(found, QUICK_RATIO if quick else FULL_RATIO, jobs):
+        progress.print(f"{still} of {len(found)} brackets open", style="dim", highlight=False)
+    if as_json:
+        click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
+    else:
+        _show(found, commands or len(found) <= FEW, console)
+    absent = missing(engine, engines)
+    for line in absent:
+        progress.print(line, markup=False, highlight=False, soft_wrap=True)
+    sys.exit(statuses.verdict(False, not absent))
+
+
+def _who(bracket: Bracket) -> str:
+    return f"{bracket.base.engine}/{bracket.base.profile} {bracket.base.dimension}-D"
+
+
+def _show(found: list[Bracket], commands: bool, console: Console) -> None:
+    kinds = dict.fromkeys((each.base.scene, each.frontier.name) for each in found)
+    for scene, name in kinds:
+        own = [each for each in found if (each.base.scene, each.frontier.name) == (scene, name)]
+        first = own[0].frontier
+        console.print()
+        params = " ".join(f"{k}={v:g}" for k, v in first.params.items())
+        console.print(Text(f"{name} ({scene}{' ' + params if params else ''})", style="bold"))
+        console.print(Text(f"survives if it {first.survives}", style="dim"))
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
+        for heading in ("engine, profile", "survives", "fails", "how"):
+            table.add_column(heading)
+        for each in own:
+            table.add_row(_who(each), *_cells(each))
+        console.print(table, highlight=False)
+        for each in own if commands else ():
+            for end, said in ((each.survives, "survives"), (each.fails, "fails")):
+                if end is not None:
+                    console.print(Text(f"  {said}: {reproduce(end.slot.as_dict())}"), soft_wrap=True)
+    if not commands and found:
+        console.print()
+        console.print(Text("--commands prints the two cells of every bracket, --json all of it", style="dim"))
+
+
+def _cells(bracket: Bracket) -> tuple[str, str, str]:
+    if bracket.refused:
+        return "-", "-", bracket.refused
+    good, bad = bracket.survives, bracket.fails
+    said = [value_text(bracket.frontier, end.value) if end else "" for end in (good, bad)]
+    return said[0] or "nothing asked", said[1] or "nothing asked", bad.fate if bad else "the hardest asked survives"
+
+
+def _as_plain(bracket: Bracket) -> dict[str, Any]:
+    ends = {
+        name: None if end is None else {
+            "value": end.value, "fate": end.fate, "slot": end.slot.as_dict(), "command": reproduce(end.slot.as_dict())
+        }
+        for name, end in (("survives", bracket.survives), ("fails", bracket.fails))
+    }  # fmt: skip
+    slot, frontier = bracket.base, bracket.frontier
+    return {
+        "scene": slot.scene, "dimension": slot.dimension, "engine": slot.engine, "profile": slot.profile,
+        "what": frontier.name, "unit": frontier.unit, "predicate": frontier.survives, "said": bracket.text,
+        "refused": bracket.refused, "cells": bracket.cells, **ends,
+    }  # fmt: skip

@@ -1,0 +1,72 @@
+"""``residuals``: how far the impulses that engines report break the laws of contact."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+from rich.table import Table
+from rich.text import Text
+
+from reports.command.group import AS_JSON, main
+from reports.command.posing import cells_of
+from reports.command.selection import request_from, selection
+from reports.terminal import terminal
+from reports.wording import number, reproduce
+from validation.apart import Apart
+from validation.plan import slots
+from validation.residuals import LAWS, Residuals, ask
+
+
+@main.command("residuals")
+@selection
+@AS_JSON
+def residuals(as_json: bool, **options: Any) -> None:
+    """Measure how far the contacts that engines report break the laws of contact, on the representative cells.
+
+    Shares of the largest impulse of the run (works: times the fastest contact); a word where an engine reports none.
+    """
+    options["full"] = not options["quick"]
+    cells = cells_of(slots(request_from(options)), bool(options["param"] or options["iterations"] or options["dt"]))
+    progress = terminal(stderr=True)
+    found: list[Residuals] = []
+    with Apart() as apart:
+        for slot in cells:
+            progress.print(f"{slot.engine}/{slot.profile} {slot.scene} {slot.dimension}-D", style="dim", markup=False)
+            found.append(ask(slot, apart))
+    if as_json:
+        plain = [
+            {"slot": each.slot.as_dict(), "command": reproduce(each.slot.as_dict()), "contacts": each.contacts,
+             "refused": each.refused, "residuals": {name: list(value) for name, value in each.values.items()}}
+            for each in found
+        ]  # fmt: skip
+        click.echo(json.dumps(plain, indent=1))
+        return
+    _show(found)
+
+
+def _show(found: list[Residuals]) -> None:
+    console = terminal()
+    for scene in dict.fromkeys((each.slot.scene, each.slot.dimension) for each in found):
+        own = [each for each in found if (each.slot.scene, each.slot.dimension) == scene]
+        params = own[0].slot.params_text()
+        console.print()
+        console.print(Text(f"{scene[0]} {scene[1]}-D{' ' + params if params else ''}", style="bold"))
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
+        for heading in ("engine, profile", *LAWS):
+            table.add_column(heading)
+        told = []
+        for each in own:
+            who = f"{each.slot.engine}/{each.slot.profile}"
+            reasons = dict.fromkeys(reason for value, reason in each.values.values() if value is None)
+            if reasons:
+                told.append(f"{who}: {'; '.join(reasons)}")
+            else:
+                table.add_row(who, *(number(value, 2) for value, _ in each.values.values()))
+        if table.row_count:
+            console.print(table, highlight=False)
+        for line in told:
+            console.print(Text(f"  {line}", style="dim"))
+    console.print()
+    console.print(Text("; ".join(f"{name}: {law}" for name, law in LAWS.items()), style="dim"))

@@ -1,0 +1,78 @@
+"""Scenes by family: a line of marks and a sentence each, so that forty scenes are read like eight."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from reports.matrix import UNJUDGED, Field, Matrix, matrix_of
+from reports.page.conclusions import clean_profiles, joined
+from reports.page.source import Source
+from reports.page.verdicts import Mark, MatrixLine, family_mark, matrix_lines, slug
+from reports.wording import mark_of, plural
+from validation.canonical import FAMILIES
+from validation.posed import resolve
+
+#: Scenes that a sentence names one by one.
+FEW = 3
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family: its scenes, what the data say of it, its marks (one per engine and profile), its scenes' lines."""
+
+    name: str
+    anchor: str
+    scenes: tuple[str, ...]
+    sentence: str
+    marks: list[Mark]
+    lines: list[MatrixLine]
+
+
+def families(source: Source) -> list[Family]:
+    """Families of the run's scenes: the known ones in their order, then others by name."""
+    found = matrix_of(source.rows)
+    scenes: dict[str, list[str]] = {}
+    for scene in source.scenes:
+        scenes.setdefault(resolve(scene).family, []).append(scene)
+    names = [name for name in FAMILIES if name in scenes] + sorted(set(scenes) - set(FAMILIES))
+    return [_family(source, found, name, scenes[name]) for name in names]
+
+
+def _family(source: Source, found: Matrix, name: str, scenes: Sequence[str]) -> Family:
+    lines = [line for line in source.lines if line[0] in scenes]
+    anchor = slug("family", name)
+    marks = []
+    for column in source.columns:
+        own: Counter[str] = Counter()
+        for line in lines:
+            own += found.fields[line, column].marks if (line, column) in found.fields else Counter()
+        marks.append(family_mark(Field(own) if own else None, anchor))
+    return Family(name, anchor, tuple(scenes), sentence(source, scenes), marks, matrix_lines(source, found, lines))
+
+
+def sentence(source: Source, scenes: Sequence[str]) -> str:
+    """What the data say of some scenes: who passes all of them, where each other engine has no clean profile."""
+    clean = {scene: clean_profiles(source, scene) for scene in scenes}
+    asked = {
+        engine: [s for s in scenes if any(mark_of(r) not in UNJUDGED for r in source.of(scene=s, engine=engine))]
+        for engine in source.engines
+    }
+    whole, lacking = [], []
+    for engine, own in asked.items():
+        without = [scene for scene in own if not clean[scene].get(engine)]
+        if own and not without:
+            whole.append(engine if len(own) == len(scenes) else f"{engine} ({len(own)} of them)")
+        elif without:
+            where = joined(without) if len(without) <= FEW else f"{len(without)} of {len(own)}"
+            lacking.append(f"{engine} has none for {where}")
+    if not whole and not lacking:
+        return "No engine gave an answer that is judged."
+    said = f"{plural(len(scenes), 'scene')}. "
+    if whole:
+        has = "has" if len(whole) == 1 else "each have"
+        said += f"{joined(whole)} {has} a profile that passes everything{'; ' if lacking else '.'}"
+    if lacking:
+        said += f"{'' if whole else 'No engine passes everything: '}{joined(lacking)}."
+    return said

@@ -1,0 +1,84 @@
+"""What makes the page small: pictures look the same, markup means the same, and both are smaller."""
+
+import itertools
+import math
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from reports.page.slimming import FLAT, simplified, small_html, small_path, small_svg
+
+
+def distance(point, a, b):
+    length = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2
+    share = ((point[0] - a[0]) * (b[0] - a[0]) + (point[1] - a[1]) * (b[1] - a[1])) / length if length else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.dist(point, (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+
+
+CURVE = [(4.13 * k, 125.0 + 100.0 * math.cos(0.06 * k) * math.exp(-0.02 * k)) for k in range(150)]
+
+
+def test_no_point_of_a_curve_is_farther_from_what_is_drawn_than_said():
+    drawn = small_path("M" + "L".join(f"{x:.2f},{y:.2f}" for x, y in CURVE))
+    steps = [tuple(map(float, pair.split(","))) for pair in re.split("[Ml]", drawn)[1:]]
+    at, kept = (0.0, 0.0), []
+    for step in steps:
+        at = (at[0] + step[0], at[1] + step[1])
+        kept.append(at)
+    assert len(kept) < 0.7 * len(CURVE)
+    off = max(min(distance(p, a, b) for a, b in itertools.pairwise(kept)) for p in CURVE)
+    assert off <= FLAT + 0.1  # steps are in tenths, and do not add up
+
+
+def test_a_straight_run_is_one_line_and_a_corner_stays():
+    assert small_path("M0,0L1,0L2,0L3,0L3,5L3,9") == "M0,0l3,0l0,9"
+    assert simplified([(0.0, 0.0), (1.0, 3.0), (0.0, 0.0)], 0.25) == [(0.0, 0.0), (1.0, 3.0), (0.0, 0.0)]
+    assert small_path("M3.39,0A3.39,3.39,0,1,1,-3.39,0") == "M3.39,0A3.39,3.39,0,1,1,-3.39,0"
+
+
+def test_one_look_is_said_once_and_parts_that_differ_keep_theirs():
+    small = small_svg(
+        '<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="a &lt;b&gt;"><g class="x"><g transform='
+        '"translate(0,0)"><line x2="0" y2="4" stroke="red"/><line transform="translate(3,1)" x2="0" y2="4" '
+        'stroke="red"/></g><g><path aria-label="one &amp; only" role="graphics-symbol" d="M0,0L1,1" stroke="blue"/></g>'
+        "</g></svg>"
+    )
+    assert small == (
+        '<svg role="img" aria-label="a &lt;b&gt;"><g stroke="red"><path d="M0,0l0,4M3,1l0,4"/></g>'
+        '<path d="M0,0l1,1" stroke="blue" data-is="one &amp; only"/></svg>'
+    )
+    assert "class" not in small and "graphics-symbol" not in small and 'role="img"' in small
+
+
+class Seen(HTMLParser):
+    """Tags with attributes, and text: what a browser is given, closing tags aside."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.said = [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, tuple(attrs)))
+
+    def handle_data(self, data):
+        self.said += data
+
+
+def test_markup_means_the_same():
+    page = (
+        '<table class="grid wide">\n  <tr id="a-1"><th scope="row">x</th><td class="n" title="a b">1 < 2</td></tr>\n'
+        '</table><pre>\n  </td> kept </td>\n</pre><script>if (a) { "</li>  \n  " }</script><ul><li>y</li>\n</ul>'
+    )
+    small = small_html(page)
+    assert Seen(small).tags == Seen(page).tags
+    assert Seen(small).said.split() == Seen(page).said.split()
+    assert "<pre>\n  </td> kept </td>\n</pre>" in small and '"</li>  \n  "' in small
+    assert "class=n" in small and 'class="grid wide"' in small
+
+
+@pytest.mark.parametrize("quoted", ['<a href="#x">', '<td title="a">', '<input value="a b">', '<td class="a"/>'])
+def test_quotes_stay_where_they_are_needed(quoted):
+    assert small_html(quoted) == quoted

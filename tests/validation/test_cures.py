@@ -1,0 +1,183 @@
+"""Cures: the smallest change that mends most and breaks nothing, told of the scene and dimension it was measured on."""
+
+from dataclasses import replace
+
+import pytest
+
+from adapters.engine_folder import CURES, inside
+from adapters.registry import find, names
+from reports.cures import cure_paste, cure_text, decided_by, told_cures
+from validation import cures
+from validation.cures import Cure, _best, _Trials, asked_of, cures_of, read, search, write
+from validation.posed import resolve
+from validation.switching import readings
+
+CURE = Cure(
+    "mujoco", "4.0.1", "default", "pinch", 2, ({}, {"margin": 1.05}), 5, 0, 12, "creep", "m/s", {"margin": 1.05}, 0.0,
+    5.7e-5, 0.0157, 1.4e-6, {"cone": "elliptic", "solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)}, "tuned",
+    ({"tolerance": 0.0},), 45, 1.5e-5, 2.5e-5,
+)  # fmt: skip
+
+
+def test_a_table_is_read_back_with_its_tuples(tmp_path):
+    other = replace(CURE, dimension=3, before=None, changes={}, profile="", others=(), cost_before=None, left=5)
+    write([CURE, other], tmp_path / "cures.csv")
+    assert read(tmp_path / "cures.csv") == [CURE, other]
+
+
+def test_a_cure_is_told_in_one_line_with_error_and_cost():
+    text = cure_text(CURE)
+    assert text.startswith("2-D by cone=elliptic, solimp=0.9999 0.9999 0.001 0.5 1: creep at margin=1.05")
+    assert "0.0157 -> 1.4e-6 m/s" in text and text.endswith("at 1.7 times the cost") and "\n" not in text
+    assert "2 of 5 checks still fail" in cure_text(replace(CURE, left=2))
+    assert cure_text(replace(CURE, left=5, changes={})).endswith(
+        "none of 45 changes of its settings that were tried helps"
+    )
+
+
+def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): CURE})
+    assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 1
+    assert told_cures("mujoco", "4.0.1", "pinch", "default", [3]) == []
+    assert told_cures("mujoco", "4.0.2", "pinch", "default", [2]) == []
+    assert told_cures("mujoco", "4.0.1", "pinch", "tuned", [2]) == []
+    assert decided_by("mujoco", "4.0.1", "pinch", [3], "default", "tuned") == ""
+    planar = decided_by("mujoco", "4.0.1", "pinch", [2], "default", "tuned")
+    assert planar and decided_by("mujoco", "4.0.1", "pinch", [2, 3], "default", "tuned") == f"{planar} (2-D)"
+
+
+def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
+    both = {("pinch", 2): CURE, ("pinch", 3): replace(CURE, dimension=3, cost_after=4.5e-5)}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: both)
+    (text,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
+    assert text.startswith("2-D and 3-D by cone=elliptic") and text.endswith("at 3 times the cost")
+    both["pinch", 3] = replace(CURE, dimension=3, changes={"tolerance": 0.0})
+    assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 2
+
+
+def test_a_cure_is_pasted_with_the_values_of_its_own_cell():
+    pytest.importorskip("mujoco")
+    assert 'cone="elliptic"' in cure_paste(CURE) and 'solimp="0.9999 0.9999 0.001 0.5 1"' in cure_paste(CURE)
+    assert cure_paste(replace(CURE, changes={})) == ""
+
+
+def test_few_cells_stand_for_a_scene_of_many():
+    for scene in ("impact", "bounce", "stack", "pinch"):
+        found = asked_of(scene, 2)
+        assert 1 <= len(found) <= cures.MOST_CELLS
+        assert dict(resolve(scene).minimal(resolve(scene).representative)) in found
+
+
+# ---- the search, on an engine whose settings do what a table says ----
+
+NAMES = ("a", "b", "c")
+
+
+class Toy:
+    """Two checks fail as shipped; ``mended(settings)`` says by how many tolerances each is off."""
+
+    profiles = ("default", "tuned")
+
+    def __init__(self, off):
+        self.off = off
+
+
+def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
+    """Trials on one cell of which the first checks are off by ``off(settings)`` tolerances, the others by 0."""
+    from validation.cells import Observation, Outcome, Slot
+
+    slot = Slot("pinch", (), 2, "toy", "default", 1 / 240)
+
+    def observe(slots, jobs=1):
+        found = {}
+        for asked in slots:
+            blank = Observation(asked, "c", 1, "1", Outcome.OK)
+            checks = [each.check for each in readings(blank)]
+            by = off(dict(asked.switched) | ({"iterations": asked.iterations} if asked.iterations else {}))
+            by = [*by, *[0.0] * (len(checks) - len(by))]
+            metrics = {c.metric: (c.truth + k * c.bound, "") for c, k in zip(checks, by, strict=True)}
+            found[asked] = replace(blank, metrics=metrics)
+        return found
+
+    monkeypatch.setattr(cures, "observe", observe)
+    monkeypatch.setattr(cures, "_own", lambda slot: dict.fromkeys(NAMES, 0))
+    monkeypatch.setattr(cures, "load", lambda engine: Toy(off))
+    monkeypatch.setattr(cures, "candidates_of", lambda engine: candidates)
+    monkeypatch.setattr(cures, "belongs_of", lambda engine: {})
+    monkeypatch.setattr(cures, "has_iterations", lambda engine, slot: False)
+    monkeypatch.setattr(cures, "changes_of", lambda slot, name: dict(whole or {}))
+    trials = _Trials([slot], 1)
+    failing = sum(each.badness > 1.0 for each in trials.start)
+    found = _best("toy", trials, [slot], failing)
+    return (found, trials) if handed else found
+
+
+def test_one_setting_that_mends_all_is_found_and_its_equals_are_named(monkeypatch):
+    def off(s):
+        return (0.5, 0.5) if s.get("b") == 2 or s.get("c") == 1 else (9.0, 9.0)
+
+    best, singles = trials_of(monkeypatch, off, {"a": (1,), "b": (1, 2), "c": (1,)})
+    assert best.failing == 0 and best.size == 1
+    assert [dict(each.changes[0]) for each in singles] == [{"b": 2}, {"c": 1}]
+
+
+def test_what_breaks_a_check_that_passed_is_no_cure(monkeypatch):
+    def off(s):
+        return (0.0, 0.0, 1.5) if s.get("a") else (9.0, 0.5) if s.get("b") else (9.0, 9.0)
+
+    best, _ = trials_of(monkeypatch, off, {"a": (1,), "b": (1,)})
+    assert dict(best.changes[0]) == {"b": 1} and best.failing == 1
+
+
+def test_two_that_mend_together_are_found_where_none_does_alone(monkeypatch):
+    def off(s):
+        return (0.5 if s.get("a") else 9.0, 0.5 if s.get("a") and s.get("c") else 9.0)
+
+    best, _ = trials_of(monkeypatch, off, {"a": (1,), "b": (1,), "c": (1,)})
+    assert dict(best.changes[0]) == {"a": 1, "c": 1} and best.failing == 0
+
+
+def test_a_profile_is_cut_down_to_what_cannot_be_left_out(monkeypatch):
+    def off(s):
+        return (0.5, 0.5) if s.get("a") and s.get("c") else (9.0, 9.0)
+
+    best, _ = trials_of(monkeypatch, off, {}, {"a": 1, "b": 1, "c": 1})
+    assert dict(best.changes[0]) == {"a": 1, "c": 1} and best.failing == 0
+
+
+def test_where_nothing_helps_nothing_is_said_to(monkeypatch):
+    best, singles = trials_of(monkeypatch, lambda s: (9.0, 9.0), {"a": (1, 2)}, {"b": 1})
+    assert best is None and singles == []
+
+
+def test_what_is_told_is_a_check_that_the_cure_mends(monkeypatch):
+    def off(s):
+        return (8.0, 0.5) if s.get("b") else (9.0, 5.0)  # the first check stays wrong
+
+    (best, _), trials = trials_of(monkeypatch, off, {"b": (1,)}, handed=True)
+    failing = [each for each in trials.start if each.badness > 1.0]
+    assert [each.check.metric for each in failing] == ["creep", "turned"]
+    assert cures._told(trials, failing, best).check.metric == "turned"
+    assert cures._told(trials, failing, None).check.metric == "creep"
+
+
+def test_a_real_engine_is_cured_by_what_its_sheet_says():
+    """Chipmunk's box hops as it starts to slide, by an overlap that it is not given at the start."""
+    pytest.importorskip("pymunk")
+    found = search("chipmunk", "slide", 2)
+    assert (found.failing, found.left) == (1, 0) and found.metric == "hop"
+    assert list(found.changes) == ["start_overlap"] and found.before > found.tolerance > found.after
+    assert found.cost_before > 0.0 and found.cost_after > 0.0
+    assert search("chipmunk", "incline", 2) is None and search("chipmunk", "slide", 3) is None
+
+
+@pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
+def test_the_committed_tables_are_of_the_installed_release_and_of_scenes_that_exist(engine):
+    listed = read(inside(engine, CURES))
+    assert {cure.engine for cure in listed} == {engine}
+    assert len({(cure.scene, cure.dimension) for cure in listed}) == len(listed) == len(cures_of(engine))
+    for cure in listed:
+        assert cure.dimension in resolve(cure.scene).dimensions and 0 < cure.failing <= cure.judged
+        assert bool(cure.changes) == cure.helps and cure.left <= cure.failing
+        assert [dict(cell) for cell in cure.cells] == [dict(cell) for cell in asked_of(cure.scene, cure.dimension)]
+        assert find(engine).engine is None or cure.version == find(engine).version, "make cures"

@@ -1,0 +1,171 @@
+"""What must not matter: maps that come back as they went, and engines of which each kind of dependence is seen."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.scene import Body, Box, Scene
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.catalogue import CATALOGUE
+from validation.cells import Slot
+from validation.invariance import RELATIONS, Change, compare, floor, judged, measured, unit_of
+
+BY_NAME = {relation.name: relation for relation in RELATIONS}
+LINES = [(name, d) for name, scene in CATALOGUE.items() for d in scene.dimensions]
+
+
+def start_of(scene):
+    """A trajectory of two samples: the scene's own start, and the same moved and turned by what its twist says."""
+    d = scene.dimension
+    pose = np.array([body.pose for body in scene.bodies])
+    twist = np.array([body.twist for body in scene.bodies])
+    return Trajectory(np.array([0.0]), pose[None], twist[None], None, 0.01, "completed"), d
+
+
+@pytest.mark.parametrize("relation", [each for each in RELATIONS if each.name not in ("again", "fresh process")],
+                         ids=lambda each: each.name)  # fmt: skip
+@pytest.mark.parametrize(("name", "dimension"), LINES)
+def test_what_is_posed_otherwise_comes_back_as_it_was(name, dimension, relation):
+    scene = CATALOGUE[name].scene(dimension)
+    posed = relation.pose(scene)
+    if isinstance(posed, str):
+        assert relation.name in ("boosted", "turned 33", "turned 90")
+        return
+    back = posed.back(start_of(posed.scene)[0])
+    before, _ = start_of(scene)
+    size = max(1.0, posed.shift)
+    for index, body in enumerate(scene.bodies):
+        if hasattr(body.shape, "normal"):
+            continue  # lies where its normal says
+        assert back.pose[0, index, :dimension] == pytest.approx(before.pose[0, index, :dimension], abs=1e-13 * size)
+        turned = np.abs(back.pose[0, index, dimension:] @ before.pose[0, index, dimension:])
+        if dimension == 3:  # a quaternion and its negative are one attitude
+            assert turned == pytest.approx(1.0, abs=1e-12)
+        assert back.twist[0, index] == pytest.approx(before.twist[0, index], abs=1e-13 * size)
+
+
+@pytest.mark.parametrize("name", ["turned 33", "turned 90", "mirrored"])
+def test_a_map_of_space_keeps_distances_from_every_face(name):
+    scene = CATALOGUE["incline"].scene(3)
+    posed = BY_NAME[name].pose(scene).scene
+    for one, other in zip(scene.bodies, posed.bodies, strict=True):
+        if hasattr(one.shape, "normal"):
+            continue
+        for face, moved in zip(scene.bodies, posed.bodies, strict=True):
+            if hasattr(face.shape, "normal"):
+                before = np.dot(face.shape.normal, one.pose[:3]) - face.shape.offset
+                after = np.dot(moved.shape.normal, other.pose[:3]) - moved.shape.offset
+                assert after == pytest.approx(before, abs=1e-12)
+    assert math.hypot(*posed.gravity) == pytest.approx(math.hypot(*scene.gravity))
+
+
+def corner(pose, twist, d, own):
+    """Place and velocity of a point ``own`` that is fixed in a body, off its axes."""
+    if d == 2:
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        arm = np.array([[c, -s], [s, c]]) @ own
+        return pose[:2] + arm, twist[:2] + twist[2] * np.array([-arm[1], arm[0]])
+    w, v = pose[3], pose[4:]
+    arm = own + 2.0 * np.cross(v, np.cross(v, own) + w * own)
+    return pose[:3] + arm, twist[:3] + np.cross(twist[3:], arm)
+
+
+@pytest.mark.parametrize("name", ["turned 33", "mirrored"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_points_of_turning_bodies_move_as_the_world_was_mapped(name, dimension):
+    """A wrong sign of a spin that goes forth and back would cancel: here it does not."""
+    if dimension == 2:
+        body = Body("box", Box((0.5, 0.25)), 1.0, 0.1, (1.0, 2.0, 0.7), (0.5, -0.25, 3.0))
+    else:
+        half = 0.35
+        attitude = (math.cos(half), 0.6 * math.sin(half), 0.0, 0.8 * math.sin(half))
+        body = Body("box", Box((0.5, 0.25, 0.1)), 1.0, (0.1, 0.1, 0.1), (1.0, 2.0, 3.0, *attitude),
+                    (0.5, -0.25, 1.0, 3.0, -2.0, 1.0))  # fmt: skip
+    posed = BY_NAME[name].pose(Scene("toy", 1, dimension, (body,), (), (0.0,) * dimension, 1.0))
+    if isinstance(posed, str):
+        assert dimension == 2 and name == "turned 33"
+        return
+    place, speed = corner(np.array(body.pose), np.array(body.twist), dimension, np.array([0.3, 0.2, 0.1][:dimension]))
+    mapped = posed.scene.bodies[0]
+    own = np.array([-0.3 if name == "mirrored" else 0.3, 0.2, 0.1][:dimension])
+    angle = math.radians(33.0)
+    world = np.diag([-1.0, 1.0, 1.0][:dimension]) if name == "mirrored" else np.array(
+        [[math.cos(angle), -math.sin(angle), 0.0], [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]]
+    )  # fmt: skip
+    found = corner(np.array(mapped.pose), np.array(mapped.twist), dimension, own)
+    assert found[0] == pytest.approx(world @ place) and found[1] == pytest.approx(world @ speed)
+
+
+def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
+    scene = CATALOGUE["head_on"].scene(2)
+    posed = BY_NAME["renumbered"].pose(scene)
+    rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (1.0, 0.0), (2.0, 0.5), -1e-3)], 2)
+    record = ContactRecord(np.array([0]), np.array([0, 1]), rows)
+    found = posed.back(replace(start_of(posed.scene)[0], contacts=record)).contacts.rows
+    last = len(scene.bodies) - 1
+    assert (found.a[0], found.b[0]) == (last - 1, last)
+    assert found.normal[0].tolist() == [-1.0, 0.0] and found.impulse[0].tolist() == [-2.0, -0.5]
+
+
+BASE = {"speed": (2.0, ""), "count": (0.0, ""), "absent": (None, "why")}
+
+
+def test_a_change_is_judged_by_what_moved_starts_change():
+    floors = floor(BASE, [{"speed": (2.0 + 1e-9, ""), "count": (0.0, "")}, {"speed": (2.0, ""), "count": (0.0, "")}])
+    assert floors == {"speed": pytest.approx(1e-9), "count": 0.0, "absent": 0.0}
+    good = judged("mirrored", BASE, {"speed": (2.0 + 9e-9, ""), "count": (0.0, "")}, floors)
+    bad = judged("mirrored", BASE, {"speed": (2.0 + 11.1e-9, ""), "count": (0.0, "")}, floors)
+    assert good.holds and not bad.holds and bad.metric == "speed"
+    worse = judged("mirrored", BASE, {"speed": (2.0, ""), "count": (1e-300, "")}, floors)
+    assert not worse.holds and worse.metric == "count"
+    lost = judged("mirrored", BASE, {"speed": (None, "gone"), "count": (0.0, "")}, floors)
+    assert not lost.holds and math.isinf(lost.change)
+    assert not judged("mirrored", BASE, "it crashed", floors).holds
+    assert Change("boosted", refused="something in it is fixed").holds
+
+
+def test_a_chaotic_scene_is_not_blamed_on_its_engine():
+    floors = floor(BASE, ["no answer"])
+    assert judged("mirrored", BASE, {"speed": (7.0, ""), "count": (3.0, "")}, floors).holds
+
+
+def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
+    scene = CATALOGUE["bounce"].scene(2)
+    posed = BY_NAME["moved"].pose(scene)
+    assert unit_of(scene, posed.shift) == np.spacing(posed.shift) > 100.0 * unit_of(scene, 0.0)
+
+
+def test_a_dependence_on_order_and_on_the_side_is_found(monkeypatch):
+    """An engine that pushes the body that is listed last to the right: order and mirror show it, place does not."""
+    from adapters.registry import load
+    from validation import invariance
+
+    pytest.importorskip("pymunk")
+    real = invariance.run
+
+    def pushed(engine, scene, dt, settings, sampling):
+        found = real(engine, scene, dt, settings, sampling)
+        found.twist[-1, -1, 0] += 1e-3
+        found.pose[-1, -1, 0] += 1e-3
+        return found
+
+    monkeypatch.setattr(invariance, "run", pushed)
+    assert load("chipmunk")
+    slot = Slot("head_on", (), 2, "chipmunk", "tuned", 1 / 240)
+    base = measured(slot, "again")
+    floors = floor(base, [measured(slot, "again", k * 1e-16) for k in (1, -1, 16)])
+    verdicts = {
+        name: judged(name, base, measured(slot, name), floors).holds for name in ("again", "renumbered", "mirrored")
+    }
+    assert verdicts == {"again": True, "renumbered": False, "mirrored": False}
+
+
+def test_a_real_engine_is_asked_everything():
+    pytest.importorskip("pymunk")
+    found = {change.relation: change for change in compare(Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 240))}
+    assert list(found) == [relation.name for relation in RELATIONS]
+    assert found["again"].holds and found["fresh process"].holds and found["mirrored"].holds
+    assert "no vertical axis" in found["turned 33"].refused and "left behind" in found["boosted"].refused

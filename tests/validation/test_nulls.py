@@ -1,0 +1,104 @@
+"""Nulls: three motions that need no engine, and the skill that errors have against them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from validation.catalogue import CATALOGUE
+from validation.nulls import NULLS, Null, did_nothing, free_flight, nulls_of, perfectly_inelastic, skill, skill_of
+
+DT = 1 / 240
+
+
+def scene_of(*bodies, gravity=(0.0, 0.0), duration=1.0):
+    return Scene("toy", 1, 2, bodies, (Pair(),), gravity, duration)
+
+
+def disc(name, x, v=0.0, mass=1.0, y=0.0, spin=0.0, force=()):
+    return Body(name, Disc(0.5), mass, 0.125 * mass, (x, y, 0.0), (v, 0.0, spin), force=force)
+
+
+def test_free_flight_follows_its_loads_to_the_digit():
+    ball = disc("ball", 1.0, 2.0, mass=4.0, spin=3.0, force=(8.0, 0.0))
+    found = free_flight(scene_of(ball, gravity=(0.0, -10.0)), DT)
+    assert found.t[-1] == pytest.approx(1.0)
+    assert found.pose[-1, 0] == pytest.approx([1.0 + 2.0 + 1.0, -5.0, 3.0])
+    assert found.twist[-1, 0] == pytest.approx([4.0, -10.0, 3.0])
+
+
+def test_a_body_in_space_keeps_turning_about_its_axis():
+    tumble = CATALOGUE["tumble"].scene(3)
+    found = free_flight(tumble, DT)
+    assert np.linalg.norm(found.pose[:, 0, 3:], axis=1) == pytest.approx(1.0)
+    spin, half = np.array(tumble.bodies[0].twist[3:]), 0.5 * found.t[-1]
+    rate = np.linalg.norm(spin)
+    expected = [math.cos(rate * half), *(math.sin(rate * half) * spin / rate)]
+    assert found.pose[-1, 0, 3:] == pytest.approx(expected)
+
+
+def test_who_does_nothing_has_no_speed_either():
+    found = did_nothing(scene_of(disc("ball", 0.0, 5.0)), DT)
+    assert not found.twist.any() and (found.pose == found.pose[0]).all()
+
+
+def test_what_touches_moves_on_with_the_common_momentum():
+    found = perfectly_inelastic(scene_of(disc("a", 0.0, 3.0, mass=1.0, spin=7.0), disc("b", 2.0, 0.0, mass=2.0)), DT)
+    assert found.twist[-1, :, 0] == pytest.approx([1.0, 1.0]) and not found.twist[-1, :, 2].any()
+    assert found.pose[-1, 1, 0] - found.pose[-1, 0, 0] == pytest.approx(1.0, abs=3.0 * DT)
+
+
+def test_three_in_a_row_end_as_one_and_a_wall_stops_them():
+    row = [disc("a", 0.0, 4.0), disc("b", 1.5), disc("c", 3.0)]
+    free = perfectly_inelastic(scene_of(*row, duration=3.0), DT)
+    assert free.twist[-1, :, 0] == pytest.approx([4.0 / 3.0] * 3)
+    wall = Body("wall", HalfSpace((-1.0, 0.0), -4.0), motion="fixed")
+    held = perfectly_inelastic(scene_of(*row, wall, duration=3.0), DT)
+    assert not held.twist[-1].any() and held.pose[-1, 2, 0] == pytest.approx(3.5, abs=4.0 / 3.0 * DT)
+
+
+def test_a_ball_that_lands_stays_and_one_that_touches_from_the_start_never_falls():
+    floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
+    found = perfectly_inelastic(
+        scene_of(floor, disc("high", 0.0, y=1.5), disc("low", 5.0, y=0.5), gravity=(0.0, -10.0)), DT
+    )
+    assert found.pose[-1, 1, 1] == pytest.approx(0.5, abs=10.0 * 0.45 * DT) and not found.twist[-1].any()
+    assert (found.pose[:, 2, 1] == 0.5).all()
+
+
+@pytest.mark.parametrize("name", NULLS)
+def test_every_scene_can_be_asked_of_every_null(name):
+    for scene, canonical in CATALOGUE.items():
+        for dimension in canonical.dimensions:
+            made = canonical.scene(dimension, dict(canonical.representative))
+            for check in canonical.checks(made, DT):
+                if check.truth is not None:
+                    asked = (scene, dimension, canonical.representative, DT, check.metric, check.truth)
+                    (found,) = [each for each in nulls_of(*asked) if each.name == name]
+                    assert found.error is None or math.isfinite(found.error)
+
+
+def test_nobody_who_has_no_engine_passes_a_scene_in_which_something_must_bounce():
+    for scene, metric, truth in (("impact", "rebound_ratio", 0.8), ("thin_wall", "rebound_ratio", 0.5)):
+        errors = {each.name: each.error for each in nulls_of(scene, 2, {}, DT, metric, truth)}
+        assert errors == {"did nothing": truth, "free flight": 1.0 + truth, "perfectly inelastic": truth}
+
+
+@pytest.mark.parametrize(("error", "worth"), [(0.0, 1.0), (0.4, 0.5), (-0.4, 0.5), (0.8, 0.0), (1.6, -1.0)])
+def test_skill_is_measured_against_the_best_null(error, worth):
+    found = skill(error, [Null("worse", 0.0, 3.0), Null("best", 0.0, 0.8), Null("none", None, None)])
+    assert found == (pytest.approx(worth), "best")
+
+
+def test_where_there_is_no_skill_it_is_said_why():
+    assert skill(None, [Null("a", 0.0, 1.0)])[0] is None
+    assert skill(0.1, [Null("a", 0.0, 0.0), Null("b", 1.0, 1.0)]) == (None, "a is exact here")
+    assert "no null has this number" in skill(0.1, [Null("a", None, None)])[1]
+
+
+def test_the_skill_of_a_row_is_that_of_its_cell():
+    row = {"scene": "impact", "dimension": 2, "slot": {"params": {"e": 0.5}}, "dt": DT, "metric": "rebound_ratio",
+           "truth": 0.5, "value": 0.105}  # fmt: skip
+    assert skill_of(row) == (pytest.approx(1.0 - 0.395 / 0.5), "did nothing")
+    assert skill_of(row | {"value": None})[0] is None

@@ -1,0 +1,112 @@
+"""Residuals of reported contacts: nothing of exact ones, and each law is seen to break by the planted size."""
+
+import math
+import os
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.apart import Apart
+from validation.cells import Slot
+from validation.residuals import LAWS, ask, measured, residuals
+
+DT, MASS, G, MU = 0.01, 2.0, 10.0, 0.5
+WEIGHT = MASS * G * DT
+
+
+def ball(vx, vy):
+    return Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0), (vx, vy, 0.0))
+
+
+def sliding(steps=5, speed=3.0, **changes):
+    """A smooth-spinning ball held from turning would be unphysical: this one slides and spins up, exactly."""
+    scene = Scene(
+        "toy", 1, 2,
+        (Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed"), ball(speed, 0.0)),
+        (Pair(restitution=0.0, friction=MU),), (0.0, -G), steps * DT,
+    )  # fmt: skip
+    impulse = np.array([-MU * WEIGHT, WEIGHT]) + np.array(changes.pop("impulse", (0.0, 0.0)))
+    t = np.arange(steps + 1) * DT
+    pose, twist = np.zeros((steps + 1, 2, 3)), np.zeros((steps + 1, 2, 3))
+    for k in range(steps + 1):
+        twist[k, 1] = [speed - MU * G * t[k], 0.0, -0.5 * MU * WEIGHT / 0.25 * k]
+        pose[k, 1] = [speed * t[k], 0.5, 0.0]
+    twist[1:, 1, 1] += changes.pop("rise", 0.0)
+    rows = Contacts.from_rows([(0, 1, (pose[k, 1, 0], 0.0), (0.0, 1.0), impulse, 0.0) for k in range(1, steps + 1)], 2)
+    record = ContactRecord(np.arange(1, steps + 1), np.arange(steps + 1), rows)
+    return scene, Trajectory(t, pose, twist, record, DT, "completed")
+
+
+def values(found):
+    return {name: value for name, (value, _) in found[0].items()}
+
+
+def test_exact_contacts_have_no_residual():
+    found = values(residuals(*sliding()))
+    assert list(found) == list(LAWS)
+    assert max(found.values()) < 1e-13
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-3, 0.1])
+@pytest.mark.parametrize(
+    ("changes", "law", "share"),
+    [
+        ({"impulse": (-WEIGHT, 0.0)}, "cone", 1.0),
+        ({"impulse": (0.0, WEIGHT)}, "momentum", 1.0),
+        ({"rise": 1.0}, "separation", 1.0),
+    ],
+)
+def test_a_planted_fault_is_seen_with_its_size(changes, law, share, size):
+    planted = {name: tuple(size * v for v in value) if name == "impulse" else size for name, value in changes.items()}
+    scene, found = sliding(**planted)
+    told = values(residuals(scene, found))
+    assert told[law] > 0.2 * share * size / 3.0
+    assert told[law] < 5.0 * share * size
+
+
+def test_a_contact_that_pulls_and_friction_that_drives_are_seen():
+    assert values(residuals(*sliding(impulse=(0.0, -1.5 * WEIGHT))))["pull"] == pytest.approx(1.0)
+    driven = values(residuals(*sliding(impulse=(2.0 * MU * WEIGHT, 0.0))))
+    assert driven["slip"] > 0.1 and driven["cone"] < 1e-12
+
+
+def test_what_is_not_reported_has_its_reason_and_no_number():
+    scene, found = sliding()
+    silent = Trajectory(found.t, found.pose, found.twist, None, DT, "completed")
+    assert residuals(scene, silent)[0]["pull"] == (None, "the engine reports no contacts")
+    found.contacts.rows.impulse[0] = math.nan
+    assert "does not say" in residuals(scene, found)[0]["cone"][1]
+
+
+def test_a_bounce_obeys_newtons_law_and_half_of_it_does_not():
+    for back, wrong in ((1.5, 0.0), (0.9, 0.6 / 3.0)):
+        scene = Scene(
+            "toy", 1, 2,
+            (Body("wall", HalfSpace((0.0, 1.0), 0.0), motion="fixed"), ball(0.0, -3.0)),
+            (Pair(restitution=0.5),), (0.0, 0.0), DT,
+        )  # fmt: skip
+        twist = np.zeros((2, 2, 3))
+        twist[:, 1, 1] = -3.0, back
+        pose = np.zeros((2, 2, 3))
+        pose[:, 1, 1] = 0.5
+        rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (0.0, 1.0), (0.0, MASS * (3.0 + back)), 0.0)], 2)
+        found = Trajectory(
+            np.array([0.0, DT]), pose, twist, ContactRecord(np.array([1]), np.array([0, 1]), rows), DT, "completed"
+        )
+        told = values(residuals(scene, found))
+        assert told["separation"] == pytest.approx(wrong, abs=1e-12)
+        assert told["momentum"] < 1e-12
+
+
+def test_real_engines_are_asked_in_a_process_of_their_own():
+    pytest.importorskip("pymunk")
+    with Apart() as apart:
+        found = ask(Slot("pinch", (), 2, "chipmunk", "tuned", 1 / 240), apart)
+        lost = apart.ask(os._exit, 3)
+        again = ask(Slot("pinch", (), 2, "chipmunk", "tuned", 1 / 240), apart)
+    assert found.contacts > 100 and found.values["cone"][0] < 1e-6
+    assert lost == "no answer: BrokenProcessPool" and again == found
+    assert measured(Slot("impact", (), 3, "chipmunk", "tuned", 1 / 240)).refused

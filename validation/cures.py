@@ -1,0 +1,368 @@
+"""Cures: which stock settings mend what an engine gets wrong as shipped on a scene, and what they cost.
+
+    as shipped          the quick cells of the scene: checks that fail
+    one setting         every candidate of the engine's experiments, every setting that another profile changes, and
+                        ten times the iterations, each alone
+    one more            where no setting is enough alone: each candidate beside the best one
+    another profile     all that it changes, and then fewer and fewer of them, until nothing can be left out
+    the cure            mends most checks and breaks none; of equals the one that changes least, then the nearest
+
+The same cells, candidates and rule for every engine. Error and cost stand side by side: CPU time per step, the least of
+interleaved rounds in the bench's own lane, as shipped and cured. What was found stands in ``cures.csv`` of the engine's
+folder, by scene *and dimension*: a cure that was measured in the plane is not told of space.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from adapters.engine_folder import CURES, belongs_of, candidates_of, inside
+from adapters.registry import find, load, profile_of
+from adapters.stepping import step_count
+from validation.bench.lane import Lane
+from validation.bench.units import Unit
+from validation.canonical import Params
+from validation.cells import Outcome, Slot, prepare, settings_of
+from validation.decisive import changes_of
+from validation.plan import QUICK_DT, has_iterations
+from validation.posed import resolve
+from validation.switching import Reading, observe, readings, switched
+
+#: Most cells that a search asks: beyond them the scene's representative, planted and searched ones stand for it.
+MOST_CELLS = 6
+#: Rounds of timing; the least of so many is the time that nothing else disturbed.
+ROUNDS = 7
+#: Simulated time that is clocked [s].
+CLOCKED = 0.5
+#: A check this far below its tolerance cannot be improved in a way that anyone sees.
+INVISIBLE = 1e-3
+
+Changes = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cure:
+    """What mends an engine as shipped on one scene and dimension.
+
+    Parameters
+    ----------
+    cells
+        Parameters of the cells that were asked, as what differs from the scene's defaults.
+    failing, left, judged
+        Checks of these cells that fail as shipped and with the cure, and all of them.
+    metric, unit, params
+        The check that is told: of those that the cure mends (or that fail, if it mends none), the first that the scene
+        states, where it was farthest off.
+    truth, tolerance, before, after
+        Its numbers; a value is None where the engine gave no answer.
+    changes
+        Settings of the cure with their values in the cell that is told; empty if nothing that was tried helps.
+    profile
+        Profile that has all of these settings; empty for a cure that no profile is.
+    others
+        Other single settings that mend as many checks alone.
+    tried
+        How many changes were tried.
+    cost_before, cost_after
+        CPU time per step [s] in the cell that is told; None where it was not clocked.
+    """
+
+    engine: str
+    version: str
+    shipped: str
+    scene: str
+    dimension: int
+    cells: tuple[Params, ...]
+    failing: int
+    left: int
+    judged: int
+    metric: str
+    unit: str
+    params: Params
+    truth: float
+    tolerance: float
+    before: float | None
+    after: float | None
+    changes: Changes
+    profile: str
+    others: tuple[Changes, ...]
+    tried: int
+    cost_before: float | None
+    cost_after: float | None
+
+    @property
+    def helps(self) -> bool:
+        """Whether anything was found."""
+        return self.left < self.failing
+
+    @property
+    def times(self) -> float | None:
+        """Cost of the cure in units of the cost as shipped."""
+        return self.cost_after / self.cost_before if self.cost_before and self.cost_after else None
+
+
+def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
+    """Cells of a search: all quick ones at the profile's own iterations, or those that stand for them."""
+    canonical = resolve(scene)
+    quick = [v.params for v in canonical.variations("quick") if v.runs_in(dimension) and None in v.iterations]
+    if len(quick) > MOST_CELLS:
+        searched = canonical.searched.cells if canonical.searched else ()
+        quick = [canonical.representative, *canonical.planted, *searched][:MOST_CELLS]
+    return tuple(dict(params) for params in dict.fromkeys(canonical.minimal(params) for params in quick))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A change, tried: the checks that fail with it, what it broke, and decades of error over tolerance."""
+
+    changes: tuple[Changes, ...]
+    failing: int
+    broken: bool
+    decades: float
+
+    @property
+    def size(self) -> int:
+        return len({name for each in self.changes for name in each})
+
+    def rank(self) -> tuple[int, int, float]:
+        """Order of cures: checks left, settings changed, decades."""
+        return self.failing, self.size, self.decades
+
+
+class _Trials:
+    """Readings of all cells under changes; a change may have another value in each cell. Each cell runs once."""
+
+    def __init__(self, slots: Sequence[Slot], jobs: int) -> None:
+        self.slots, self.jobs = slots, jobs
+        self.seen: dict[Slot, list[Reading]] = {}
+        self.tried = 0
+        self.own = [_own(slot) for slot in slots]
+        self.start = self._readings([{}] * len(slots))
+
+    def _readings(self, changes: Sequence[Changes]) -> list[Reading]:
+        asked = [switched(slot, own) for slot, own in zip(self.slots, changes, strict=True)]
+        self._run(asked)
+        return [found for slot in asked for found in self.seen[slot]]
+
+    def _run(self, slots: Iterable[Slot]) -> None:
+        new = [slot for slot in slots if slot not in self.seen]
+        self.seen |= {slot: readings(found) for slot, found in observe(new, self.jobs).items()}
+
+    def all(self, many: Sequence[Sequence[Changes]]) -> list[_Found]:
+        """Try changes, all of their cells in one go."""
+        kept = [[_differing(each, own) for each, own in zip(one, self.own, strict=True)] for one in many]
+        kept = [one for one in kept if any(one)]
+        self._run([switched(slot, own) for one in kept for slot, own in zip(self.slots, one, strict=True)])
+        self.tried += len(kept)
+        return [self._found(one) for one in kept]
+
+    def _found(self, changes: Sequence[Changes]) -> _Found:
+        after = self._readings(changes)
+        broken = any(old.badness <= 1.0 < new.badness for old, new in zip(self.start, after, strict=True))
+        bad = [min(max(each.badness, INVISIBLE), 1e3) for each in after]
+        failing = sum(b > 1.0 for b in bad)
+        return _Found(tuple(changes), failing, broken, sum(math.log10(b / INVISIBLE) for b in bad))
+
+
+def _own(slot: Slot) -> dict[str, Any]:
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return {setting.name: setting.value for setting in settings_of(load(slot.engine), slot, scene)}
+
+
+def _differing(changes: Changes, own: Changes) -> Changes:
+    """What a change would set otherwise than the profile has it; an experiment may add settings of its own."""
+    return {name: value for name, value in changes.items() if name not in own or own[name] != value}
+
+
+def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | None:
+    """Search what mends ``engine`` as shipped; None if it passes there, cannot be asked, or ships no profile.
+
+    Raises
+    ------
+    EngineError, SceneError
+        For an unknown or missing engine, an unknown scene.
+    """
+    shipped = profile_of(engine, "shipped")
+    cells = asked_of(scene, dimension)
+    if shipped is None or not cells:
+        return None
+    own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, QUICK_DT) for cell in cells]
+    first = observe(own, jobs)
+    if any(found.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED) for found in first.values()):
+        return None
+    trials = _Trials(own, jobs)
+    failing = [found for found in trials.start if found.badness > 1.0]
+    if not failing:
+        return None
+    best, singles = _best(engine, trials, own, len(failing))
+    return _cure(engine, trials, failing, best, singles)
+
+
+def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tuple[_Found | None, list[_Found]]:
+    """The best change, and all single settings that are no worse than it."""
+    others = [name for name in load(engine).profiles if name != own[0].profile]
+    wholes = {name: [changes_of(slot, name) for slot in own] for name in others}
+    singles = _singles(engine, own, list(wholes.values()))
+    found = _useful(trials.all(singles), failing)
+    if not found or found[0].failing:
+        beside = [each.changes for each in found[:1]]
+        pairs = [[{**a, **b} for a, b in zip(one, first, strict=True)] for first in beside for one in singles]
+        found += _useful(trials.all(pairs), failing)
+    if not found or min(each.failing for each in found):
+        found += [_smallest(trials, engine, each) for each in _useful(trials.all(list(wholes.values())), failing)]
+    found.sort(key=_Found.rank)
+    best = found[0] if found else None
+    return best, [each for each in found if best and each.size == 1 and each.failing == best.failing]
+
+
+def _useful(found: Iterable[_Found], failing: int) -> list[_Found]:
+    return sorted((each for each in found if not each.broken and each.failing < failing), key=_Found.rank)
+
+
+def _singles(engine: str, own: Sequence[Slot], wholes: Sequence[Sequence[Changes]]) -> list[list[Changes]]:
+    """Every setting alone: candidates, those of other profiles with what belongs to them, and more iterations."""
+    belongs = belongs_of(engine)
+    singles: list[list[Changes]] = [
+        [{name: value}] * len(own) for name, values in candidates_of(engine).items() for value in values
+    ]
+    for whole in wholes:
+        for name in dict.fromkeys(name for each in whole for name in each):
+            if belongs.get(name) is None:
+                singles.append([{n: v for n, v in each.items() if belongs.get(n, n) == name} for each in whole])
+    if all(has_iterations(load(engine), slot) for slot in own):
+        counts = [int(_own(slot)["iterations"]) for slot in own]
+        singles.append([{"iterations": 10 * count} for count in counts])
+    return [one for k, one in enumerate(singles) if one not in singles[:k]]
+
+
+def _smallest(trials: _Trials, engine: str, whole: _Found) -> _Found:
+    """A profile's changes without those that can be left out, one after the other."""
+    belongs = belongs_of(engine)
+    best = whole
+    for name in dict.fromkeys(name for each in whole.changes for name in each if name not in belongs):
+        fewer = [{n: v for n, v in each.items() if belongs.get(n, n) != name} for each in best.changes]
+        tried = trials.all([fewer])
+        if tried and not tried[0].broken and tried[0].failing <= best.failing:
+            best = tried[0]
+    return best
+
+
+def _cure(
+    engine: str, trials: _Trials, failing: Sequence[Reading], best: _Found | None, singles: Sequence[_Found]
+) -> Cure:
+    told = _told(trials, failing, best)
+    place = trials.slots.index(told.slot)
+    changes: Changes = best.changes[place] if best else {}
+    if best and not changes:  # what is told was mended by nothing; tell the values of a cell in which something is set
+        changes = next(each for each in best.changes if each)
+    cured = switched(told.slot, best.changes[place]) if best else told.slot
+    after = next(each for each in trials.seen[cured] if each.check.metric == told.check.metric)
+    before_cost, after_cost = clocked([told.slot, cured]) if best else (None, None)
+    others = tuple(each.changes[place] for each in singles if best and each.changes != best.changes)
+    check = told.check
+    assert check.truth is not None and check.bound is not None  # only judged checks fail
+    return Cure(
+        engine, find(engine).version, told.slot.profile, told.slot.scene, told.slot.dimension,
+        tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
+        len(trials.start), check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value,
+        after.value, changes, _profile_of(engine, trials.slots, best), others, trials.tried, before_cost, after_cost,
+    )  # fmt: skip
+
+
+def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
+    """The check that stands for a cure: the first that the scene states of those it mends, where it was worst."""
+    mended = []
+    for slot, changes in zip(trials.slots, best.changes if best else (), strict=False):
+        after = {each.check.metric: each for each in trials.seen[switched(slot, changes)]}
+        mended += [each for each in failing if each.slot == slot and after[each.check.metric].badness <= 1.0]
+    shown = mended or failing
+    first = next(each.check.metric for each in failing if each.check.metric in {one.check.metric for one in shown})
+    return max((each for each in shown if each.check.metric == first), key=lambda each: each.badness)
+
+
+def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
+    """Profile that has all settings of a cure."""
+    for name in load(engine).profiles if best else ():
+        wanted = [changes_of(slot, name) for slot in slots]
+        if best and all(each.items() <= w.items() for each, w in zip(best.changes, wanted, strict=True)):
+            return name
+    return ""
+
+
+def clocked(slots: Sequence[Slot]) -> tuple[float | None, ...]:
+    """CPU time per step of each slot [s]: the least of `ROUNDS`, taken in turns in one process of the bench's lane."""
+    units = []
+    for slot in slots:
+        scene = prepare(slot).scene
+        steps = step_count(min(CLOCKED, scene.duration), slot.dt)
+        units.append(Unit("work", slot, "", len(scene.bodies), 0, steps))
+    lane = Lane(patience=120.0)
+    lane.start()
+    try:
+        laps = [[lane.time(unit) for unit in units] for _ in range(ROUNDS)]
+    finally:
+        lane.stop()
+    found = []
+    for k, unit in enumerate(units):
+        good = [lap[k].seconds / unit.steps for lap in laps if not lap[k].void and lap[k].seconds > 0.0]
+        found.append(min(good) if good else None)
+    return tuple(found)
+
+
+# ---- the committed table ---------------------------------------------------------------------------------------------
+
+
+@cache
+def cures_of(engine: str) -> Mapping[tuple[str, int], Cure]:
+    """What was measured and is listed, by scene and dimension; nothing for an engine that nobody measured."""
+    path = inside(engine, CURES)
+    try:
+        found = read(path) if path else []
+    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are read by a test
+        return {}
+    return {(cure.scene, cure.dimension): cure for cure in found if cure.engine == engine}
+
+
+#: How a field of the table is written: as JSON what has parts or may be missing, as text the rest.
+_PLAIN = ("engine", "version", "shipped", "scene", "metric", "unit", "profile")
+
+
+def write(cures: Iterable[Cure], path: Path) -> None:
+    """Write a table of cures."""
+    with path.open("w", encoding="utf-8", newline="") as lines:
+        table = csv.writer(lines, lineterminator="\n")
+        names = [field.name for field in fields(Cure)]
+        table.writerow(names)
+        for cure in cures:
+            rounded = replace(cure, cost_before=_digits(cure.cost_before, 3), cost_after=_digits(cure.cost_after, 3))
+            values = [getattr(rounded, name) for name in names]
+            table.writerow([v if n in _PLAIN else json.dumps(v) for n, v in zip(names, values, strict=True)])
+
+
+def _digits(value: float | None, digits: int) -> float | None:
+    return None if value is None else float(f"{value:.{digits}g}")
+
+
+def read(path: Path) -> list[Cure]:
+    """Read a table of cures."""
+    with path.open(encoding="utf-8", newline="") as lines:
+        return [_cure_of(row) for row in csv.DictReader(lines)]
+
+
+def _cure_of(row: Mapping[str, str]) -> Cure:
+    values: dict[str, Any] = {name: text if name in _PLAIN else json.loads(text) for name, text in row.items()}
+    others = tuple(_settings(each) for each in values["others"])
+    values |= {"cells": tuple(values["cells"]), "others": others, "changes": _settings(values["changes"])}
+    return Cure(**values)
+
+
+def _settings(plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as they were before JSON made lists of tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()}

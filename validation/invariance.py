@@ -1,0 +1,422 @@
+"""What must not change an answer: names, places, headings, company, time of day. Asked of every scene and engine.
+
+    scene --map--> the same physics, posed otherwise --run--> trajectory --back--> measured like the scene itself
+
+Bodies renumbered, world turned about the vertical or mirrored, moved far away or carried along, a bystander out of
+reach, the same again in the same process and in a fresh one. The largest change of each metric is judged against ten
+times the largest change from starts moved by 1 to 16 units in the last place: what a chaotic scene makes of round-off
+is no fault of its engine. Where the map itself rounds coarser (far away), the moved starts are rounded as coarsely.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from adapters.engine import Array, Contacts
+from adapters.foreign import checked_refusal, said_by
+from adapters.registry import load
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import posed_for, run
+from adapters.trajectory import ContactRecord, Measured, Trajectory
+from validation.apart import Apart
+from validation.cells import Slot, settings_of
+from validation.posed import resolve
+
+#: Units in the last place by which starts are moved, up and down.
+MOVES = (1, 2, 4, 8, 16)
+#: How many times the largest change from moved starts a map may change a metric by.
+FACTOR = 10.0
+#: What is left where moved starts change nothing: the last digits of the value itself, in units of the machine's.
+LAST_DIGITS = 64.0 * float(np.finfo(float).eps)
+#: How far a scene is moved, in its own sizes.
+FAR = 1e3
+
+Metrics = Mapping[str, Measured]
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A scene posed otherwise, and the way back; ``shift`` is the largest coordinate that the map added [m]."""
+
+    scene: Scene
+    back: Callable[[Trajectory], Trajectory]
+    shift: float = 0.0
+
+
+@dataclass(frozen=True)
+class Relation:
+    """One thing that must not matter; ``pose`` gives the scene posed so, or says why it cannot be."""
+
+    name: str
+    says: str
+    pose: Callable[[Scene], Posed | str]
+    fresh: bool = False
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a relation changed in one cell.
+
+    Parameters
+    ----------
+    metric, change, allowed
+        The metric that changed most for what it may; empty where nothing could be compared.
+    refused
+        Why the relation cannot be asked here, or what the engine said instead of an answer.
+    lost
+        Whether the engine answers the scene itself and not the scene posed otherwise: that is a change, too.
+    """
+
+    relation: str
+    metric: str = ""
+    change: float = 0.0
+    allowed: float = 0.0
+    refused: str = ""
+    lost: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing changed that should not have."""
+        return not self.lost and self.change <= self.allowed
+
+
+# ---- maps ------------------------------------------------------------------------------------------------------------
+
+
+def size_of(scene: Scene) -> float:
+    """Largest extent of what can move: where the bodies are, and how large they are [m]."""
+    free = [body for body in scene.bodies if body.motion == "free"]
+    d = scene.dimension
+    places = np.array([body.pose[:d] for body in free])
+    return float(np.ptp(places, axis=0).max() + 2.0 * max(_reach(body) for body in free))
+
+
+def _reach(body: Body) -> float:
+    shape = body.shape
+    if isinstance(shape, Box):
+        return math.hypot(*shape.half_extents)
+    return shape.radius if isinstance(shape, Disc | Sphere) else 0.0
+
+
+def itself(scene: Scene) -> Posed | str:
+    """Nothing is changed: whatever differs, the engine or its process remembered."""
+    return Posed(scene, lambda found: found)
+
+
+def renumbered(scene: Scene) -> Posed | str:
+    """The bodies in the opposite order."""
+    last = len(scene.bodies) - 1
+
+    def back(found: Trajectory) -> Trajectory:
+        def contacts(rows: Contacts) -> Contacts:
+            # A contact acts on the body with the higher index: it is the other one now.
+            return Contacts(last - rows.b, last - rows.a, rows.point, -rows.normal, -rows.impulse, rows.gap)
+
+        return _mapped(found, lambda pose: pose[:, ::-1], lambda twist: twist[:, ::-1], contacts)
+
+    return Posed(replace(scene, bodies=scene.bodies[::-1]), back)
+
+
+def turned(degrees: float) -> Callable[[Scene], Posed | str]:
+    """The world turned about the vertical."""
+
+    def pose(scene: Scene) -> Posed | str:
+        if scene.dimension == 2:
+            return "the plane has no vertical axis to turn about"
+        matrix, half = _about_z(math.radians(degrees)), math.radians(0.5 * degrees)
+        spin = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
+        moved = _posed(scene, lambda x: matrix @ x, lambda q: _product(spin, q), lambda w: matrix @ w)
+        if np.abs(matrix @ np.array(scene.gravity) - np.array(scene.gravity)).max() > 0.0:
+            moved = replace(moved, gravity=_plain(matrix @ np.array(scene.gravity)))
+        away = spin * np.array([1.0, -1.0, -1.0, -1.0])
+        return Posed(moved, lambda found: _returned(found, matrix.T, lambda q: _product(away, q), matrix.T))
+
+    return pose
+
+
+def mirrored(scene: Scene) -> Posed | str:
+    """Left and right swapped."""
+    d = scene.dimension
+    flip = np.diag([-1.0, *[1.0] * (d - 1)])
+    # Spins are axial: what a mirror in x leaves of them is the part about x.
+    spins = -np.ones(1) if d == 2 else np.array([1.0, -1.0, -1.0])
+    quaternion = np.array([1.0, 1.0, -1.0, -1.0])
+
+    def attitude(q: Array) -> Array:
+        return np.asarray(q * (spins if d == 2 else quaternion))
+
+    moved = _posed(scene, lambda x: flip @ x, attitude, lambda w: spins * w)
+    moved = replace(moved, gravity=_plain(flip @ np.array(scene.gravity)))
+    return Posed(moved, lambda found: _returned(found, flip, attitude, np.diag(spins)))
+
+
+def moved_away(scene: Scene) -> Posed | str:
+    """A thousand of its sizes to the side."""
+    shift = np.zeros(scene.dimension)
+    shift[0] = FAR * size_of(scene)
+
+    def back(found: Trajectory) -> Trajectory:
+        def pose(values: Array) -> Array:
+            values = values.copy()
+            values[..., : scene.dimension] -= shift
+            return values
+
+        def contacts(rows: Contacts) -> Contacts:
+            return replace(rows, point=rows.point - shift)
+
+        return _mapped(found, pose, lambda twist: twist, contacts)
+
+    bodies = []
+    for body in scene.bodies:
+        if isinstance(body.shape, HalfSpace):
+            offset = body.shape.offset + float(np.dot(body.shape.normal, shift))
+            bodies.append(replace(body, shape=HalfSpace(body.shape.normal, offset)))
+        else:
+            place = np.array(body.pose[: scene.dimension]) + shift
+            bodies.append(replace(body, pose=(*_plain(place), *body.pose[scene.dimension :])))
+    return Posed(replace(scene, bodies=tuple(bodies)), back, float(shift[0]))
+
+
+def boosted(scene: Scene) -> Posed | str:
+    """Carried along at a constant speed: one of its sizes a second."""
+    if any(body.motion != "free" for body in scene.bodies):
+        return "something in it is fixed or driven, and would be left behind"
+    d = scene.dimension
+    speed = np.zeros(d)
+    speed[0] = size_of(scene)
+    bodies = tuple(
+        replace(body, twist=(*_plain(np.array(body.twist[:d]) + speed), *body.twist[d:])) for body in scene.bodies
+    )
+
+    def back(found: Trajectory) -> Trajectory:
+        pose, twist = found.pose.copy(), found.twist.copy()
+        pose[..., :d] -= found.t[:, None, None] * speed
+        twist[..., :d] -= speed
+        contacts = found.contacts
+        if contacts is not None:
+            times = np.repeat(found.t[contacts.step], np.diff(contacts.offset))
+            contacts = replace(
+                contacts, rows=replace(contacts.rows, point=contacts.rows.point - times[:, None] * speed)
+            )
+        return replace(found, pose=pose, twist=twist, contacts=contacts)
+
+    return Posed(replace(scene, bodies=bodies), back, float(speed[0]) * scene.duration)
+
+
+def with_a_bystander(scene: Scene) -> Posed | str:
+    """One more body, like the first free one, so far away that it never meets anything."""
+    free = next(body for body in scene.bodies if body.motion == "free")
+    d, name = scene.dimension, "bystander"
+    # Up as far as it falls in twice the time, and beside all half-spaces' reach: it only flies.
+    fall = 2.0 * math.hypot(*scene.gravity) * scene.duration**2
+    up = -np.array(scene.gravity) / (math.hypot(*scene.gravity) or 1.0)
+    place = np.array(free.pose[:d]) + up * fall
+    for body in scene.bodies:
+        if isinstance(body.shape, HalfSpace):
+            place = place + 50.0 * size_of(scene) * np.array(body.shape.normal)
+    if not any(isinstance(body.shape, HalfSpace) for body in scene.bodies):
+        place[-1] += 50.0 * size_of(scene)
+    far = Body(name, free.shape, free.mass, free.inertia, (*_plain(place), *free.pose[d:]))
+    pairs = (*scene.pairs, Pair(name, "*", 0.0, 0.0))
+
+    def back(found: Trajectory) -> Trajectory:
+        return _mapped(found, lambda pose: pose[:, :-1], lambda twist: twist[:, :-1], lambda rows: rows)
+
+    return Posed(replace(scene, bodies=(*scene.bodies, far), pairs=pairs), back)
+
+
+RELATIONS = (
+    Relation("again", "run again in the same process", itself),
+    Relation("fresh process", "run in a process that has run nothing else", itself, fresh=True),
+    Relation("renumbered", "bodies in the opposite order", renumbered),
+    Relation("turned 33", "world turned by 33 degrees about the vertical", turned(33.0)),
+    Relation("turned 90", "world turned by 90 degrees about the vertical", turned(90.0)),
+    Relation("mirrored", "left and right swapped", mirrored),
+    Relation("boosted", "everything carried along at one size a second", boosted),
+    Relation("moved", "a thousand of its sizes to the side", moved_away),
+    Relation("bystander", "one more body, out of reach", with_a_bystander),
+)
+
+
+def _plain(values: Array) -> tuple[float, ...]:
+    return tuple(float(value) + 0.0 for value in values)
+
+
+def _about_z(angle: float) -> Array:
+    quarter = round(angle / (0.5 * math.pi))
+    if math.isclose(angle, quarter * 0.5 * math.pi):  # a quarter turn rounds nothing
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    else:
+        c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _product(p: Array, q: Array) -> Array:
+    """Product of quaternions w, x, y, z; the first turns by itself after the second has."""
+    w, v, u, r = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
+    return np.concatenate([w * u - (v * r).sum(-1, keepdims=True), w * r + u * v + np.cross(v, r)], axis=-1)
+
+
+def _posed(
+    scene: Scene, place: Callable[[Array], Array], attitude: Callable[[Array], Array], spin: Callable[[Array], Array]
+) -> Scene:
+    """The scene with vectors, attitudes and spins mapped."""
+    d, bodies = scene.dimension, []
+    for body in scene.bodies:
+        pose, twist, shape = np.array(body.pose), np.array(body.twist), body.shape
+        if isinstance(shape, HalfSpace):
+            bodies.append(replace(body, shape=HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)))
+            continue
+        bodies.append(
+            replace(
+                body,
+                pose=(*_plain(place(pose[:d])), *_plain(attitude(pose[d:]))),
+                twist=(*_plain(place(twist[:d])), *_plain(spin(twist[d:]))),
+                force=_plain(place(np.array(body.force))),
+                torque=_plain(spin(np.array(body.torque))),
+            )
+        )
+    return replace(scene, bodies=tuple(bodies))
+
+
+def _returned(found: Trajectory, matrix: Array, attitude: Callable[[Array], Array], spins: Array) -> Trajectory:
+    """A trajectory with vectors, attitudes and spins mapped back."""
+    d = found.dimension
+
+    def pose(values: Array) -> Array:
+        return np.concatenate([values[..., :d] @ matrix.T, attitude(values[..., d:])], axis=-1)
+
+    def twist(values: Array) -> Array:
+        return np.concatenate([values[..., :d] @ matrix.T, values[..., d:] @ spins.T], axis=-1)
+
+    def contacts(rows: Contacts) -> Contacts:
+        vectors = {name: getattr(rows, name) @ matrix.T for name in ("point", "normal", "impulse")}
+        return replace(rows, **vectors)
+
+    return _mapped(found, pose, twist, contacts)
+
+
+def _mapped(
+    found: Trajectory,
+    pose: Callable[[Array], Array],
+    twist: Callable[[Array], Array],
+    rows: Callable[[Contacts], Contacts],
+) -> Trajectory:
+    contacts = found.contacts
+    if contacts is not None:
+        contacts = ContactRecord(contacts.step, contacts.offset, rows(contacts.rows))
+    return replace(found, pose=pose(found.pose), twist=twist(found.twist), contacts=contacts)
+
+
+# ---- runs ------------------------------------------------------------------------------------------------------------
+
+
+def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
+    """Metrics of a cell posed as ``relation`` says, or why there are none; runs in this process.
+
+    ``moves`` [m] is added to the height of every free body.
+    """
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    (asked,) = [each for each in RELATIONS if each.name == relation]
+    posed = asked.pose(scene)
+    if isinstance(posed, str):
+        return posed
+    try:
+        engine = load(slot.engine)
+        refusal = checked_refusal(engine.refuses(posed_for(engine, posed.scene), slot.profile))
+        if refusal:
+            return refusal
+        # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
+        settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
+        found = run(engine, _raised(posed.scene, moves), slot.dt, settings, canonical.sampling(scene))
+        if found.finish == "diverged":
+            return found.reason
+        return dict(canonical.measure(scene, posed.back(found)))
+    except BaseException as error:  # whatever an engine raises costs this question only
+        return said_by(error)
+
+
+def _raised(scene: Scene, by: float) -> Scene:
+    up = scene.dimension - 1
+
+    def pose(values: tuple[float, ...]) -> tuple[float, ...]:
+        return (*values[:up], values[up] + by, *values[up + 1 :])
+
+    if by == 0.0:
+        return scene
+    return replace(
+        scene, bodies=tuple(replace(b, pose=pose(b.pose)) if b.motion == "free" else b for b in scene.bodies)
+    )
+
+
+def unit_of(scene: Scene, shift: float) -> float:
+    """Unit in the last place of the scene's largest coordinate, or of where a map has moved it to [m]."""
+    places = [abs(x) for body in scene.bodies for x in body.pose[: scene.dimension]]
+    return float(np.spacing(max([shift, size_of(scene), *places])))
+
+
+def compare(slot: Slot, relations: Sequence[str] = ()) -> list[Change]:
+    """Ask one cell everything, in processes of their own: an engine that aborts costs one answer."""
+    wanted = [each for each in RELATIONS if not relations or each.name in relations]
+    with Apart() as apart:
+        return _changes(slot, wanted, apart)
+
+
+def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Change]:
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    base = apart.ask(measured, slot, "again")
+    if isinstance(base, str):
+        return [Change(each.name, refused=base) for each in wanted]
+    floors: dict[float, Mapping[str, float]] = {}
+    found = []
+    for relation in wanted:
+        posed = relation.pose(scene)
+        if isinstance(posed, str):
+            found.append(Change(relation.name, refused=posed))
+            continue
+        unit = unit_of(scene, posed.shift)
+        if unit not in floors:
+            floors[unit] = floor(
+                base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
+            )
+        answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
+        found.append(judged(relation.name, base, answer, floors[unit]))
+    return found
+
+
+def floor(base: Metrics, moved: Sequence[Metrics | str]) -> dict[str, float]:
+    """Largest change of each metric from moved starts; infinite where a moved start loses it."""
+    changes = dict.fromkeys(base, 0.0)
+    for found in moved:
+        for name, (value, _) in base.items():
+            other = None if isinstance(found, str) else found.get(name, (None, ""))[0]
+            if value is not None:
+                changes[name] = max(changes[name], math.inf if other is None else abs(other - value))
+    return changes
+
+
+def judged(relation: str, base: Metrics, answer: Metrics | str, floors: Mapping[str, float]) -> Change:
+    """The metric that changed most for what it may."""
+    if isinstance(answer, str):
+        return Change(relation, refused=answer, lost=True)
+    worst = Change(relation)
+    for name, (value, _) in base.items():
+        other = answer.get(name, (None, ""))[0]
+        if value is None:
+            continue
+        allowed = FACTOR * floors[name] + LAST_DIGITS * abs(value)
+        change = math.inf if other is None else abs(other - value)
+        if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
+            worst = Change(relation, name, change, allowed)
+    return worst
+
+
+def _share(change: float, allowed: float) -> float:
+    if change == 0.0 or math.isinf(allowed):
+        return 0.0
+    return change / allowed if allowed else math.inf
