@@ -93,7 +93,8 @@ def _tangential(scene: Scene) -> bool:
         vectors = [scene.gravity] + [b.twist[:d] for b in scene.bodies] + [b.force for b in scene.bodies]
         for vector in vectors:
             normal = sum(v * n for v, n in zip(vector, face.normal, strict=True))
-            along = math.sqrt(max(0.0, sum(v * v for v in vector) - normal * normal))
+            # Component by component: the difference of two squares would lose half the digits, and with them the tilt.
+            along = math.hypot(*(v - normal * n for v, n in zip(vector, face.normal, strict=True)))
             if along > 1e-12 * max(1.0, math.hypot(*vector)):
                 return True
     return False
