@@ -17,6 +17,7 @@ from validation.bench.agreement import ratios
 from validation.plan import QUICK_DT
 from validation.posed import resolve
 from validation.releases import history
+from validation.releases.timing import CALLED
 from validation.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
 
 
@@ -143,7 +144,8 @@ def _releases(store: Store, kept: Kept, engine: str) -> list[_Entry]:
             found = history.observations(store, engine, version)
             summary = summarise(found, history.told_by(engine, version, found).rows)
             kept.put(name, summary)
-        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary))
+        taken = {key: (ratio, CALLED) for key, ratio in history.times(store, engine, version).items()}
+        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary, taken))
     return entries
 
 
