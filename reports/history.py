@@ -9,11 +9,10 @@ from pathlib import Path
 from reports.releases import PACE, as_table
 from reports.wording import plural
 from validation.comparison import Kind
-from validation.identity import commit
 from validation.releases import history
 from validation.releases.history import Step
 from validation.releases.notes import explanations
-from validation.store import Store
+from validation.store import RELEASE_TITLE, Store
 
 HEAD = """# Physics over engine releases
 
@@ -62,8 +61,8 @@ def _moved(own: Sequence[Step]) -> str:
 
 def page(store: Store) -> str:
     """Markdown: of each engine in the store a table of its releases and the sentences."""
-    here = commit()
-    out = [HEAD.format(commit=f" at commit {here}" if here else "")]
+    made = {run.commit for run in store.runs() if run.title.startswith(RELEASE_TITLE) and run.plan}
+    out = [HEAD.format(commit=f"; its rows were made at {' and '.join(sorted(made))}" if all(made) and made else "")]
     for engine in history.engines(store):
         told = history.told(store, engine)
         steps = history.steps(told)

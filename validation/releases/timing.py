@@ -1,7 +1,7 @@
 """Times of releases: what a scene costs on each, against a unit of the same machine.
 
-    each round:  yardstick, the engine's timed call, yardstick     in the release's environment, one after the other
-    ratio        the call's time over the mean of both yardsticks, step by step; a busy machine slows all three
+    each round:  yardstick, timed call, yardstick, timed call, yardstick, ...     in the release's environment
+    ratio        a call's time over the mean of the yardsticks on both of its sides; a busy machine slows all three
 
 Seconds of two machines, or of two hours of one, cannot be compared; a share of something that never changes can. The
 yardstick is a loop of plain Python: it is the same interpreter in every environment, where numpy differs between them.
@@ -23,10 +23,10 @@ from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.plan import QUICK_DT
 from validation.posed import is_file, resolve
 
-#: Rounds, each in a process of its own: a median of seven, and a slow one is outvoted by six.
-ROUNDS = 7
-#: Turns of the yardstick's loop: 5 to 10 ms, a hundred times what reading the clock costs.
-TURNS = 100_000
+#: Rounds, each in a process of its own: two that were disturbed are outvoted by three.
+ROUNDS = 5
+#: Turns of the yardstick's loop: some 5 ms, a thousand times what reading the clock costs.
+TURNS = 50_000
 #: Name of the yardstick in place of an engine, and what it is called.
 YARDSTICK, CALLED = "python", "a loop of Python"
 #: Seconds without an answer after which what is timed counts as hanging.
@@ -61,16 +61,16 @@ def laps(slots: Sequence[Slot], rounds: int = ROUNDS) -> Iterator[dict[str, Any]
     try:
         for round_ in range(rounds):
             lane.start()
-            for order, slot in enumerate(slot for slot in slots if slot not in void):
+            before = yardstick()
+            for order, slot in enumerate([slot for slot in slots if slot not in void]):
                 unit = work_unit(slot, "", None)
-                before = yardstick()
-                found = lane.time(unit)
-                own = 0.5 * (before + yardstick())
+                found, after = lane.time(unit), yardstick()
+                beside, before = 0.5 * (before + after), after
                 if found.void:
                     void.add(slot)
-                yield {"timed": slot.as_dict(), "round": round_, "order": order, "yardstick": own, "void": found.void,
-                       "seconds": found.seconds, "wall_seconds": found.wall_seconds, "steps": unit.steps,
-                       "bodies": unit.bodies, "state_hash": found.state_hash}  # fmt: skip
+                yield {"timed": slot.as_dict(), "round": round_, "order": order, "yardstick": beside,
+                       "void": found.void, "seconds": found.seconds, "wall_seconds": found.wall_seconds,
+                       "steps": unit.steps, "bodies": unit.bodies, "state_hash": found.state_hash}  # fmt: skip
     finally:
         lane.stop()
 
