@@ -14,7 +14,7 @@ from rich.console import Console
 from adapters.engine import EngineError
 from adapters.plain import one_line
 from adapters.scene import SceneError
-from reports import exports
+from reports import brief, exports
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
@@ -68,7 +68,10 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done), chosen)
+    observations = store.observations(done)
+    rows = rows_of(done.id, observations, chosen)
+    if done.finished:
+        brief.keep(out, done.id, observations, rows)
     store.close()
     _show(rows, out, as_json, console, options)
     absent = missing(options["engine"], request.engines)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from reports.brief import Brief, Kept, Key, Summary, summarise
 from reports.dashboard.steps import ERROR, TIME, Rule, Step, steps
-from reports.dashboard.summary import Brief, Kept, Key, Summary, summarise
 from reports.page.charts import EXACT
 from validation.bench import reading
 from validation.bench.agreement import ratios

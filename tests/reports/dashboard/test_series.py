@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from reports.brief import FILE, Kept, Summary, summarise
 from reports.command import main
 from reports.dashboard import events
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
-from reports.dashboard.summary import FILE, Kept, Summary, summarise
 from validation.cells import Outcome, Slot
 from validation.store import Store
 
@@ -110,9 +110,26 @@ def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeyp
     assert (history_folder / FILE).exists()
     monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
     panels(store, history_folder)
-    monkeypatch.setattr("reports.dashboard.summary.judging_code", lambda: "other code")
+    monkeypatch.setattr("reports.brief.judging_code", lambda: "other code")
     with pytest.raises(pytest.fail.Exception):
         panels(store, history_folder)
+    store.close()
+
+
+def test_a_run_keeps_its_own_summary_so_that_no_dashboard_judges_it_again(tmp_path, monkeypatch):
+    """Of 500 runs the quick suite's judging takes an hour; reading what they kept takes seconds."""
+    words = ["run", "impact", "--param", "e=0.5", "--dim", "2", "--engine", "chipmunk", "--dt", "1/240"]
+    done = CliRunner().invoke(main, [*words, "--jobs", "1", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    store = Store(tmp_path, create=False)
+    (made,) = store.runs()
+    kept = Kept(tmp_path)
+    assert kept.get(made.id) == summarise(store.observations(made))
+    kept.close()
+    monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
+    assert {panel.key for panel in panels(store, tmp_path)} == {
+        ("chipmunk", profile, "impact", 2) for profile in ("default", "tuned")
+    }
     store.close()
 
 
