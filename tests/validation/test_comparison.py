@@ -126,6 +126,11 @@ def test_the_same_question_is_found_however_its_slot_is_written():
     turned = {**ROW, "slot": dict(reversed(list(ROW["slot"].items())))}
     assert compare_rows([ROW], [turned]) == []
     assert len(compare_rows([ROW], [{**ROW, "metric": "sink"}])) == 2
+    assert len(compare_rows([ROW], [{**ROW, "slot": replace(SLOT, iterations=4).as_dict()}])) == 2
+
+
+def test_a_ratio_is_told_without_a_unit():
+    assert change({**ROW, "unit": "1"}, {**ROW, "unit": "1", "physics": "fail"}).before == "0.25 (pass)"
 
 
 # ---- order, families, plain data -----------------------------------------------------------------------------------
@@ -143,6 +148,7 @@ def test_the_most_serious_change_comes_first():
         replace(CHANGE, size=-8.0),
         replace(CHANGE, size=3.0),
         CHANGE,
+        replace(CHANGE, slot={"iterations": 1}),
         replace(CHANGE, slot={"iterations": 4}),
         replace(CHANGE, slot={"iterations": 30}),
         replace(CHANGE, metric="sink"),
@@ -173,14 +179,15 @@ def test_families_hold_rows_of_one_kind_direction_and_metric_the_largest_first()
     first = replace(CHANGE, metric="impulse[1]", size=2.0)
     largest = replace(CHANGE, metric="impulse[12]", size=7.0)
     others = [
-        replace(CHANGE, metric="impulse_scatter"), replace(CHANGE, metric="impulse[1]", regressed=False),
+        replace(CHANGE, metric="impulse_scatter"), replace(CHANGE, metric="load[1]"),
+        replace(CHANGE, metric="impulse[1]", regressed=False),
         replace(CHANGE, metric="impulse[1]", kind=Kind.FLIP), replace(CHANGE, metric="impulse[1]", scene="pile"),
         replace(CHANGE, metric="impulse[1]", engine="zoo"), replace(CHANGE, metric="impulse[1]", profile="stiff"),
     ]  # fmt: skip
     found = families([first, *others, largest])
     assert [family.changes for family in found if len(family.changes) > 1] == [(largest, first)]
     assert next(family for family in found if len(family.changes) > 1).first is largest
-    assert len(found) == 7 and found[0].first.kind is Kind.FLIP
+    assert len(found) == 8 and found[0].first.kind is Kind.FLIP
 
 
 @pytest.mark.parametrize(
@@ -221,6 +228,7 @@ def test_a_change_of_speed_says_both_ratios_and_its_interval():
         (timed(1.0), timed(math.nextafter(PRACTICAL, 2.0)), True),
         (timed(PRACTICAL), timed(1.0), False),
         (timed(1.2), timed(1.0), True),
+        (timed(1.0), timed(1.5), True),
         (timed(1.0), timed(2.0, 1.05, 4.0), False),  # the interval does not clear the threshold
         (timed(1.0, 0.5, 1.95), timed(2.0), False),
         (timed(2.0, 1.05, 4.0), timed(1.0), False),
@@ -228,7 +236,8 @@ def test_a_change_of_speed_says_both_ratios_and_its_interval():
     ],
 )
 def test_a_change_of_speed_counts_if_its_whole_interval_is_beyond_a_tenth(before, after, counts):
-    assert bool(compare_speeds([before], [after])) == counts
+    found = compare_speeds([before], [after])
+    assert bool(found) == counts and all(each.regressed == (after["ratio"] > before["ratio"]) for each in found)
 
 
 def test_only_the_same_unit_against_the_same_opponent_is_compared():
