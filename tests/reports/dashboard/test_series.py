@@ -159,7 +159,8 @@ def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_pat
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told == {"path": str(path), "panels": 4, "moved": 4}
-    assert "<svg" in path.read_text()
+    text = path.read_text()
+    assert "<svg" in text and "4 panels of " in text
 
 
 def test_a_store_without_a_finished_run_is_one_line(tmp_path):
