@@ -57,11 +57,7 @@ SUBJECTS = {
     ),
     "reports/exports.py": ("reports/test_exports.py", "reports/test_what_is_shown.py"),
     "reports/wording.py": ("reports/test_wording.py", "reports/test_what_is_shown.py"),
-    "reports/changes.py": (
-        "reports/test_changes.py",
-        "reports/test_comparison.py",
-        "validation/releases/test_commands.py",
-    ),
+    "reports/changes.py": ("reports/test_changes.py",),
     "reports/findings.py": ("reports/test_findings_shown.py", "reports/test_what_is_shown.py"),
     "reports/matrix.py": ("reports/test_matrix.py", "reports/test_what_is_shown.py"),
     "reports/command/statuses.py": ("reports/test_statuses.py",),
