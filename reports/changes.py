@@ -42,7 +42,7 @@ class Side:
     def text(self) -> str:
         """``20261121-101500 (commit 1a2b3c4, 7300 rows)``."""
         commit = f"commit {self.commit[:12]}, " if self.commit else ""
-        return f"{self.run or 'rows'} ({commit}{len(self.rows)} rows)"
+        return f"{self.run or 'rows'} ({commit}{plural(len(self.rows), 'row')})"
 
 
 def load_side(argument: str, out: Path) -> Side:
@@ -185,7 +185,7 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
         ]
         out.append("| " + " | ".join(cells) + " |")
     if len(found) > most:
-        left = f"{len(found) - most} more {'family' if len(found) == most + 1 else 'families'}"
+        left = plural(len(found) - most, "more family")
         out.append(f"\n... and {left}; `crosscheck compare --json` lists every change")
     return "\n".join(out) + "\n"
 

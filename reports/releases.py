@@ -144,7 +144,7 @@ def found_as_text(plain: dict[str, Any]) -> str:
     ]
     for version in plain["not_asked_between"]:
         lines.append(f"  {version} lies between and did not answer: {plain['silent'][version]}")
-    lines.append(f"asked {len(plain['asked'])} releases: {', '.join(plain['asked'])}")
+    lines.append(f"asked {plural(len(plain['asked']), 'release')}: {', '.join(plain['asked'])}")
     if plain["others"] is None:
         lines.append("the only change? --all asks every release")
     elif plain["others"]:

@@ -234,5 +234,5 @@ def _environments(remove: str | None, as_json: bool) -> None:
         for row in data:
             state = row["wrong"] or "as installed"
             click.echo(f"{row['name']}  Python {row['python']}  {row['bytes'] / 2**20:.0f} MiB  {state}")
-        click.echo(f"{len(data)} environments in {environments.folder()}")
+        click.echo(f"{plural(len(data), 'environment')} in {environments.folder()}")
     sys.exit(statuses.ALARM if any(row["wrong"] for row in data) else statuses.FINE)

@@ -23,6 +23,7 @@ from reports.progress import run_plan
 from reports.stages import warm_up
 from reports.summary import show
 from reports.terminal import terminal
+from reports.wording import plural
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import pinned, resolve
@@ -58,7 +59,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "cell"))
         return
     folder(out)
     for name in request.scenes:

@@ -23,7 +23,18 @@ from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
-from reports.wording import LABELS, mark_of, measured, missing_text, number, params_text, quantity, reproduce, row_id
+from reports.wording import (
+    LABELS,
+    mark_of,
+    measured,
+    missing_text,
+    number,
+    params_text,
+    plural,
+    quantity,
+    reproduce,
+    row_id,
+)
 from validation.bench import reading
 from validation.cells import Observation
 from validation.rows import rows_of
@@ -159,7 +170,7 @@ def _print_families(found: Sequence[Family], console: Console) -> None:
         own = [family for family in found if family.mark == mark]
         console.print()
         count = sum(len(family.rows) for family in own)
-        console.print(Text(f"{LABELS[mark]}: {count} rows in {len(own)} families", style="bold"))
+        console.print(Text(f"{LABELS[mark]}: {plural(count, 'row')} in {plural(len(own), 'family')}", style="bold"))
         table = _grid("id", "engine, scene", "worst row", "rows")
         table.columns[0].no_wrap = True
         for family in own:
