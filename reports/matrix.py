@@ -149,7 +149,7 @@ def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) ->
     for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
         yield f"{engine} {_version(versions.get(engine, ''))}".strip(), ()
         profiles = [profile for name, profile in matrix.columns if name == engine]
-        refused = _never_asked(matrix, engine, profiles)
+        refused = _never_asked(matrix, engine)
         for profile in profiles:
             dimensions = [d for d in sorted({d for _, d in matrix.lines}) if d not in refused]
             yield from _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}")
@@ -157,7 +157,7 @@ def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) ->
             yield from _lines(matrix.fields, scenes, (engine, profiles[0]), [dimension], "  every profile")
 
 
-def _never_asked(matrix: Matrix, engine: str, profiles: Sequence[str]) -> list[int]:
+def _never_asked(matrix: Matrix, engine: str) -> list[int]:
     """Dimensions in which an engine cannot be asked for anything."""
     found = []
     for dimension in sorted({d for _, d in matrix.lines}):

@@ -133,11 +133,17 @@ def test_rows_at_iterations_asked_for_are_counted_apart():
     assert matrix.counts == {"stack": (4, 30)}
 
 
+def same_dimension(dimension, mark):
+    return [row("stack", dimension, "deep", "soft", mark, 4)]
+
+
 def test_a_sweep_is_said_in_a_line_of_its_own_with_dimensions_only_where_they_differ():
     assert sweeps_of(matrix_of(ROWS)) == [
         "stack at 4, 30 iterations instead of the profile's own, FAIL: "
         "flat/soft 0/1; deep/soft 2/3 2-D and 0/3 3-D; deep/stiff 4/4."
     ]
+    three = [*same_dimension(2, "known"), *same_dimension(3, "pass"), *same_dimension(4, "known")]
+    assert sweeps_of(matrix_of(three))[0].endswith("deep/soft 1/1 2-D 4-D and 0/1 3-D.")
     same = [row("stack", d, "deep", "soft", iterations=4) for d in (2, 3)]
     asked = [row("stack", 3, "flat", "soft", "unsupported", 4), row("impact", 3, "deep", "soft", "known", 8)]
     assert sweeps_of(matrix_of([*same, *asked])) == [
