@@ -34,7 +34,7 @@ def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
 
 #: Headings of `_line`, and what is said of the pace where there is one.
 HEADINGS = ("release", "fails", "no answer", "mended", "moved", "time", "")
-PACE = "time: median over scenes, in those of the first release; each against a loop of Python on the same machine"
+PACE = "time: the first release's is 1; median over scenes, each against a loop of Python on the same machine"
 
 
 def _first(releases: Sequence[Told]) -> Told:
