@@ -73,6 +73,11 @@ def test_values_that_repeat_exactly_have_a_step_wherever_they_change(n):
     assert steps([1.0] * (n - 1) + [1.005], ERROR) == [] and steps([1.0] * n + [1.08] * n, TIME) == []
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_a_series_too_short_for_two_levels_has_no_step(n):
+    assert steps([1.0] + [9.0] * (n - 1), TIME) == []
+
+
 def test_a_time_that_stands_out_alone_is_no_step_and_one_that_stays_is():
     assert steps([1.0] * 9 + [3.0] + [1.0] * 9, TIME) == []
     assert [step.at for step in steps([1.0] * 9 + [1.5] * 3, TIME)] == [9]
