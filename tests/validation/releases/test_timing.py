@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from adapters import registry
 from reports.command import main
 from reports.dashboard.series import panels
+from validation.bench.stopwatch import Lap
 from validation.cells import Observation, Outcome, Slot
 from validation.releases import history, timing
 from validation.releases.history import Told
@@ -101,6 +102,34 @@ def test_a_pace_is_the_median_over_scenes_that_both_releases_have():
     assert told(a=2.0, b=2.0, c=1.0, new=50.0).pace(first) == 1.0
     assert told(a=3.0, b=6.0, c=4.0).pace(first) == 3.0
     assert told(new=1.0).pace(first) is None and told().pace(first) is None
+
+
+def test_a_lap_is_measured_by_the_yardsticks_on_both_of_its_sides_and_one_that_fails_is_not_asked_again(monkeypatch):
+    class FakeLane:
+        started = 0
+
+        def __init__(self, patience):
+            pass
+
+        def start(self):
+            FakeLane.started += 1
+
+        def time(self, unit):
+            void = "it crashed" if unit.slot.profile == "gone" else ""
+            return Lap("1.0", 4.0, 5.0, 6.0, "ab", None, void=void)
+
+        def stop(self):
+            FakeLane.started = -FakeLane.started
+
+    ticks = iter(range(1, 100))
+    monkeypatch.setattr(timing, "Lane", FakeLane)
+    monkeypatch.setattr(timing, "yardstick", lambda: float(next(ticks)))
+    gone = replace(SLOT, profile="gone")
+    found = list(timing.laps([SLOT, gone], rounds=2))
+    assert [(lap["round"], lap["timed"]["profile"], lap["yardstick"], lap["void"]) for lap in found] == [
+        (0, "default", 1.5, ""), (0, "gone", 2.5, "it crashed"), (1, "default", 4.5, "")]  # fmt: skip
+    assert (found[0]["seconds"], found[0]["wall_seconds"], found[0]["order"], found[1]["order"]) == (4.0, 5.0, 0, 1)
+    assert FakeLane.started == -2  # a process per round, and none is left
 
 
 def test_a_yardstick_is_milliseconds_of_cpu_time():
