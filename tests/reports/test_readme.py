@@ -84,6 +84,7 @@ SAID = {
 }
 #: Command of the README -> why it is not run here.
 NOT_RUN = {
+    "crosscheck releases ... --times": "installs releases: run by tests/validation/releases",
     "crosscheck releases mujoco 3.2.7,3.12.0 stack": "installs releases: run by tests/validation/releases",
     "crosscheck bisect mujoco 3.4.0..3.12.0 stack --check drift": "installs releases: run by tests/validation/releases",
     "crosscheck run": "minutes: every continuous-integration run makes it by `make run`",
