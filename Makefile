@@ -57,17 +57,20 @@ publish: $(STAMP)
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
 
-# History over releases of the engines: environments are built once, what is stored is not run again; hours at first.
+# History over releases of the engines, with times: environments are built once, what is stored is not run again; about
+# an hour at first.
 # A release that does not answer is a row with its reason (status 4), and no reason to stop.
 RELEASES_OUT ?= crosscheck-releases
 MUJOCO_RELEASES ?= 3.0.0,3.0.1,3.1.0,3.1.1,3.1.6,3.2.7,3.3.0,3.3.5,3.3.6,3.3.7,3.4.0,3.5.0,3.7.0,3.8.0,3.8.1,3.9.0,3.10.0,$\
 	3.11.0,3.12.0,3.14.0,3.17.0,4.0.0,4.0.1
 releases: $(STAMP)
+	@test -z "$$(git status --porcelain)" || { echo "commit first: the history carries the commit's hash"; exit 2; }
 	for which in "mujoco $(MUJOCO_RELEASES)" "chipmunk 6.4.0.." "bullet 3.2.6.."; do \
-		$(BIN)/crosscheck releases $$which --out $(RELEASES_OUT) || test $$? -eq 4 || exit 2; \
+		$(BIN)/crosscheck releases $$which --times --out $(RELEASES_OUT) || test $$? -eq 4 || exit 2; \
 	done
-	$(BIN)/crosscheck dashboard --out $(RELEASES_OUT) --output reports/published/releases.html
-	$(BIN)/python -m reports.history $(RELEASES_OUT) reports/published/releases.md
+	$(BIN)/crosscheck dashboard --out $(RELEASES_OUT) --output $(RELEASES_OUT)/releases.html
+	$(BIN)/python -m reports.history $(RELEASES_OUT) $(RELEASES_OUT)/releases.md
+	cp $(RELEASES_OUT)/releases.html $(RELEASES_OUT)/releases.md reports/published/
 
 # Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
 tune: $(STAMP)

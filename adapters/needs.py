@@ -105,5 +105,6 @@ def _tangential(scene: Scene) -> bool:
 def _is_across(vector: tuple[float, ...], normal: tuple[float, ...]) -> bool:
     """Whether ``vector`` has a part across the unit ``normal`` (1e-12: round-off)."""
     along = sum(v * n for v, n in zip(vector, normal, strict=True))
-    across = math.sqrt(max(0.0, sum(v * v for v in vector) - along * along))
+    # Component by component: the difference of two squares would lose half the digits, and with them the tilt.
+    across = math.hypot(*(v - along * n for v, n in zip(vector, normal, strict=True)))
     return across > 1e-12 * max(1.0, math.hypot(*vector))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.wording import markdown, number, reproduce
+from reports.wording import markdown, number, plural, reproduce
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.comparison import Change, Kind, families
@@ -42,7 +42,7 @@ class Side:
     def text(self) -> str:
         """``20261121-101500 (commit 1a2b3c4, 7300 rows)``."""
         commit = f"commit {self.commit[:12]}, " if self.commit else ""
-        return f"{self.run or 'rows'} ({commit}{len(self.rows)} rows)"
+        return f"{self.run or 'rows'} ({commit}{plural(len(self.rows), 'row')})"
 
 
 def load_side(argument: str, out: Path) -> Side:
@@ -152,7 +152,7 @@ def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
         change, more = family.first, len(family.changes) - 1
         if change.kind in (Kind.ADDED, Kind.REMOVED):
             who = f"{change.engine}/{change.profile} {change.scene}"
-            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {more + 1} rows")
+            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {plural(more + 1, 'row')}")
             continue
         trend = "regressed" if change.regressed else "improved or neutral"
         rest = f" and {more} more like it" if more else ""
@@ -185,7 +185,8 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
         ]
         out.append("| " + " | ".join(cells) + " |")
     if len(found) > most:
-        out.append(f"\n... and {len(found) - most} more families; `crosscheck compare --json` lists every change")
+        left = plural(len(found) - most, "more family")
+        out.append(f"\n... and {left}; `crosscheck compare --json` lists every change")
     return "\n".join(out) + "\n"
 
 

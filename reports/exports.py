@@ -14,7 +14,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from reports.findings import ALARMING, finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
-from reports.wording import LABELS, cell, mark_of, markdown
+from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.rows import Row, frame, rows_of
 from validation.store import Store
 
@@ -91,7 +91,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
         out.append(f"| {markdown(line[0])} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
     out += ["", legend().replace("|", "\\|"), ""]
     for mark, group in grouped(rows):
-        out.append(f"**{LABELS[mark]}**: {len(group)} rows")
+        out.append(f"**{LABELS[mark]}**: {plural(len(group), 'row')}")
         if mark in ALARMING:
             out += [f"* {markdown(finding_line(row))}" for row in group]
     return "\n".join(out) + "\n"

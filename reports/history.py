@@ -6,19 +6,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from reports.releases import as_table
+from reports.releases import PACE, as_table
+from reports.wording import plural
 from validation.comparison import Kind
-from validation.identity import commit
 from validation.releases import history
 from validation.releases.history import Step
 from validation.releases.notes import explanations
-from validation.store import Store
+from validation.store import RELEASE_TITLE, Store
 
 HEAD = """# Physics over engine releases
 
 Made by `make releases`{commit}. The same cells of every scene of the quick suite on each release,
 driven by one adapter in an environment of its own; receipts ran before each cell. A row is one check of one cell.
-*fails* counts rows outside their tolerance; *mended* those that pass although they are listed as findings of other
+*fails* counts rows outside their tolerance; *no answer* those whose cell crashed, hung or is not driven as declared:
+they fail no check and are no better for it; *mended* those that pass although they are listed as findings of other
 releases; *moved* those whose verdict flips or whose value moves beyond its noise floor. `crosscheck bisect` finds each
 of these steps again. What the notes say of a release is set beside a step that it may explain; it was not proven by
 building that one change.
@@ -26,42 +27,47 @@ building that one change.
 
 
 def sentences(engine: str, steps: Sequence[Step]) -> list[str]:
-    """One sentence per release, profile and scene that moved: what, by how much, and what the notes say of it."""
-    groups: dict[tuple[str, str, str, str], list[Step]] = {}
+    """What moved in which release: a paragraph per release and explanation, a line in it per profile and scene."""
+    groups: dict[tuple[str, str], dict[str, dict[tuple[str, str], list[Step]]]] = {}
     for step in steps:
         change = step.family.first
-        groups.setdefault((step.before, step.after, change.profile, change.scene), []).append(step)
-    return [_sentence(engine, *key, own) for key, own in groups.items()]
+        why = "; ".join(explanations(engine, change.scene, change.profile, step.before, step.after))
+        told = groups.setdefault((step.before, step.after), {}).setdefault(why, {})
+        told.setdefault((change.profile, change.scene), []).append(step)
+    out = []
+    for (before, after), paragraphs in groups.items():
+        for why, places in paragraphs.items():
+            lines = [f"  * {profile} {scene}: {_moved(own)}" for (profile, scene), own in places.items()]
+            out.append("\n".join([f"**{after}** (after {before}). {why[0].upper()}{why[1:]}.", *lines]))
+    return out
 
 
-def _sentence(engine: str, before: str, after: str, profile: str, scene: str, own: Sequence[Step]) -> str:
+def _moved(own: Sequence[Step]) -> str:
+    """``2 rows begin to fail, 14 change their value; first `drift` (3-D) 1e-9 m (pass) -> 0.1 m (fail)``."""
     changes = [change for step in own for change in step.family.changes]
     flips = [change.regressed for change in changes if change.kind is Kind.FLIP]
     ends = [change.regressed for change in changes if change.kind is Kind.OUTCOME]
     counts = (
-        (sum(flips), "begin to fail"),
-        (len(flips) - sum(flips), "cease to fail"),
-        (sum(ends), "end without an answer"),
-        (len(ends) - sum(ends), "have an answer again"),
-        (sum(change.kind is Kind.ERROR for change in changes), "change their value"),
+        (sum(flips), "begins to fail", "begin to fail"),
+        (len(flips) - sum(flips), "ceases to fail", "cease to fail"),
+        (sum(ends), "ends without an answer", "end without an answer"),
+        (len(ends) - sum(ends), "has an answer again", "have an answer again"),
+        (sum(change.kind is Kind.ERROR for change in changes), "changes its value", "change their value"),
     )
-    said = ", ".join(f"{what} {count}" for count, what in counts if count)
+    said = [f"{plural(count, 'row')} {one if count == 1 else more}" for count, one, more in counts if count]
     first = own[0].family.first
-    why = "; ".join(explanations(engine, scene, profile, before, after))
-    moved = f"`{first.metric}` ({history.cell_of(first)}) {first.before} -> {first.after}"
-    return (
-        f"**{after}** (after {before}), {profile} {scene}: rows that {said}; first {moved}. {why[0].upper()}{why[1:]}."
-    )
+    return f"{', '.join(said)}; first `{first.metric}` ({history.cell_of(first)}) {first.before} -> {first.after}"
 
 
 def page(store: Store) -> str:
     """Markdown: of each engine in the store a table of its releases and the sentences."""
-    here = commit()
-    out = [HEAD.format(commit=f" at commit {here}" if here else "")]
+    made = {run.commit for run in store.runs() if run.title.startswith(RELEASE_TITLE) and run.plan}
+    out = [HEAD.format(commit=f"; its rows were made at {' and '.join(sorted(made))}" if all(made) and made else "")]
     for engine in history.engines(store):
         told = history.told(store, engine)
         steps = history.steps(told)
         out += [f"## {engine}", "", as_table(told, steps)]
+        out += [f"{PACE}.", ""] if any(each.times for each in told) else []
         said = sentences(engine, steps)
         out += [f"* {line}" for line in said] or ["No row moved."]
         out.append("")

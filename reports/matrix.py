@@ -23,6 +23,8 @@ STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red"
 ALARM = "bold white on red"
 #: From this width on a field says FAIL in full [columns].
 ROOMY = 100
+#: Space before a scene [columns]: one of padding, and one that the box draws as its divider.
+GAP = 2
 #: Marks of rows that have no verdict.
 UNJUDGED = ("unsupported", "none", "not_installed")
 
@@ -115,10 +117,10 @@ def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[T
 
 
 def _chunks(widths: Sequence[int], room: int) -> Iterator[list[int]]:
-    """Indices of scenes that fit beside each other; two columns of space before each."""
+    """Indices of scenes that fit beside each other, each with its `GAP`: a count cut in half would be another count."""
     chosen: list[int] = []
     for k, wide in enumerate(widths):
-        if chosen and sum(widths[j] + 2 for j in chosen) + wide + 2 > room:
+        if chosen and sum(widths[j] + GAP for j in chosen) + wide + GAP > room:
             yield chosen
             chosen = []
         chosen.append(k)
@@ -129,7 +131,7 @@ def _chunks(widths: Sequence[int], room: int) -> Iterator[list[int]]:
 def _table(
     scenes: Sequence[str], chosen: Sequence[int], body: Sequence[tuple[str, Any]], texts: Sequence[Any], first: int
 ) -> Table:
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 2, 0, 0))
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
     table.add_column("engine, profile", no_wrap=True, min_width=first)
     for k in chosen:
         table.add_column(scenes[k], no_wrap=True)
@@ -147,7 +149,7 @@ def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) ->
     for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
         yield f"{engine} {_version(versions.get(engine, ''))}".strip(), ()
         profiles = [profile for name, profile in matrix.columns if name == engine]
-        refused = _never_asked(matrix, engine, profiles)
+        refused = _never_asked(matrix, engine)
         for profile in profiles:
             dimensions = [d for d in sorted({d for _, d in matrix.lines}) if d not in refused]
             yield from _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}")
@@ -155,7 +157,7 @@ def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) ->
             yield from _lines(matrix.fields, scenes, (engine, profiles[0]), [dimension], "  every profile")
 
 
-def _never_asked(matrix: Matrix, engine: str, profiles: Sequence[str]) -> list[int]:
+def _never_asked(matrix: Matrix, engine: str) -> list[int]:
     """Dimensions in which an engine cannot be asked for anything."""
     found = []
     for dimension in sorted({d for _, d in matrix.lines}):

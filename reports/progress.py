@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from reports.stages import stage, warm_up
+from reports.wording import plural
 from validation.cells import Slot
 from validation.store import Run, Store
 from validation.tracks import representatives
@@ -36,7 +37,7 @@ def run_plan(
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
-        console.print(f"resuming run {run.id}: {len(done)} of {len(slots)} cells are done")
+        console.print(f"resuming run {run.id}: {len(done)} of {plural(len(slots), 'cell')} done")
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -56,7 +57,7 @@ def run_plan(
     shown = representatives(slots) if finish else set()
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
-        stage(console, f"{len(todo)} cells"),
+        stage(console, plural(len(todo), "cell")),
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):
         task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
@@ -70,7 +71,7 @@ def run_plan(
             console.print("interrupted: what finished is kept, the same command resumes")
             raise
     for reason, count in left.items():
-        console.print(f"left: {count} cells, {reason}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"left: {plural(count, 'cell')}, {reason}", markup=False, highlight=False, soft_wrap=True)
     if left:
         console.print("this run is not complete; the same command resumes it", markup=False)
     elif finish:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reports.wording import markdown, number
+from reports.wording import markdown, number, plural
 from validation.comparison import Change, Kind
 from validation.releases.bisection import Found
 from validation.releases.history import Step, Told, cell_of, mended, sentence
@@ -20,27 +20,42 @@ from validation.verdicts import Physics
 SHOWN = 6
 
 
-def _line(told: Told, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Version, rows that fail, rows that pass although they are listed for other releases, what moved."""
+def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
+    """Version and counts of rows: fail, without an answer, pass although listed for other releases, moved; the pace."""
     if told.reason:
-        return (told.version, "-", "-", "-", told.reason)
+        return (told.version, "-", "-", "-", "-", "-", told.reason)
     moved = sum(len(step.family.changes) for step in steps if step.after == told.version)
     better = sum(mended(row) for row in told.rows)
     note = "; ".join(f"no verdicts of {said}" for said in told.doubted)
-    return (told.version, str(told.count(Physics.FAIL)), str(better or "-"), str(moved or "-"), note)
+    counts = (told.count(Physics.FAIL), told.ended or "-", better or "-", moved or "-")
+    pace = told.pace(first)
+    return (told.version, *map(str, counts), "-" if pace is None else f"x{number(pace, 3)}", note)
+
+
+#: Headings of `_line`, and what is said of the pace where there is one.
+HEADINGS = ("release", "fails", "no answer", "mended", "moved", "time", "")
+PACE = "time: the first release's is 1; median over scenes, each against a loop of Python on the same machine"
+
+
+def _first(releases: Sequence[Told]) -> Told:
+    """The first release that was timed, whose pace is one."""
+    return next((told for told in releases if told.times), releases[0])
 
 
 def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console) -> None:
     """A line per release, then what moved in each: its families of changes, the most serious first."""
-    rows = max((len(told.rows) for told in releases), default=0)
-    console.print(Text(f"{releases[0].engine}: {len(releases)} releases, {rows} rows each", style="bold"))
+    rows, first = max((len(told.rows) for told in releases), default=0), _first(releases)
+    head = f"{first.engine}: {plural(len(releases), 'release')}, {plural(rows, 'row')} each"
+    console.print(Text(head, style="bold"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading, side in (("release", "left"), ("fails", "right"), ("mended", "right"), ("moved", "right")):
-        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type]  # a word of rich's own
+    for heading in HEADINGS[:-1]:
+        table.add_column(heading, justify="left" if heading == HEADINGS[0] else "right", no_wrap=True)
     table.add_column("", overflow="fold")
     for told in releases:
-        table.add_row(*_line(told, steps))
+        table.add_row(*_line(told, first, steps))
     console.print(table, highlight=False)
+    if first.times:
+        console.print(Text(PACE, style="dim"))
     for version in dict.fromkeys(step.after for step in steps):
         own = [step for step in steps if step.after == version]
         console.print()
@@ -66,8 +81,8 @@ def mark(change: Change) -> str:
 
 def as_table(releases: Sequence[Told], steps: Sequence[Step]) -> str:
     """A line per release, in Markdown."""
-    out = ["| release | fails | mended | moved | |", "|---|---|---|---|---|"]
-    out += ["| " + " | ".join(markdown(cell) for cell in _line(told, steps)) + " |" for told in releases]
+    out, first = ["| " + " | ".join(HEADINGS) + " |", "|---" * len(HEADINGS) + "|"], _first(releases)
+    out += ["| " + " | ".join(markdown(cell) for cell in _line(told, first, steps)) + " |" for told in releases]
     return "\n".join(out) + "\n"
 
 
@@ -91,7 +106,9 @@ def as_json(releases: Sequence[Told], steps: Sequence[Step]) -> str:
             "release": told.name,
             "rows": len(told.rows),
             "fails": told.count(Physics.FAIL),
+            "no_answer": told.ended,
             "mended": sum(mended(row) for row in told.rows),
+            "time": told.pace(_first(releases)),
             "reason": told.reason,
             "without_verdicts": list(told.doubted),
         }
@@ -127,7 +144,7 @@ def found_as_text(plain: dict[str, Any]) -> str:
     ]
     for version in plain["not_asked_between"]:
         lines.append(f"  {version} lies between and did not answer: {plain['silent'][version]}")
-    lines.append(f"asked {len(plain['asked'])} releases: {', '.join(plain['asked'])}")
+    lines.append(f"asked {plural(len(plain['asked']), 'release')}: {', '.join(plain['asked'])}")
     if plain["others"] is None:
         lines.append("the only change? --all asks every release")
     elif plain["others"]:

@@ -26,6 +26,12 @@ def say(console: Console, text: str) -> None:
     console.print(Text(text), soft_wrap=True)
 
 
+def _busy() -> str:
+    """What a stage that takes so long on idle cores must add where they are not idle."""
+    load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0, os.cpu_count() or 1
+    return f"; these are busy (load {load:.0f} on {cores}), so longer" if load > 0.5 * cores else ""
+
+
 @contextmanager
 def stage(console: Console, name: str) -> Iterator[None]:
     """Say how long the block took, unless it fails."""
@@ -45,7 +51,7 @@ def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
         return names
     jobs = jobs or os.cpu_count() or 1
     expected = clock(warming.estimate(jobs))
-    say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores")
+    say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores{_busy()}")
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with (
         stage(console, "compiled"),

@@ -16,6 +16,7 @@ from rich.text import Text
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, versions_of
+from reports.wording import plural
 
 Plain = Mapping[str, Any]
 #: Families of alarms that are named one by one; `crosscheck findings --new` names all.
@@ -96,7 +97,7 @@ def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> No
     commands = [("crosscheck report --open", "one page about all of it")]
     if found:
         commands = [
-            ("crosscheck findings", f"{failing} rows that fail, in {len(found)} families"),
+            ("crosscheck findings", f"{plural(failing, 'failing row')}, in {plural(len(found), 'family')}"),
             (f"crosscheck findings --engine {engine}", "the same of one engine; --scene, --new"),
             ("crosscheck explain ID", "one row: why, and what cures it"),
             *commands,
@@ -105,4 +106,4 @@ def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> No
         console.print(Text(f"  {command:<38} {what}"))
     written = [str(path) for path in files]
     if written:
-        console.print(_folded(f"{len(rows)} rows written: {', '.join(written)}", console), soft_wrap=True)
+        console.print(_folded(f"{plural(len(rows), 'row')} written: {', '.join(written)}", console), soft_wrap=True)

@@ -18,7 +18,7 @@ import pytest
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
-from reports.wording import measured, quantity, reproduce
+from reports.wording import measured, plural, quantity, reproduce
 from validation.catalogue import matching
 from validation.cells import Slot, slot_from_dict
 from validation.plan import Request, slots
@@ -52,7 +52,7 @@ class Plugin:
 
     def pytest_report_header(self) -> str:
         """What is checked."""
-        return f"crosscheck: {self.engine} {self.version}, {len(self.slots)} cells"
+        return f"crosscheck: {self.engine} {self.version}, {plural(len(self.slots), 'cell')}"
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> None:

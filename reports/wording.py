@@ -129,5 +129,7 @@ def params_text(params: Mapping[str, float]) -> str:
 
 
 def plural(count: int, noun: str) -> str:
-    """``1 run``, ``2 runs``."""
-    return f"{count} {noun}" + ("" if count == 1 else "s")
+    """``1 run``, ``2 runs``, ``2 families``."""
+    if count == 1:
+        return f"1 {noun}"
+    return f"{count} {noun.removesuffix('y')}ies" if noun.endswith("ly") else f"{count} {noun}s"

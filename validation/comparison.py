@@ -125,7 +125,8 @@ def _versions(a: Plain, b: Plain) -> str:
 def _state(row: Plain) -> str:
     if row["outcome"] != "ok":
         return str(row["outcome"])
-    value = "no value" if row["value"] is None else f"{row['value']:.10g} {row['unit']}"
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    value = "no value" if row["value"] is None else f"{row['value']:.10g}{unit}"
     return f"{value} ({row['physics'] or 'not judged'})"
 
 

@@ -71,8 +71,8 @@ def fed_by(scene: Scene) -> str:
 
 
 def _load(scene: Scene, body: Body) -> Array:
-    """Constant load on a body, m g + F, (d,) [N]."""
-    return body.mass * np.array(scene.gravity) + np.array(body.force)
+    """Constant load on a body, m g + F, (d,) [N]; infinite where a scene file's numbers are beyond all others."""
+    return np.array([body.mass * pull + push for pull, push in zip(scene.gravity, body.force, strict=True)])
 
 
 def _least_moment(body: Body) -> float:
@@ -112,7 +112,7 @@ def energy_growth(scene: Scene, trajectory: Trajectory) -> Measured:
         power = power + np.abs(trajectory.twist[:, i, d:] @ np.array(body.torque))
         path = np.linalg.norm(trajectory.pose[:, i, :d] - trajectory.pose[0, i, :d], axis=1)
         ripple += 0.5 * trajectory.dt * (power + power[0])
-        ripple += ROUND_OFF * float(np.linalg.norm(_load(scene, body))) * path
+        ripple += ROUND_OFF * math.hypot(*_load(scene, body)) * path
     return max(0.0, float((energy - energy[0] - ripple).max())), ""
 
 
@@ -121,7 +121,7 @@ def energy_bound(scene: Scene, dt: float) -> float:
     free = [body for body in scene.bodies if body.motion == "free"]
     bound, scale = 0.0, 0.0
     for body in free:
-        load, torque = float(np.linalg.norm(_load(scene, body))), math.hypot(*body.torque)
+        load, torque = math.hypot(*_load(scene, body)), math.hypot(*body.torque)
         speed, spin = math.hypot(*body.twist[: scene.dimension]), math.hypot(*body.twist[scene.dimension :])
         moment = body.inertia if isinstance(body.inertia, float | int) else max(body.inertia)
         bound += (load * load / body.mass + torque * torque / _least_moment(body)) * dt * dt
@@ -185,7 +185,7 @@ def overlap_bound(scene: Scene, dt: float) -> float:
     pulls = []
     for body in scene.bodies:
         if body.motion == "free":
-            load, torque = float(np.linalg.norm(_load(scene, body))), math.hypot(*body.torque)
+            load, torque = math.hypot(*_load(scene, body)), math.hypot(*body.torque)
             turning = 0.0 if isinstance(body.shape, Disc | Sphere) else metrics.reach(body.shape) / _least_moment(body)
             pulls.append(load / body.mass + torque * turning)
     place = max(math.hypot(*body.pose[: scene.dimension]) + metrics.reach(body.shape) for body in scene.bodies)

@@ -51,9 +51,10 @@ class Warming:
         return len(self._tasks)
 
     def estimate(self, jobs: int) -> float:
-        """Expected time [s]: the longest of earlier compilations here and the one on the machine this was written on.
+        """Expected time on idle cores [s]: the longest of earlier compilations here and the one on another machine.
 
-        Earlier ones may have found their kernels ready, and took less than the next will.
+        CPU time, which a busy machine hardly changes. Earlier ones may have found their kernels ready, and took less
+        than the next will.
         """
         known = [_seconds(path) for _, mark in self._tasks for path in mark.parent.parent.glob("*/warm-*.json")]
         each = max([*known, FIRST / 2.0])
@@ -68,7 +69,7 @@ class Warming:
                 slots, mark = running[future]
                 with contextlib.suppress(BrokenProcessPool, Exception):
                     seconds = future.result()
-                    mark.write_text(json.dumps({"seconds": round(seconds, 1)}), encoding="utf-8")
+                    mark.write_text(json.dumps({"cpu_seconds": round(seconds, 1)}), encoding="utf-8")
                 yield f"{slots[0]['engine']} {slots[0]['dimension']}-D"
 
 
@@ -81,18 +82,18 @@ def _groups(slots: Sequence[Slot]) -> dict[tuple[str, int], dict[tuple[str, str]
 
 
 def _compile(slots: Sequence[dict[str, object]]) -> float:
-    """Run cells for what they leave in the cache; return the time that took [s]."""
+    """Run cells for what they leave in the cache; return the CPU time that took [s]."""
     from validation.cells import slot_from_dict
     from validation.execution import execute
 
-    started = time.perf_counter()
+    started = time.process_time()
     for slot in slots:
         execute(slot_from_dict(slot))
-    return time.perf_counter() - started
+    return time.process_time() - started
 
 
 def _seconds(mark: Path) -> float:
     try:
-        return float(json.loads(mark.read_text(encoding="utf-8"))["seconds"])
+        return float(json.loads(mark.read_text(encoding="utf-8"))["cpu_seconds"])
     except (OSError, ValueError, KeyError, TypeError):
         return 0.0

@@ -17,7 +17,7 @@ from adapters import registry
 from reports.command.group import AS_JSON, OUT, main
 from reports.progress import run_plan
 from reports.terminal import terminal
-from reports.wording import number
+from reports.wording import number, plural
 from validation.acceptance import Change, Proposal, accepted, propose, slots_to_move
 from validation.cells import Observation, prepare
 from validation.findings import Family, FindingsError, files
@@ -68,7 +68,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
         click.echo(json.dumps({**said, "refused": len(proposal.refused), "not_accepted": left}, indent=1))
     else:
-        click.echo(f"{engine}: {len(members)} rows of {len(listed)} families listed in {folder / MEMBERS}")
+        click.echo(
+            f"{engine}: {plural(len(members), 'row')} of {plural(len(listed), 'family')} listed in {folder / MEMBERS}"
+        )
     _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)
@@ -91,7 +93,7 @@ def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Con
             own += filter(_is_of_this_code, store.observations(earlier))
         moves = slots_to_move(rows_of(chosen.id, own), engine)
         if moves:
-            console.print(f"{len(moves)} cells with moved starts, for the scatter of what fails")
+            console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
             own += store.observations(run_plan(store, title, moves, console, jobs))
         return rows_of(chosen.id, own)
     finally:
@@ -165,7 +167,7 @@ def _with_reasons(proposal: Proposal, written: Sequence[Family]) -> Proposal:
 
 def _show_refused(refused: Sequence[tuple[Row, str]]) -> None:
     for why, count in Counter(why for _, why in refused).items():
-        click.echo(f"refused: {count} rows: {why}", err=True)
+        click.echo(f"refused: {plural(count, 'row')}: {why}", err=True)
     for row, _ in refused[:SHOWN]:
         where = f"{row.engine}/{row.profile} {row.scene} {row.dimension}-D"
         click.echo(f"  {where} {row.slot['params']} {row.metric} {number(row.value, 6)}", err=True)

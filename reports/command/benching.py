@@ -27,6 +27,7 @@ from reports.command.selection import JOBS, SECONDS, missing, parameter, request
 from reports.progress import run_plan
 from reports.stages import stage
 from reports.terminal import terminal
+from reports.wording import plural
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
@@ -70,7 +71,7 @@ def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
     if not cells:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(cells)}) if as_json else f"{len(cells)} cells")
+        click.echo(json.dumps({"cells": len(cells)}) if as_json else plural(len(cells), "cell"))
         return
     absent = missing(options["engine"], request.engines)
     for line in absent:
@@ -112,7 +113,7 @@ def _earlier(store: Store, name: str | None) -> Run | None:
 def _time(
     store: Store, run: Run, scenes: Sequence[str], units: Sequence[Unit], limits: Limits, seed: int, console: Console
 ) -> None:
-    console.print(f"timing {len(units)} units, one at a time, in random order (seed {seed})", highlight=False)
+    console.print(f"timing {plural(len(units), 'unit')}, one at a time, in random order (seed {seed})", highlight=False)
     started, load = time.monotonic(), os.getloadavg()
     store.clear_timings(run)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())

@@ -58,7 +58,7 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
         return
     for name, found in told.items():
         line = f"{name}: {plural(found['runs'], 'new run')}, {found['known']} known, {plural(found['rows'], 'row')}"
-        click.echo(line + (f"; {found['differing']} rows differ, ours stay" if found["differing"] else ""))
+        click.echo(line + (f"; {plural(found['differing'], 'row')} differ, ours stay" if found["differing"] else ""))
 
 
 @main.command("prune")

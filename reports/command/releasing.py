@@ -22,11 +22,12 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, request_from
 from reports.stages import say
 from reports.terminal import terminal
+from reports.wording import plural
 from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
 from validation.releases import environments, history
 from validation.releases.bisection import Unchanged, bisect
 from validation.releases.choosing import Release, chosen
-from validation.releases.driving import Effort, drive, planned
+from validation.releases.driving import Effort, drive, planned, time
 from validation.store import Store
 from validation.workers import TIMEOUT
 
@@ -58,6 +59,7 @@ def _cells(command: Command) -> Command:
 @click.argument("which", metavar="A..B|LIST|latest", required=False)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @_cells
+@click.option("--times", is_flag=True, help="Time a cell per scene as well, against a loop on the same machine.")
 @click.option("--environments", "listed", is_flag=True, help="List the environments that are kept, and check each.")
 @click.option("--remove", metavar="NAME", help="With --environments: remove this one, or 'all'.")
 @click.option("--markdown", is_flag=True, help="Print Markdown on stdout.")
@@ -66,6 +68,7 @@ def _cells(command: Command) -> Command:
 def releases(
     engine: str | None,
     which: str | None,
+    times: bool,
     listed: bool,
     remove: str | None,
     markdown: bool,
@@ -85,7 +88,7 @@ def releases(
         raise SceneError("releases: name an engine and its releases, such as: crosscheck releases ENGINE 3.0.0..3.2.7")
     asked, wanted, effort, console = _prepared(engine, which, options, out)
     store = Store(out)
-    told = [_drive(store, release, wanted, effort, console) for release in asked]
+    told = [_drive(store, release, wanted, effort, console, times) for release in asked]
     store.close()
     moved = history.steps(told)
     if as_json:
@@ -114,8 +117,10 @@ def _prepared(
     return asked, wanted, effort, console
 
 
-def _drive(store: Store, release: Release, wanted: Sequence[Slot], effort: Effort, console: Console) -> history.Told:
-    """Ask one release with a line of progress, and judge what it says."""
+def _drive(
+    store: Store, release: Release, wanted: Sequence[Slot], effort: Effort, console: Console, times: bool = False
+) -> history.Told:
+    """Ask one release with a line of progress, time it if asked to, and judge what it says."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -132,11 +137,15 @@ def _drive(store: Store, release: Release, wanted: Sequence[Slot], effort: Effor
 
         try:
             found = drive(store, release, wanted, effort, lambda line: say(console, line), seen)
+            if times:
+                progress.update(task, description=f"{release.name} timing")
+                time(store, release, found, effort, lambda line: say(console, line))
         except KeyboardInterrupt:
             say(console, "interrupted: what finished is kept, the same command goes on")
             raise
-    told = history.told_by(release.engine, release.version, found)
-    say(console, f"{release.name}: {told.reason or f'{len(found)} cells'}")
+    taken = history.times(store, release.engine, release.version)
+    told = history.told_by(release.engine, release.version, found, taken)
+    say(console, f"{release.name}: {told.reason or plural(len(found), 'cell')}")
     return told
 
 
@@ -225,5 +234,5 @@ def _environments(remove: str | None, as_json: bool) -> None:
         for row in data:
             state = row["wrong"] or "as installed"
             click.echo(f"{row['name']}  Python {row['python']}  {row['bytes'] / 2**20:.0f} MiB  {state}")
-        click.echo(f"{len(data)} environments in {environments.folder()}")
+        click.echo(f"{plural(len(data), 'environment')} in {environments.folder()}")
     sys.exit(statuses.ALARM if any(row["wrong"] for row in data) else statuses.FINE)

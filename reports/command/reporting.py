@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.stages import say, stage
 from reports.terminal import terminal
-from reports.wording import missing_text
+from reports.wording import missing_text, plural
 from validation.store import MissingError, Store
 
 
@@ -65,16 +65,25 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
     with stage(console, "dashboard"):
         found = panels(store, out, lambda line: say(console, line))
         reports = {run.id: f"report-{run.id}.html" for run in store.runs() if (out / f"report-{run.id}.html").is_file()}
+        made = _made([run.commit for run in store.runs() if run.plan])
         store.close()
         if not found:
             raise MissingError(f"out: {out} has no finished run of a scene to show")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(render(found, f"{len(found)} panels", reports), encoding="utf-8")
+        path.write_text(render(found, f"{plural(len(found), 'panel')}{made}", reports), encoding="utf-8")
     moved = sum(len(events(panel)) for panel in found)
     told = {"path": str(path), "panels": len(found), "moved": moved}
     click.echo(json.dumps(told) if as_json else str(path))
     if show and not webbrowser.open(path.resolve().as_uri()):
         click.echo(f"crosscheck: open: no browser was found; the dashboard is {path}", err=True)
+
+
+def _made(commits: Sequence[str]) -> str:
+    """At which commits what is shown was run, oldest first; nothing outside a checkout."""
+    known = list(dict.fromkeys(filter(None, commits)))
+    if len(known) <= 1:
+        return "".join(f" of commit {name}" for name in known)
+    return f" of {len(known)} commits, {known[0]} to {known[-1]}"
 
 
 @main.command()

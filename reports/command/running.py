@@ -14,7 +14,7 @@ from rich.console import Console
 from adapters.engine import EngineError
 from adapters.plain import one_line
 from adapters.scene import SceneError
-from reports import exports
+from reports import brief, exports
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
@@ -24,6 +24,7 @@ from reports.progress import run_plan
 from reports.stages import warm_up
 from reports.summary import show
 from reports.terminal import terminal
+from reports.wording import plural
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import pinned, resolve
@@ -64,7 +65,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "cell"))
         return
     if options["invariance"]:
         cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
@@ -77,7 +78,10 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done), chosen)
+    observations = store.observations(done)
+    rows = rows_of(done.id, observations, chosen)
+    if done.finished:
+        brief.keep(out, done.id, observations, rows)
     store.close()
     _show(rows, out, as_json, console, options)
     absent = missing(options["engine"], request.engines)

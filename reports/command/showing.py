@@ -23,7 +23,18 @@ from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
-from reports.wording import LABELS, mark_of, measured, missing_text, number, params_text, quantity, reproduce, row_id
+from reports.wording import (
+    LABELS,
+    mark_of,
+    measured,
+    missing_text,
+    number,
+    params_text,
+    plural,
+    quantity,
+    reproduce,
+    row_id,
+)
 from validation.bench import reading
 from validation.cells import Observation
 from validation.nulls import skill_of
@@ -62,7 +73,7 @@ def show(run: str, as_json: bool, out: Path) -> None:
     """Show RUN (the latest by default) as `run` did at its end: matrix, short answers, where the details are."""
     rows, _, costs = load(out, run)
     if as_json:
-        click.echo(json.dumps(_as_plain(rows, costs), indent=1))
+        click.echo(json.dumps(_as_plain(rows, costs) | _counted(out, run), indent=1))
         return
     console = terminal()
     show_summary(rows, console, costs)
@@ -72,16 +83,22 @@ def show(run: str, as_json: bool, out: Path) -> None:
         console.print(Text(f"  report: {report}"), soft_wrap=True)
 
 
-def _say_missing(out: Path, run: str) -> None:
-    """Say on stderr how many planned cells a run lacks, if any."""
+def _counted(out: Path, run: str) -> dict[str, Any]:
+    """Id of a run, how many cells it planned, and how many of them left no observation."""
     store = Store(out, create=False)
     try:
         chosen = store.run(run)
-        missing = store.missing(chosen)
+        return {"run": chosen.id, "planned": len(chosen.plan), "missing": store.missing(chosen)}
     finally:
         store.close()
-    if missing:
-        click.echo(f"crosscheck: run {chosen.id}: {missing_text(missing, len(chosen.plan))}", err=True)
+
+
+def _say_missing(out: Path, run: str) -> None:
+    """Say on stderr how many planned cells a run lacks, if any."""
+    counted = _counted(out, run)
+    if counted["missing"]:
+        said = missing_text(counted["missing"], counted["planned"])
+        click.echo(f"crosscheck: run {counted['run']}: {said}", err=True)
 
 
 def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
@@ -154,7 +171,7 @@ def _print_families(found: Sequence[Family], console: Console) -> None:
         own = [family for family in found if family.mark == mark]
         console.print()
         count = sum(len(family.rows) for family in own)
-        console.print(Text(f"{LABELS[mark]}: {count} rows in {len(own)} families", style="bold"))
+        console.print(Text(f"{LABELS[mark]}: {plural(count, 'row')} in {plural(len(own), 'family')}", style="bold"))
         table = _grid("id", "engine, scene", "worst row", "rows")
         table.columns[0].no_wrap = True
         for family in own:

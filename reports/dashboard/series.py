@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pandas as pd
 
+from reports.brief import Brief, Kept, Key, Summary, summarise
 from reports.dashboard.steps import ERROR, TIME, Rule, Step, steps
-from reports.dashboard.summary import Brief, Kept, Key, Summary, summarise
 from reports.page.charts import EXACT
 from validation.bench import reading
 from validation.bench.agreement import ratios
 from validation.plan import QUICK_DT
 from validation.posed import resolve
 from validation.releases import history
+from validation.releases.timing import CALLED
 from validation.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
 
 
@@ -143,7 +144,8 @@ def _releases(store: Store, kept: Kept, engine: str) -> list[_Entry]:
             found = history.observations(store, engine, version)
             summary = summarise(found, history.told_by(engine, version, found).rows)
             kept.put(name, summary)
-        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary))
+        taken = {key: (ratio, CALLED) for key, ratio in history.times(store, engine, version).items()}
+        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary, taken))
     return entries
 
 

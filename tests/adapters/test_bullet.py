@@ -502,3 +502,12 @@ def test_tuned_box_sticks_below_the_cone_and_slides_above(ratio, slides):
         assert end == pytest.approx(9.81 * (math.sin(theta) - 0.5 * math.cos(theta)), rel=5e-3)
     else:
         assert abs(end) < 1e-6
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.6, 0.0, 0.8), (0.48, -0.64, -0.6)])
+def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal):
+    from adapters.bullet.translation import _turn_up_to
+
+    x, y, z, w = _turn_up_to(normal)
+    assert math.hypot(x, y, z, w) == pytest.approx(1.0, abs=1e-12)
+    assert (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)) == pytest.approx(normal, abs=1e-12)

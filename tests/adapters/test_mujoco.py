@@ -513,3 +513,23 @@ def test_what_mujoco_itself_refuses_becomes_one_line() -> None:
     with pytest.raises(EngineError, match="MuJoCo does not compile it") as caught:
         drive(scene)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.6, 0.0, 0.8), (0.48, -0.64, -0.6)])
+def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal: tuple[float, ...]) -> None:
+    from adapters.mujoco.spec import _turn_z_to, rotation
+
+    turn = np.array([_turn_z_to(normal)])
+    assert np.linalg.norm(turn) == pytest.approx(1.0, abs=1e-12)
+    assert rotation(turn)[0] @ [0.0, 0.0, 1.0] == pytest.approx(normal, abs=1e-12)
+
+
+def test_the_solver_s_scale_is_of_the_free_bodies_where_a_body_is_prescribed() -> None:
+    """A belt of any mass beside a light ball: the mean inertia, by which the solver stops, must not see it."""
+    from adapters.mujoco.spec import Spec
+
+    light = Body("ball", Sphere(0.5), 1e-3, BALL, at(0, 0, 2))
+    belt = Body("belt", Box((1.0, 1.0, 0.5)), 1e6, CUBE, at(0, 0, -0.5), twist=(0.5,) + (0.0,) * 5, motion="prescribed")
+    scene = Scene("belt", 1, 3, (belt, light), (Pair(),), (0.0, 0.0, -G), 1.0)
+    settings = {s.name: s.value for s in ENGINE.settings("default", needs(scene), DT)}
+    assert Spec(scene, DT, settings).compile().stat.meaninertia == pytest.approx((3 * 1e-3 + 3 * 0.1) / 6)

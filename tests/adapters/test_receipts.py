@@ -232,3 +232,237 @@ def test_impulses_that_are_not_reported_are_no_zero_and_no_failure(toy_class):
 def test_a_profile_that_declares_nothing_is_held_to_a_thousandth_of_friction_and_impulses(toy, dt, quantity):
     slip = by_quantity(receipts(toy(), "default", IMPACT, dt))[quantity]
     assert slip.band < 1e-3 * slip.asked
+
+
+# ---- bands, worked out once more -----------------------------------------------------------------------------------
+
+
+def rate(loss):
+    """Rate [1/s] of an exponential that loses ``loss`` of a speed in a second."""
+    return -math.log(1.0 - loss)
+
+
+def test_bands_of_what_is_as_asked():
+    slips = by_quantity(receipts(declaring(), "default", IMPACT, DT))
+    # A box of half extent 0.3 m lands at 0.25 m/s and may leave at 0.8 of it: one step of both.
+    said = {
+        "turn": (0.0, "a sign"),
+        "size": (1.8 * 0.25 * DT / 0.3 + 1e-12, "one step of motion, and a predicted rebound"),
+        "impulse": (1e-6, "impulses are bookkeeping: they add up to m dv but for a solver's tolerance"),
+        "friction": (0.5e-4 + 1e-12, "a sliding box is solved to a share of 1e-4 of its friction"),
+    }
+    said["friction_impulse"] = said["friction"]
+    for quantity, slip in slips.items():
+        band, because = said.get(quantity, (1e-12, "exact but for round-off"))
+        assert (slip.band, slip.because) == (pytest.approx(band, rel=1e-12), because), quantity
+
+
+def test_bands_of_an_engine_in_single_precision():
+    class Single(ToyEngine):
+        facts = replace(ToyEngine.facts, precision="single")
+
+    slips = by_quantity(receipts(Single(), "default", IMPACT, DT))
+    round_off = 1e-12 * 2.0**29
+    assert slips["mass"].band == slips["impulse"].band == pytest.approx(round_off)
+    assert slips["friction"].band == pytest.approx(0.5e-4 + round_off)
+    assert slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + round_off)
+
+
+def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
+    told = {"linear_damping": Declared(0.04, 0.01), "angular_damping": Declared(0.2, 0.0)}
+    slips = by_quantity(receipts(declaring(**told), "default", IMPACT, DT))
+    window = 8 * DT  # at up to 1.3 m/s, and drag may grow with the square of a speed above 1 m/s
+    fastest = 9.81 * window
+    share = rate(0.05) * window * fastest
+    assert slips["gravity"].band == slips["mass"].band == pytest.approx(share + 1e-12)
+    assert slips["inertia"].band == pytest.approx(rate(0.2) * window * fastest + 1e-12)
+    assert slips["sampling"].band == pytest.approx(8 * share + 1e-12)
+    assert slips["impulse"].band == pytest.approx(rate(0.05) * 12 * DT + 1e-6)  # 5.5 steps down, 5.5 up, one of contact
+    assert slips["gravity"].because == "exact but for round-off; and declared drag"
+    assert slips["turn"].band == 0.0 and slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + 1e-12)
+    for untouched in ("step", "restitution"):
+        assert (slips[untouched].band, slips[untouched].because) == (1e-12, "exact but for round-off")
+    assert slips["friction"].band == slips["friction_impulse"].band == 0.5e-4 + 1e-12
+    for damping in ("linear_damping", "angular_damping"):
+        assert slips[damping].band == told[damping].band
+    finer = by_quantity(receipts(declaring(**told), "default", IMPACT, 1 / 960))
+    assert finer["gravity"].band == pytest.approx(rate(0.05) * 8 / 960 + 1e-12)  # slower than 1 m/s: not less than 1
+
+
+def test_drag_of_one_kind_widens_nothing_that_the_other_kind_slows():
+    slips = by_quantity(receipts(declaring(angular_damping=Declared(0.2, 0.0)), "default", IMPACT, DT))
+    assert slips["gravity"].band == slips["linear_damping"].band == 1e-12 < slips["inertia"].band
+
+
+def test_drag_that_stops_everything_is_taken_for_a_loss_of_99_in_100():
+    slips = by_quantity(receipts(declaring(linear_damping=Declared(1.0, 5.0)), "default", IMPACT, DT))
+    assert slips["impulse"].band == pytest.approx(rate(0.99) * 12 * DT + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("sweeps", "left"),
+    # One sweep: from no friction to a stop within the window, in which twice the friction takes 0.85 of the speed.
+    [(1, 2.0 * 0.5 / 0.85), (2, 0.25), (10, 0.05)],
+)
+def test_sweeps_asked_for_leave_a_share_of_friction_and_two_steps_of_it(sweeps, left):
+    own = {"friction_impulse": Declared(0.45, 0.125, "it is so")}
+    slips = by_quantity(receipts(declaring(**own), "default", IMPACT, DT, sweeps))
+    wider = left + 2 * DT / 0.5 * 0.5
+    assert slips["friction"].band == pytest.approx(0.5e-4 + wider)
+    impulse = slips["friction_impulse"]
+    assert (impulse.asked, impulse.declared, impulse.band) == (0.5, 0.45, pytest.approx(0.125 + wider))
+    assert impulse.because == f"it is so; {sweeps} iterations were asked for, and a load may be off by 1/{sweeps}"
+    assert slips["impulse"].band == 1e-6  # of an engine that is moved by its impulses
+
+
+def test_a_sum_of_impulses_that_is_declared_is_not_told_when_the_solve_is_cut_off():
+    engine = declaring(impulse=Declared(0.98, 0.01, "left by its solver"))
+    slip = by_quantity(receipts(engine, "default", IMPACT, DT, 5))["impulse"]
+    assert (slip.asked, slip.declared, slip.band, slip.holds) == (1.0, 0.98, 1e9, True)
+    assert slip.because == "left by its solver; 5 iterations were asked for: not told"
+    own = by_quantity(receipts(engine, "default", IMPACT, DT))["impulse"]
+    assert (own.declared, own.band, own.because, own.holds) == (0.98, 0.01, "left by its solver", False)
+
+
+# ---- which sample counts -------------------------------------------------------------------------------------------
+
+
+def told_wrong(probe, factor):
+    """An engine whose reported impulses are off by ``factor`` on one probe."""
+
+    class Wrong(ToyEngine):
+        def build(self, scene, dt, settings):
+            simulation = super().build(scene, dt, settings)
+            told = simulation.contacts
+
+            def contacts():
+                found = told()
+                found.impulse[:] *= factor
+                return found
+
+            if scene.name == f"probe_{probe}":
+                simulation.contacts = contacts
+            return simulation
+
+    return Wrong()
+
+
+@pytest.mark.parametrize("probe", ["landing", "slide"])
+def test_the_sample_farthest_off_counts_whichever_probe_it_is_of(probe):
+    slip = by_quantity(receipts(told_wrong(probe, 1.5), "default", IMPACT, DT))["impulse"]
+    assert slip.measured == pytest.approx(1.5) and not slip.holds
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_a_sample_that_is_no_number_is_the_farthest_of_all():
+    slip = by_quantity(receipts(told_wrong("landing", math.inf), "default", IMPACT, DT))["impulse"]
+    assert not math.isfinite(slip.measured) and not slip.holds
+
+
+def test_a_quantity_that_one_probe_refuses_is_told_by_the_other_and_one_that_diverges_is_not():
+    class Picky(ToyEngine):
+        def refuses(self, scene, profile):
+            return "no corners" if scene.name == "probe_corner" else None
+
+    slip = by_quantity(receipts(Picky(), "default", IMPACT, DT))["turn"]
+    assert (slip.measured, slip.holds, slip.because) == (1.0, True, "a sign")
+
+    class Exploding(ToyEngine):
+        def build(self, scene, dt, settings):
+            simulation = super().build(scene, dt, settings)
+            if scene.name == "probe_corner":
+                simulation.twists[-1, 0] = math.nan
+            return simulation
+
+    slip = by_quantity(receipts(Exploding(), "default", IMPACT, DT))["turn"]
+    assert math.isnan(slip.measured) and not slip.holds
+    assert (slip.asked, slip.declared, slip.band) == (1.0, 1.0, 0.0)
+    assert slip.because.startswith("probe corner diverged: the state is not finite")
+
+
+def test_what_is_not_told_still_says_what_was_asked_and_declared():
+    class Deaf(ToyEngine):
+        def refuses(self, scene, profile):
+            return "no floor" if scene.name in ("probe_slide", "probe_landing") else None
+
+        def declares(self, profile, needs, dt):
+            return {"friction": Declared(0.25, 0.125, "half of it")}
+
+    slip = by_quantity(receipts(Deaf(), "default", IMPACT, DT))["friction"]
+    assert (slip.asked, slip.declared, slip.band, slip.holds) == (0.5, 0.25, 0.125, True)
+    assert slip.because == "probe slide refused: no floor"
+    silent = by_quantity(receipts(told_wrong("slide", math.nan), "default", IMPACT, DT))["friction_impulse"]
+    assert (silent.asked, silent.declared) == (0.5, 0.5) and silent.band == pytest.approx(0.5e-4)
+    assert silent.because == "contact impulses are not reported at these settings" and silent.holds
+
+
+# ---- what the engine is asked --------------------------------------------------------------------------------------
+
+
+def test_an_engine_is_asked_for_the_profile_the_needs_and_the_step_that_are_judged():
+    asked = []
+
+    class Asked(ToyEngine):
+        @property
+        def profiles(self):
+            return dict.fromkeys(("default", "other"), self.chosen)
+
+        def settings(self, profile, needs, dt, iterations=None):
+            asked.append(("settings", profile, needs, dt))
+            return super().settings(profile, needs, dt, iterations)
+
+        def chosen(self, needs, dt):
+            return [Setting("iterations", 30, "enough")]
+
+        def declares(self, profile, needs, dt):
+            asked.append(("declares", profile, needs, dt))
+            return {}
+
+        def refuses(self, scene, profile):
+            asked.append(("refuses", profile))  # by the toy itself as well, of no profile
+            return None
+
+        def scheme(self, profile):
+            asked.append(("scheme", profile))
+            return super().scheme(profile)
+
+    receipts(Asked(), "other", IMPACT, DT)
+    assert set(asked) - {("refuses", "")} == {
+        ("settings", "other", IMPACT, DT),
+        ("declares", "other", IMPACT, DT),
+        ("refuses", "other"),
+        ("scheme", "other"),
+    }
+
+
+def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(toy_class):
+    builds = []
+
+    class Counting(toy_class):
+        def build(self, scene, dt, settings):
+            builds.append(scene.name)
+            return super().build(scene, dt, settings)
+
+    engine = Counting()
+    receipts(engine, "default", IMPACT, DT)
+    builds.clear()
+    receipts(engine, "default", replace(IMPACT, friction=0.25), DT)
+    assert builds == ["probe_landing", "probe_rebound", "probe_slide", "probe_corner"]
+
+
+def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):
+    class Listing(toy_class):
+        @property
+        def profiles(self):
+            return {"default": lambda needs, dt: [Setting("iterations", 30, ""), Setting("solref", given, "")]}
+
+        def build(self, scene, dt, settings):
+            seen.append(settings["solref"])
+            return super().build(scene, dt, {"iterations": settings["iterations"]})
+
+    seen, given = [], [0.5, [1, "a"]]
+    receipts(Listing(), "default", SMOOTH, DT)
+    assert set(seen) == {(0.5, (1, "a"))}
+    given = [1, {"a": 2}]
+    with pytest.raises(EngineError, match=r"^settings: a setting is a number, a word or a list of them, not a table$"):
+        receipts(Listing(), "default", SMOOTH, DT)

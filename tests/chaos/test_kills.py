@@ -33,6 +33,11 @@ def workers_of(pid):
         return []
 
 
+def listening():
+    """Let a command end on Ctrl-C although the tests run in the background, where a shell has it ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def is_running(pid):
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
@@ -53,7 +58,7 @@ def test_kills_at_random_moments_lose_nothing_that_finished_and_change_no_bit(di
     expected, seconds = undisturbed
     for _ in range(60 if soak else 5):
         process = subprocess.Popen([*COMMAND, "--out", str(tmp_path)], cwd=ROOT, stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL)  # fmt: skip
+                                   stderr=subprocess.DEVNULL, preexec_fn=listening)  # fmt: skip
         time.sleep(dice.uniform(0.0, 0.9 * seconds))
         workers = workers_of(process.pid)
         process.send_signal(dice.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))
@@ -81,8 +86,8 @@ def test_what_an_engine_started_does_not_outlive_a_run_that_is_killed(faulty, tm
     command = [sys.executable, "-m", "reports.command", "run", "impact", "--param", "v=2", "--dim", "2", "--engine",
                "faulty", "--profile", "hang", "--out", str(tmp_path)]  # fmt: skip
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    sleepers = wait_for(lambda: running("sleep\x004711"), 90.0)
-    assert sleepers
+    sleepers = wait_for(lambda: running("sleep\x004711") or process.poll() is not None, 300.0)
+    assert sleepers and process.poll() is None, "the engine was never asked"
     process.kill()
     process.wait()
     wait_for(lambda: not running("sleep\x004711"), 30.0)

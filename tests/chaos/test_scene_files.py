@@ -64,7 +64,7 @@ def mutated(data, dice):
             owner = owner[key]
         what, key = dice.random(), path[-1]
         if what < 0.45:
-            owner[key] = dice.choice(STRANGE)
+            owner[key] = copy.deepcopy(dice.choice(STRANGE))  # a list of ours would grow from file to file
         elif what < 0.6:
             del owner[key]
         elif what < 0.7 and isinstance(owner, list):

@@ -66,7 +66,7 @@ def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
         f"{Kind.SPEED.value} (improved or neutral): bullet/tuned stack 2-D n=5 time: pass 1e-6 m -> FAIL 3e-3 m x0.5 "
         f"[] | {again}",
         f"{Kind.REMOVED.value}: bullet/tuned stack interface_impulse: 2 rows",
-        f"{Kind.ADDED.value}: bullet/tuned incline creep: 1 rows",
+        f"{Kind.ADDED.value}: bullet/tuned incline creep: 1 row",
     ])  # fmt: skip
     assert as_text([], A, A).endswith("nothing changed\n")
 
@@ -98,7 +98,7 @@ def test_markdown_says_how_many_families_it_leaves_out():
     assert text.endswith("\n\n... and 3 more families; `crosscheck compare --json` lists every change\n")
     assert "more families" not in as_markdown(every[:50], A, B)
     assert as_markdown(every, A, B, most=52).endswith(
-        "\n... and 1 more families; `crosscheck compare --json` lists every change\n"
+        "\n... and 1 more family; `crosscheck compare --json` lists every change\n"
     )
 
 
@@ -133,6 +133,56 @@ def results(tmp_path):
         ids.append(run)
     store.close()
     return tmp_path / "results", ids
+
+
+@pytest.fixture
+def released(tmp_path):
+    """A folder with what two releases of an engine said, the older one in two runs, and the newest run of each."""
+    store, newest = Store(tmp_path / "results"), {}
+    for version, e in (("9.0", 0.5), ("10.0", 0.8), ("9.0", 0.75)):
+        asked = replace(CELL, params=(("e", e),))
+        run, _ = store.start(f"release nameless=={version}: impact", [asked], fresh=True, apart=version)
+        store.add(run, Observation(asked, "c", 1, version, Outcome.OK, metrics={"rebound_ratio": (e, "")}))
+        store.finish(run)
+        newest[version] = run
+    store.close()
+    return tmp_path / "results", newest
+
+
+def test_a_side_is_all_that_a_release_was_asked_dated_by_its_newest_run(released, monkeypatch):
+    folder, newest = released
+    runs = {run.id: replace(run, date=f"on day {k}", commit=f"commit {k}") for k, run in enumerate(newest.values())}
+    seen = changes.Store.runs
+    monkeypatch.setattr(changes.Store, "runs", lambda store: [runs.get(run.id, run) for run in seen(store)])
+    found = load_side("nameless==9.0", folder)
+    own = runs[newest["9.0"].id]
+    assert (found.run, found.date, found.commit) == ("nameless==9.0", own.date, own.commit)
+    assert found.ratios == [] and found.versions == {"nameless": "9.0"}
+    values = [row["value"] for row in found.rows if row["metric"] == "rebound_ratio"]
+    assert values == [0.5, 0.75]
+    assert value(load_side("nameless==10.0", folder)) == 0.8
+
+
+def test_a_release_that_is_not_there_is_refused_with_those_that_are(released, tmp_path):
+    folder, _ = released
+    for argument, known in (("nameless==8.0", "9.0, 10.0"), ("another==9.0", "none")):
+        with pytest.raises(MissingError) as caught:
+            load_side(argument, folder)
+        assert str(caught.value) == f"run: {Store(folder).path} has no release {argument}; it has {known}"
+    with pytest.raises(MissingError):
+        load_side("nameless==9.0", tmp_path / "not there")
+    assert not (tmp_path / "not there").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (replace(FLIP, kind=Kind.SPEED, size=0.123456), "x0.123"), (replace(FLIP, size=0.123456), "+0.123 tol"),
+        (replace(FLIP, size=-0.5), "-0.5 tol"), (replace(FLIP, size=0.0), ""),
+    ],
+)  # fmt: skip
+def test_sizes_have_a_sign_where_they_are_differences_and_three_digits(change, said):
+    assert as_markdown([change], A, B).splitlines()[-1].endswith(f"| {said} |")
 
 
 def value(found):

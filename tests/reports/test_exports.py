@@ -81,11 +81,11 @@ def test_markdown_is_the_matrix_its_legend_and_what_needs_attention():
         "| impact 2-D | FAIL known 1/1 | CRASHED 2/3 |",
         "| impact 3-D |  | pass 1 |",
         "", empty, "",
-        "**CRASHED**: 1 rows",
+        "**CRASHED**: 1 row",
         "* " + finding_line(rows[4]).replace("|", "\\|"),
-        "**FAIL new**: 1 rows",
+        "**FAIL new**: 1 row",
         "* " + finding_line(rows[1]).replace("|", "\\|"),
-        "**FAIL known**: 1 rows",
+        "**FAIL known**: 1 row",
         "",
     ])  # fmt: skip
 

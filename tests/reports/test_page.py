@@ -372,6 +372,8 @@ def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
     made = CliRunner().invoke(main, ["report", "--json", "--out", str(tmp_path)])
     assert said in shown.stderr and said in made.stderr
     assert json.loads(made.stdout)["missing"] == 2
+    plain = json.loads(CliRunner().invoke(main, ["show", "--json", "--out", str(tmp_path)]).stdout)
+    assert (plain["run"], plain["planned"], plain["missing"]) == (run.id, 3, 2)
     assert said in (tmp_path / "report.html").read_text()
     store = Store(tmp_path)
     for slot in slots[1:]:

@@ -91,6 +91,7 @@ NOT_RUN = {
     "crosscheck run pinch --invariance": "a minute on all engines: run by tests/validation/test_invariance.py",
     "crosscheck residuals pinch": "runs every engine: run by tests/validation/test_residuals.py",
     "crosscheck field": "all its notes are asked by tests/validation/test_field.py",
+    "crosscheck releases ... --times": "installs releases: run by tests/validation/releases",
     "crosscheck releases mujoco 3.2.7,3.12.0 stack": "installs releases: run by tests/validation/releases",
     "crosscheck bisect mujoco 3.4.0..3.12.0 stack --check drift": "installs releases: run by tests/validation/releases",
     "crosscheck run": "minutes: every continuous-integration run makes it by `make run`",

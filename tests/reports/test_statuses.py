@@ -140,3 +140,10 @@ def test_a_bench_of_which_no_cell_has_a_result_says_so(tmp_path):
     result = call("bench", "impact", "--engine", "chipmunk", "--dim", 3, "--dt", "1/60", "--out", tmp_path)
     assert result.exit_code == statuses.INCOMPLETE
     assert "no cell has a result" in one_line(result)
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"), [((False,), 0), ((True,), 1), ((False, False), 4), ((True, False), 1), ((True, True), 1)]
+)
+def test_a_run_that_is_complete_unless_said_otherwise_ends_by_its_alarms(asked, status):
+    assert statuses.verdict(*asked) == status

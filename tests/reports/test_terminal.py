@@ -127,3 +127,23 @@ def test_every_command_has_the_console_that_reads_no_markup():
             if isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) == "Console":
                 made.append(path.name)
     assert made == ["terminal.py"]
+
+
+@pytest.mark.parametrize(("load", "said"), [(0.4, ""), (1.0, ""), (8.2, "; these are busy (load 8 on 2), so longer")])
+def test_an_estimate_for_idle_cores_says_where_they_are_not_idle(monkeypatch, load, said):
+    from reports import stages
+
+    monkeypatch.setattr(stages.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(stages.os, "getloadavg", lambda: (load, 0.0, 0.0))
+    assert stages._busy() == said
+
+
+def test_a_compilation_is_remembered_by_its_cpu_time(monkeypatch):
+    """Waiting is what a busy machine adds; it must not make the next estimate longer."""
+    import time
+
+    from validation import execution, warming
+    from validation.cells import Slot
+
+    monkeypatch.setattr(execution, "execute", lambda slot: time.sleep(0.5))
+    assert warming._compile([Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240).as_dict()]) < 0.25

@@ -6,7 +6,7 @@ import shlex
 
 import pytest
 
-from reports.wording import cell, mark_of, markdown, measured, number, params_text, quantity, reproduce, row_id
+from reports.wording import cell, mark_of, markdown, measured, number, params_text, plural, quantity, reproduce, row_id
 from validation.catalogue import CATALOGUE
 
 SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engine": "chipmunk", "profile": "tuned",
@@ -99,3 +99,12 @@ def test_the_id_of_a_row_is_eight_digits_of_what_was_asked_and_of_nothing_else()
     turned = dict(reversed(list(SLOT.items())))
     assert row_id({"slot": turned, "metric": "rebound_ratio", "value": 0.2, "run": "two"}) == row_id(row)
     assert row_id({**row, "metric": "impulse"}) != row_id(row) != row_id({**row, "slot": {**SLOT, "dimension": 3}})
+
+
+@pytest.mark.parametrize(
+    ("count", "noun", "text"),
+    [(1, "row", "1 row"), (0, "row", "0 rows"), (2, "row", "2 rows"), (1, "family", "1 family"),
+     (3, "family", "3 families"), (2, "day", "2 days")],
+)  # fmt: skip
+def test_nouns_are_counted(count, noun, text):
+    assert plural(count, noun) == text

@@ -1,7 +1,8 @@
 """Runs in the environment of a release: an entry without a command line, for numpy and the engine alone.
 
-    stdin    one JSON object: {"engine", "request" or null, "slots", "stated", "jobs", "timeout"}
-    stdout   one JSON object per line: first what this is ({"told": ...}), then an observation or {"left": ...} each
+    stdin    one JSON object: {"engine", "request" or null, "slots", "timed", "stated", "jobs", "timeout"}
+    stdout   one JSON object per line: first what this is ({"told": ...}), then an observation or {"left": ...} each,
+             then {"timed": ...} for each lap of what is to be timed
 
 Cells run as everywhere: `validation.workers` isolates them, receipts run before each. The parent keeps stdin open as
 long as it lives; when it closes, this process ends, and its workers with it.
@@ -22,6 +23,7 @@ from adapters import registry
 from validation import posed
 from validation.cells import Slot, slot_from_dict
 from validation.plan import Request, slots
+from validation.releases.timing import laps
 from validation.workers import run_cells
 
 
@@ -63,6 +65,8 @@ def _run(answers: TextIO, asked: Mapping[str, Any]) -> None:
 
     for observation in run_cells(wanted, asked["jobs"], asked["timeout"], leave=leave):
         _say(answers, observation.as_dict())
+    for lap in laps([slot_from_dict(data) for data in asked["timed"]]):
+        _say(answers, lap)
 
 
 def _say(answers: TextIO, data: Mapping[str, Any]) -> None:

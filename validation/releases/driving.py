@@ -22,6 +22,7 @@ from validation.plan import Request, slots
 from validation.releases.carried import code
 from validation.releases.choosing import Release
 from validation.releases.environments import BuildError, Environment, build
+from validation.releases.timing import kept, timed_cells
 from validation.store import RELEASE_TITLE, Run, Store
 from validation.workers import TIMEOUT
 
@@ -129,9 +130,14 @@ def _protocol(release: Release, todo: Sequence[Slot], told: dict[str, Any]) -> d
 
 
 def _answers(
-    release: Release, effort: Effort, request: Request | None, todo: Sequence[Slot], say: Say
+    release: Release,
+    effort: Effort,
+    request: Request | None,
+    todo: Sequence[Slot],
+    say: Say,
+    timed: Sequence[Slot] = (),
 ) -> Iterator[dict[str, Any]]:
-    """What the environment of a release says, line by line: first what it is, then an answer per cell.
+    """What the environment of a release says, line by line: first what it is, then an answer per cell, then laps.
 
     Raises
     ------
@@ -144,12 +150,13 @@ def _answers(
         environment = build(release, say)
     except BuildError as error:
         raise Unasked(str(error)) from None
-    scenes = list(dict.fromkeys([*(slot.scene for slot in todo), *(request.scenes if request else ())]))
+    scenes = list(dict.fromkeys([*(slot.scene for slot in (*todo, *timed)), *(request.scenes if request else ())]))
     question = {
         "engine": release.engine,
         "distribution": release.distribution,
         "request": asdict(request) if request else None,
         "slots": [slot.as_dict() for slot in todo],
+        "timed": [slot.as_dict() for slot in timed],
         "stated": posed.stated_of(scenes),
         "jobs": effort.jobs,
         "timeout": effort.timeout,
@@ -248,6 +255,34 @@ def _keep(written: list[str], line: str | None) -> None:
     if line is not None:
         written.append(line)
         del written[:-200]
+
+
+def time(
+    store: Store, release: Release, wanted: Sequence[Observation], effort: Effort, say: Say = lambda line: None
+) -> None:
+    """Time a release on cells that it has answered; what the store has of the same code is not timed again."""
+    todo = timed_cells(wanted)
+    if not todo or (not effort.fresh and set(todo) <= _timed(store, release)):
+        return
+    run, _ = store.start(f"{RELEASE_TITLE}{release.name}: times", [], fresh=True, apart=release.name)
+    try:
+        answers = _answers(release, effort, None, [], say, todo)
+        store.set_protocol(run, _protocol(release, todo, next(answers)["told"]))
+        void = kept(answers, release.version, lambda timings: store.add_timings(run, timings))
+    except Unasked as why:
+        void = {"": one_line(why)}
+    for reason in void.values():
+        say(f"{release.name}: not timed: {reason}")
+    store.finish(run)
+
+
+def _timed(store: Store, release: Release) -> set[Slot]:
+    """Cells that the store has a release's times of, taken with the adapter that runs now."""
+    found: set[Slot] = set()
+    for run in store.release_runs(release.engine, release.version):
+        if (store.protocol(run) or {}).get("code", {}).get("adapter") == adapter_hash(release.engine):
+            found |= {timing.slot for timing in store.timings(run)}
+    return found
 
 
 def answered(store: Store, release: Release, wanted: Sequence[Slot]) -> dict[Slot, Observation]:

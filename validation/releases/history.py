@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from packaging.version import Version
 
+from validation.bench.agreement import ratios
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.comparison import Change, Family, Kind, compare_rows, families
 from validation.findings import Finding, row_key
@@ -19,6 +21,10 @@ from validation.verdicts import Physics
 
 #: Outcomes that are an answer of the engine; the others are the reason why there is none.
 ANSWERS = (Outcome.OK.value, Outcome.DIVERGED.value, Outcome.CRASHED.value, Outcome.TIMED_OUT.value)
+#: Outcomes that end without a number to judge: fewer rows that fail are no better if these are more.
+ENDED = (Outcome.CRASHED.value, Outcome.TIMED_OUT.value, Outcome.INVALID.value)
+#: Engine, profile, scene, dimension.
+Key = tuple[str, str, str, int]
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,8 @@ class Told:
         Why it answered nothing; empty if it did.
     doubted
         Profiles without verdicts on this release, with the receipt that fails there.
+    times
+        Time of a scene over that of the yardstick (`validation.releases.timing`), where it was taken.
     """
 
     engine: str
@@ -38,6 +46,7 @@ class Told:
     rows: tuple[Row, ...]
     reason: str = ""
     doubted: tuple[str, ...] = ()
+    times: Mapping[Key, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -47,6 +56,16 @@ class Told:
     def count(self, physics: Physics) -> int:
         """How many rows have this verdict."""
         return sum(row.physics == physics.value for row in self.rows)
+
+    @property
+    def ended(self) -> int:
+        """How many rows have no verdict because their cell crashed, hung, or is not driven as declared."""
+        return sum(row.outcome in ENDED for row in self.rows)
+
+    def pace(self, other: Told) -> float | None:
+        """Median over scenes of this release's time over that of ``other``; None where they share no time."""
+        both = [self.times[key] / other.times[key] for key in self.times if key in other.times]
+        return statistics.median(both) if both else None
 
 
 @dataclass(frozen=True)
@@ -88,7 +107,17 @@ def observations(store: Store, engine: str, version: str) -> list[Observation]:
     return list(found.values())
 
 
-def told_by(engine: str, version: str, found: Iterable[Observation]) -> Told:
+def times(store: Store, engine: str, version: str) -> dict[Key, float]:
+    """Time of each scene that was timed on a release over that of the yardstick; the newest ratio of each."""
+    found: dict[Key, float] = {}
+    for run in store.release_runs(engine, version):
+        for row in ratios(store, run).to_dict("records"):
+            key = str(row["engine"]), str(row["profile"]), str(row["scene"]), int(row["dimension"])
+            found[key] = float(row["ratio"])
+    return found
+
+
+def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapping[Key, float] | None = None) -> Told:
     """Judge what a release answered; a profile of which a receipt fails there has no verdicts."""
     found = list(found)
     doubts: dict[str, str] = {}
@@ -100,7 +129,7 @@ def told_by(engine: str, version: str, found: Iterable[Observation]) -> Told:
     answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)
     reason = "" if answered else next((row.reason for row in rows), "it was not asked")
     said = tuple(f"{profile}: {why}" for profile, why in doubts.items())
-    return Told(engine, version, rows, reason, said)
+    return Told(engine, version, rows, reason, said, taken or {})
 
 
 def _doubted(row: Row, doubts: dict[str, str]) -> Row:
@@ -117,7 +146,8 @@ def told(store: Store, engine: str, wanted: Sequence[str] = (), cells: Sequence[
     out = []
     for version in wanted or versions(store, engine):
         found = observations(store, engine, version)
-        out.append(told_by(engine, version, [o for o in found if not asked or o.slot in asked]))
+        chosen = [o for o in found if not asked or o.slot in asked]
+        out.append(told_by(engine, version, chosen, times(store, engine, version)))
     return out
 
 

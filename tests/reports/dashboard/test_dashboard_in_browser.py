@@ -87,9 +87,9 @@ def test_axe_finds_nothing(browser, dashboard_file, scheme):
 
 
 def test_a_name_that_is_markup_is_text(browser, tmp_path):
+    from reports.brief import Summary
     from reports.dashboard import render
     from reports.dashboard.series import _divided, _Entry
-    from reports.dashboard.summary import Summary
 
     evil = "<img src=x onerror=window.hacked=1>"
     entries = [

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from reports.brief import FILE, Kept, Summary, summarise
 from reports.command import main
 from reports.dashboard import events
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
-from reports.dashboard.summary import FILE, Kept, Summary, summarise
 from validation.cells import Outcome, Slot
 from validation.store import Store
 
@@ -73,6 +73,11 @@ def test_values_that_repeat_exactly_have_a_step_wherever_they_change(n):
     assert steps([1.0] * (n - 1) + [1.005], ERROR) == [] and steps([1.0] * n + [1.08] * n, TIME) == []
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_a_series_too_short_for_two_levels_has_no_step(n):
+    assert steps([1.0] + [9.0] * (n - 1), TIME) == []
+
+
 def test_a_time_that_stands_out_alone_is_no_step_and_one_that_stays_is():
     assert steps([1.0] * 9 + [3.0] + [1.0] * 9, TIME) == []
     assert [step.at for step in steps([1.0] * 9 + [1.5] * 3, TIME)] == [9]
@@ -110,9 +115,26 @@ def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeyp
     assert (history_folder / FILE).exists()
     monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
     panels(store, history_folder)
-    monkeypatch.setattr("reports.dashboard.summary.judging_code", lambda: "other code")
+    monkeypatch.setattr("reports.brief.judging_code", lambda: "other code")
     with pytest.raises(pytest.fail.Exception):
         panels(store, history_folder)
+    store.close()
+
+
+def test_a_run_keeps_its_own_summary_so_that_no_dashboard_judges_it_again(tmp_path, monkeypatch):
+    """Of 500 runs the quick suite's judging takes an hour; reading what they kept takes seconds."""
+    words = ["run", "impact", "--param", "e=0.5", "--dim", "2", "--engine", "chipmunk", "--dt", "1/240"]
+    done = CliRunner().invoke(main, [*words, "--jobs", "1", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    store = Store(tmp_path, create=False)
+    (made,) = store.runs()
+    kept = Kept(tmp_path)
+    assert kept.get(made.id) == summarise(store.observations(made))
+    kept.close()
+    monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
+    assert {panel.key for panel in panels(store, tmp_path)} == {
+        ("chipmunk", profile, "impact", 2) for profile in ("default", "tuned")
+    }
     store.close()
 
 
@@ -142,7 +164,8 @@ def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_pat
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told == {"path": str(path), "panels": 4, "moved": 4}
-    assert "<svg" in path.read_text()
+    text = path.read_text()
+    assert "<svg" in text and "4 panels of " in text
 
 
 def test_a_store_without_a_finished_run_is_one_line(tmp_path):

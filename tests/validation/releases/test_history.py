@@ -1,5 +1,7 @@
 """Rows over releases: what moved in which, and what the notes say of it."""
 
+from dataclasses import replace
+
 import pytest
 
 from reports.history import sentences
@@ -49,6 +51,16 @@ def test_a_cell_that_crashes_is_an_answer_and_one_that_is_invalid_is_none():
     crashed = told("2", None, outcome=Outcome.CRASHED)
     assert kinds([told("1", 0.5), crashed]) == [("1", "2", Kind.OUTCOME, 1)]
     assert kinds([told("1", 0.5), told("2", 0.4, outcome=Outcome.INVALID), told("3", 0.5)]) == []
+
+
+@pytest.mark.parametrize(
+    ("outcome", "ended"),
+    [(Outcome.OK, False), (Outcome.UNSUPPORTED, False), (Outcome.NOT_INSTALLED, False), (Outcome.CRASHED, True),
+     (Outcome.TIMED_OUT, True), (Outcome.INVALID, True)],
+)  # fmt: skip
+def test_rows_that_end_without_an_answer_are_counted_apart_from_those_that_fail(outcome, ended):
+    release = told("2", 0.4 if outcome is Outcome.OK else None, outcome=outcome)
+    assert release.ended == (len(release.rows) if ended else 0) and len(release.rows) > 1
 
 
 def test_a_missing_answer_never_replaces_one(tmp_path):
@@ -114,14 +126,22 @@ def test_a_step_is_told_with_the_note_between_its_releases_or_is_unexplained(not
     noted(NOTE)
     found = steps([told("2", 0.5), told("3", 0.4)])
     (said,) = sentences("toy", [step for step in found if step.family.first.metric == "rebound_ratio"])
-    assert (
-        said.startswith("**3** (after 2), default impact: rows that begin to fail 1; first")
-        and "0.5 1 (pass) -> 0.4 1 (fail)" in said
+    assert said == (
+        "**3** (after 2). Speeds are capped (notes of 2.5).\n"
+        "  * default impact: 1 row begins to fail; first `rebound_ratio` (2-D e=0.5 v=4) 0.5 (pass) -> 0.4 (fail)"
     )
-    assert said.endswith("Speeds are capped (notes of 2.5).")
     assert notes.explanations("toy", "impact", "default", "2.5", "3") == ["unexplained"]
     assert notes.explanations("toy", "impact", "default", "2", "2.5") == ["speeds are capped (notes of 2.5)"]
     assert notes.explanations("toy", "bounce", "default", "2", "3") == ["unexplained"]
+
+
+def test_what_one_note_explains_stands_under_it_once(noted):
+    noted(NOTE)
+    slots = (SLOT, replace(SLOT, profile="other"))
+    (said,) = sentences("toy", steps([told("2", 0.5, slots), told("3", 0.4, slots)]))
+    head, *lines = said.splitlines()
+    assert head.count("Speeds are capped") == 1 == said.count("Speeds are capped")
+    assert [line.split(":")[0] for line in lines] == ["  * default impact", "  * other impact"]
 
 
 def test_without_notes_everything_is_unexplained():

@@ -1,7 +1,8 @@
 """A run in brief: of each cell its primary error and how many of its checks fail. Kept beside the store.
 
 Judging a run of the quick suite takes seconds and a dashboard shows hundreds, so each is judged once: a summary is kept
-in ``OUT/dashboard.sqlite`` under the run and the hash of the code that judged it. The file may be deleted at any time.
+in ``OUT/dashboard.sqlite`` under the run and the hash of the code that judged it, by the run itself when it ends. The
+file may be deleted at any time.
 """
 
 from __future__ import annotations
@@ -108,6 +109,13 @@ def judging_code() -> str:
     for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".csv", ".toml")):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def keep(folder: Path, run: str, observations: Iterable[Observation], rows: Iterable[Row]) -> None:
+    """Keep the summary of a run that has just been judged, so that no dashboard has to judge it again."""
+    kept = Kept(folder)
+    kept.put(run, summarise(observations, rows))
+    kept.close()
 
 
 class Kept:

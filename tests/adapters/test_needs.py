@@ -1,0 +1,161 @@
+"""What a scene needs and which pair values meet in it: the facts that profiles choose their settings from."""
+
+import itertools
+import math
+import random
+
+import pytest
+
+from adapters.materials import Materials, Pair
+from adapters.needs import Needs, needs
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, SceneError
+
+FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
+
+
+def ball(name="ball", **changes):
+    return Body(name, **{"shape": Disc(0.25), "mass": 2.0, "inertia": 0.5, "pose": (0.0, 1.0, 0.0), **changes})
+
+
+def scene(*bodies, pair=None, gravity=(0.0, -8.0), duration=0.5):
+    return Scene("s", 1, 2, bodies, (pair or Pair(restitution=0.5),), gravity, duration)
+
+
+def test_what_a_scene_needs_fact_by_fact():
+    moving = ball(twist=(3.0, -4.0, 0.0))
+    assert needs(scene(FLOOR, moving, ball("heavy", mass=8.0), pair=Pair(restitution=0.75, friction=0.25))) == Needs(
+        dimension=2, rotation=True, friction=0.25, restitution=0.75, regime="impact", slide=True, smallest_size=0.5,
+        top_speed=5.0 + 8.0 * 0.5, mass_ratio=4.0, gravity=8.0,
+    )  # fmt: skip
+
+
+def test_nothing_that_moves_freely_needs_nothing():
+    assert needs(scene(FLOOR)) == Needs(2, False, 0.0, 0.0, "free", False, 1.0, 4.0, 1.0, 8.0)
+    still = needs(scene(ball(), gravity=(0.0, 0.0)))
+    assert still == Needs(2, False, 0.0, 0.0, "free", False, 0.5, 0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "pair", "turns"),
+    [
+        (ball(), Pair(), False),
+        (ball(), Pair(friction=0.01), True),
+        (ball(), Pair(friction=1.0), True),
+        (ball(twist=(0.0, 0.0, 0.5)), Pair(), True),
+        (ball(torque=(0.5,)), Pair(), True),
+        (ball(twist=(0.5, 0.0, 0.0)), Pair(), False),
+        (ball(shape=Box((0.25, 0.25))), Pair(), True),
+    ],
+)
+def test_a_box_friction_spin_or_torque_can_turn_a_body(body, pair, turns):
+    assert needs(scene(FLOOR, body, pair=pair)).rotation is turns
+    fixed = Body("wall", Box((0.25, 0.25)), motion="fixed", pose=(9.0, 9.0, 0.0))
+    assert needs(scene(FLOOR, fixed, ball(), pair=Pair())).rotation is False
+
+
+@pytest.mark.parametrize(
+    ("gravity", "force", "e", "regime"),
+    [((0.0, -8.0), (0.0, 0.0), 0.0, "rest"), ((0.0, -0.5), (0.0, 0.0), 0.0, "rest"),
+     ((0.0, 0.0), (0.0, 1.0), 0.0, "rest"), ((0.0, 0.0), (0.0, 0.0), 0.0, "impact"),
+     ((0.0, -8.0), (0.0, 0.0), 0.5, "impact")],
+)  # fmt: skip
+def test_bodies_rest_where_a_load_presses_them_together_and_nothing_rebounds(gravity, force, e, regime):
+    assert needs(scene(FLOOR, ball(force=force), pair=Pair(restitution=e), gravity=gravity)).regime == regime
+
+
+@pytest.mark.parametrize(
+    ("changes", "friction", "slides"),
+    [
+        ({"twist": (0.5, 0.0, 0.0)}, 0.25, True),
+        ({"twist": (0.5, 0.0, 0.0)}, 0.0, False),  # nothing rubs
+        ({"twist": (0.0, -5.0, 0.0)}, 0.25, False),
+        ({"twist": (0.0, 0.0, 0.5)}, 0.25, True),
+        ({"force": (0.5, 0.0)}, 0.25, True),
+        ({"force": (0.0, 0.5)}, 0.25, False),
+        ({"twist": (1e-9, -1.0, 0.0)}, 0.25, True),
+        ({"twist": (1e-13, -1.0, 0.0)}, 0.25, False),  # round-off
+        ({"twist": (1e-7, -1e6, 0.0)}, 0.25, False),  # round-off of a million
+    ],
+)
+def test_something_slides_where_friction_meets_motion_or_load_along_a_face(changes, friction, slides):
+    assert needs(scene(FLOOR, ball(**changes), pair=Pair(friction=friction))).slide is slides
+
+
+def test_load_straight_into_a_tilted_face_is_no_slide_however_its_normal_is_rounded():
+    for k in range(1, 400):
+        normal = (math.sin(0.005 * k), math.cos(0.005 * k))
+        tilted = Body("ramp", HalfSpace(normal, 0.0), motion="fixed")
+        for gravity, slides in ((tuple(-9.81 * n for n in normal), False), ((0.0, -9.81), True)):
+            assert needs(scene(tilted, ball(), pair=Pair(friction=0.5), gravity=gravity)).slide is slides
+
+
+# ---- materials -----------------------------------------------------------------------------------------------------
+
+
+def by_hand(pairs, free):
+    """Values of all pairs, one by one: the most specific entries say it, and one value must be said."""
+
+    def said(a, b):
+        both = {(p.restitution, p.friction) for p in pairs if {p.a, p.b} == {a, b} and "*" not in (p.a, p.b)}
+        one = {(p.restitution, p.friction) for p in pairs if ("*" in (p.a, p.b)) and {p.a, p.b} & {a, b}}
+        none = {(p.restitution, p.friction) for p in pairs if p.a == p.b == "*"}
+        return both or one or none or {(0.0, 0.0)}
+
+    found = set()
+    for a, b in itertools.combinations(free, 2):
+        if free[a] or free[b]:
+            values = said(a, b)
+            if len(values) > 1:
+                return f"{a}-{b}"
+            found |= values
+    return found
+
+
+def test_values_of_all_pairs_are_those_of_each_pair_looked_at_alone():
+    """Bodies that no entry tells apart are looked at together; that must never change what is found."""
+    dice = random.Random(12)
+    agreed = refused = 0
+    for _ in range(3000):
+        free = {name: dice.random() < 0.6 for name in "abcdef"[: dice.randint(1, 6)]}
+        names = [*free, "*"]
+        pairs = tuple(
+            Pair(dice.choice(names), dice.choice(names), dice.choice((0.0, 0.5)), dice.choice((0.0, 0.25)))
+            for _ in range(dice.randint(0, 7))
+        )
+        pairs = tuple(p for p in pairs if p.a != p.b or p.a == "*")
+        expected = by_hand(pairs, free)
+        if isinstance(expected, str):
+            refused += 1
+            with pytest.raises(SceneError, match=r"^pair \w-\w: \d entries say different things"):
+                Materials(pairs).materials(free)
+        else:
+            agreed += 1
+            assert Materials(pairs).materials(free) == expected, (pairs, free)
+    assert agreed > 500 and refused > 500
+
+
+def test_two_entries_for_no_one_in_particular_must_agree():
+    free = {"a": True, "b": False}
+    assert Materials((Pair(friction=0.5), Pair(friction=0.5))).materials(free) == {(0.0, 0.5)}
+    with pytest.raises(SceneError, match="pair a-b: 2 entries say different things; name both bodies in one"):
+        Materials((Pair(friction=0.5), Pair(friction=0.25))).materials(free)
+    named = (Pair(friction=0.5), Pair(friction=0.25), Pair("b", "a", 0.75, 0.0))
+    assert Materials(named).materials(free) == {(0.75, 0.0)}
+
+
+def test_the_pair_that_is_refused_is_one_that_nothing_names():
+    """a-b and a-c are named and agree; b-c is what two entries say different things of."""
+    pairs = (Pair("a", "b", 0.5), Pair("a", "c", 0.5), Pair("b", "*", 0.25), Pair("c", "*", 0.75), Pair("a", "*", 0.25))
+    with pytest.raises(SceneError, match="pair b-c: 2 entries"):
+        Materials(pairs).materials(dict.fromkeys("abc", True))
+    alone = (Pair("*", "*", 0.5), Pair("*", "*", 0.25), Pair("a", "b", 0.125), Pair("a", "c", 0.125))
+    with pytest.raises(SceneError, match="pair b-c: 2 entries"):
+        Materials(alone).materials(dict.fromkeys("abc", True))
+
+
+def test_entries_of_both_one_and_none_are_asked_in_that_order():
+    said = Materials((Pair("*", "*", 0.125), Pair("a", "*", 0.25), Pair("*", "b", 0.25), Pair("a", "b", 0.5))).said
+    assert said("a", "b") == said("b", "a") == {(0.5, 0.0)}
+    assert said("a", "c") == said("c", "b") == {(0.25, 0.0)}
+    assert said("c", "d") == {(0.125, 0.0)}
+    assert Materials(()).said("a", "b") == frozenset()

@@ -1,0 +1,165 @@
+"""The matrix as a reader sees it: every field, line, width and colour, and the sweeps beside it."""
+
+import io
+from collections import Counter
+
+import pytest
+from rich.console import Console
+
+from reports.matrix import ALARM, STYLES, Field, Matrix, legend, matrix_of, sweeps_of, tables_of, versions_of
+
+
+def row(scene, dimension, engine, profile, mark="pass", iterations=None):
+    """What the matrix reads of a judged row."""
+    outcome = mark if mark in ("unsupported", "crashed") else "ok"
+    physics = None if outcome != "ok" else "pass" if mark == "pass" else "fail"
+    standing = None if mark == "pass" or outcome == "crashed" else "known" if outcome == "unsupported" else mark
+    return {"scene": scene, "dimension": dimension, "engine": engine, "profile": profile, "iterations": iterations,
+            "outcome": outcome, "physics": physics, "standing": standing, "engine_version": "1.0+5f3a"}  # fmt: skip
+
+
+def times(count, *what, **more):
+    return [row(*what, **more) for _ in range(count)]
+
+
+#: `flat` is planar; `deep` differs by dimension, is silent on one scene, and was swept.
+ROWS = [
+    *times(9, "impact", 2, "flat", "soft"), *times(2, "impact", 3, "flat", "soft", "unsupported"),
+    *times(9, "impact", 2, "deep", "soft"), *times(9, "impact", 3, "deep", "soft"),
+    *times(3, "impact", 2, "deep", "stiff"), *times(1, "impact", 2, "deep", "stiff", "explained"),
+    *times(4, "impact", 3, "deep", "stiff"),
+    *times(7, "stack", 2, "flat", "soft"), *times(2, "stack", 2, "flat", "soft", "known"),
+    *times(1, "stack", 3, "flat", "soft", "unsupported"),
+    *times(5, "stack", 2, "deep", "soft"), *times(1, "stack", 2, "deep", "soft", "new"),
+    *times(5, "stack", 3, "deep", "soft"), *times(1, "stack", 3, "deep", "soft", "new"),
+    *times(2, "stack", 2, "deep", "soft", "known", 30), *times(1, "stack", 2, "deep", "soft", iterations=4),
+    *times(3, "stack", 3, "deep", "soft", iterations=4), *times(4, "stack", 3, "deep", "stiff", "known", 4),
+    *times(1, "stack", 2, "flat", "soft", iterations=30),
+]  # fmt: skip
+VERSIONS = {"flat": "7.3.1", "deep": "1.0+5f3a.dirty"}
+
+
+def shown(rows, width, versions=VERSIONS):
+    stream = io.StringIO()
+    console = Console(file=stream, width=width)
+    for table in tables_of(matrix_of(rows), versions, width):
+        console.print(table)
+    return [line.rstrip() for line in stream.getvalue().splitlines()]
+
+
+def test_a_wide_terminal_shows_it_in_full():
+    assert shown(ROWS, 100) == [
+        "engine, profile      impact          stack",
+        "─" * 51,
+        "flat 7.3.1",
+        "  soft 2-D           pass 9          FAIL known 2/9",
+        "  every profile 3-D  -               -",
+        "deep 1.0",
+        "  soft 2-D 3-D       pass 9          FAIL new 1/6",
+        "  stiff 2-D          FAIL expl. 1/4",
+        "  stiff 3-D          pass 4",
+    ]
+
+
+def test_a_narrow_terminal_shows_short_words_and_lets_the_count_say_fail():
+    assert shown(ROWS, 99)[3] == "  soft 2-D           pass 9     known 2/9"
+    assert shown(ROWS, 99)[6:8] == ["  soft 2-D 3-D       pass 9     NEW 1/6", "  stiff 2-D          expl. 1/4"]
+
+
+def test_scenes_that_do_not_fit_beside_each_other_make_further_tables():
+    assert [len(tables_of(matrix_of(ROWS), VERSIONS, width)) for width in (41, 40)] == [1, 2]
+    apart = tables_of(matrix_of(ROWS), VERSIONS, 40)
+    assert [[column.header for column in table.columns] for table in apart] == [
+        ["engine, profile", "impact"], ["engine, profile", "stack"]]  # fmt: skip
+    assert [len(table.rows) for table in apart] == [7, 7]
+    assert shown(ROWS, 40)[:2] == ["engine, profile      impact", "─" * 30]
+    assert len(tables_of(matrix_of(ROWS), VERSIONS, 1)) == 2  # one column at least, however narrow
+
+
+@pytest.mark.parametrize("width", range(30, 60))
+def test_no_width_cuts_a_count_short(width):
+    """``known 2/9`` cut to ``known 2`` would be a count that nobody made."""
+    text = "\n".join(shown(ROWS, width))
+    assert all(count in text for count in ("known 2/9", "NEW 1/6", "expl. 1/4")) and "…" not in text
+
+
+def test_colours_support_the_words_and_alarms_stand_out():
+    (table,) = tables_of(matrix_of(ROWS), VERSIONS, 100)
+    cells = [list(column.cells) for column in table.columns]
+    assert [(text.plain, text.style) for text in cells[0]][:2] == [("flat 7.3.1", "bold"), ("  soft 2-D", "")]
+    assert [getattr(text, "style", "") for text in cells[1]] == [
+        "", STYLES["pass"], STYLES["unsupported"], "", STYLES["pass"], STYLES["explained"], STYLES["pass"]]  # fmt: skip
+    assert [getattr(text, "style", "") for text in cells[2]][1:5] == [
+        STYLES["known"], STYLES["unsupported"], "", ALARM]  # fmt: skip
+    assert all(column.no_wrap for column in table.columns)
+    (odd,) = tables_of(Matrix((("a", 2),), (("e", "p"),), {(("a", 2), ("e", "p")): Field(Counter(none=1))}), {}, 80)
+    assert [getattr(text, "style", "") for text in odd.columns[1].cells][1] == ""
+
+
+def test_an_engine_whose_version_nobody_knows_stands_by_its_name():
+    assert shown(ROWS, 100, {})[2] == "flat" and shown(ROWS, 100, {})[5] == "deep"
+
+
+def test_nothing_is_an_empty_matrix():
+    assert tables_of(matrix_of([]), {}, 80) == [] and sweeps_of(matrix_of([])) == []
+
+
+def test_an_engine_that_could_be_asked_in_one_scene_is_not_called_unable():
+    rows = [*ROWS, *times(1, "bounce", 3, "flat", "soft")]
+    assert not any("every profile" in line for line in shown(rows, 120))
+    assert any(line.split() == ["soft", "3-D", "-", "-", "pass", "1"] for line in shown(rows, 120))
+
+
+def test_a_field_without_rows_is_empty_and_equal_marks_in_another_order_share_a_line():
+    rows = [row("impact", 2, "deep", "soft"), row("impact", 2, "deep", "soft", "known"),
+            row("impact", 3, "deep", "soft", "known"), row("impact", 3, "deep", "soft")]  # fmt: skip
+    assert shown(rows, 100)[3:] == ["  soft 2-D 3-D   FAIL known 1/2"]
+
+
+# ---- counting ------------------------------------------------------------------------------------------------------
+
+
+def test_rows_at_iterations_asked_for_are_counted_apart():
+    matrix = matrix_of(ROWS)
+    assert matrix.lines == (("impact", 2), ("impact", 3), ("stack", 2), ("stack", 3))
+    assert matrix.columns == (("flat", "soft"), ("deep", "soft"), ("deep", "stiff"))
+    assert matrix.fields[("stack", 2), ("deep", "soft")].marks == Counter({"pass": 5, "new": 1})
+    assert {key: dict(field.marks) for key, field in matrix.swept.items()} == {
+        (("stack", 2), ("deep", "soft")): {"known": 2, "pass": 1},
+        (("stack", 3), ("deep", "soft")): {"pass": 3},
+        (("stack", 3), ("deep", "stiff")): {"known": 4},
+        (("stack", 2), ("flat", "soft")): {"pass": 1},
+    }
+    assert matrix.counts == {"stack": (4, 30)}
+
+
+def same_dimension(dimension, mark):
+    return [row("stack", dimension, "deep", "soft", mark, 4)]
+
+
+def test_a_sweep_is_said_in_a_line_of_its_own_with_dimensions_only_where_they_differ():
+    assert sweeps_of(matrix_of(ROWS)) == [
+        "stack at 4, 30 iterations instead of the profile's own, FAIL: "
+        "flat/soft 0/1; deep/soft 2/3 2-D and 0/3 3-D; deep/stiff 4/4."
+    ]
+    three = [*same_dimension(2, "known"), *same_dimension(3, "pass"), *same_dimension(4, "known")]
+    assert sweeps_of(matrix_of(three))[0].endswith("deep/soft 1/1 2-D 4-D and 0/1 3-D.")
+    same = [row("stack", d, "deep", "soft", iterations=4) for d in (2, 3)]
+    asked = [row("stack", 3, "flat", "soft", "unsupported", 4), row("impact", 3, "deep", "soft", "known", 8)]
+    assert sweeps_of(matrix_of([*same, *asked])) == [
+        "stack at 4 iterations instead of the profile's own, FAIL: deep/soft 0/1.",
+        "impact at 8 iterations instead of the profile's own, FAIL: deep/soft 1/1.",
+    ]
+
+
+def test_versions_are_those_that_ran():
+    nothing = {**row("impact", 2, "gone", "soft"), "engine_version": ""}
+    assert versions_of([*ROWS, nothing]) == {"flat": "1.0+5f3a", "deep": "1.0+5f3a"}
+
+
+@pytest.mark.parametrize(("short", "lines", "word"), [(False, 1, "FAIL known"), (True, 2, "NEW, drifted")])
+def test_the_legend_explains_the_marks_and_fits_where_it_stands(short, lines, word):
+    text = legend(short)
+    assert len(text.splitlines()) == lines and word in text
+    assert not short or max(map(len, text.splitlines())) <= 80
+    assert legend() == legend(False)

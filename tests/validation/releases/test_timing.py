@@ -1,0 +1,163 @@
+"""Times of releases: against a loop on the same machine, taken once, and never of what has no answer."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+
+from adapters import registry
+from reports.command import main
+from reports.dashboard.series import panels
+from validation.bench.stopwatch import Lap
+from validation.cells import Observation, Outcome, Slot
+from validation.releases import history, timing
+from validation.releases.history import Told
+from validation.store import RELEASE_TITLE, Store
+
+DT = 1 / 240
+SLOT = Slot("impact", (("e", 0.5),), 2, "toy", "default", DT)
+
+
+def seen(slot=SLOT, outcome=Outcome.OK):
+    return Observation(slot, "c", 1, "1.0", outcome)
+
+
+def lap(slot=SLOT, round_=0, seconds=0.5, yardstick=0.25, void="", steps=10):
+    return {"timed": slot.as_dict(), "round": round_, "order": 0, "yardstick": yardstick, "void": void, "steps": steps,
+            "seconds": seconds, "wall_seconds": seconds, "bodies": 1, "state_hash": "ab"}  # fmt: skip
+
+
+# ---- what is timed -------------------------------------------------------------------------------------------------
+
+
+def test_one_cell_of_each_scene_dimension_and_profile_is_timed():
+    spatial, other = replace(SLOT, dimension=3), replace(SLOT, profile="other")
+    again = replace(SLOT, params=(("e", 0.8),))
+    found = timing.timed_cells(map(seen, (SLOT, again, spatial, other)))
+    assert found == [SLOT, spatial, other]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"iterations": 4}, {"ulp": 1}, {"dt": 1 / 60}, {"switched": (("a", 1),)},
+     {"scene": "my.toml"}],
+)  # fmt: skip
+def test_cells_of_sweeps_experiments_and_files_are_not_timed(change):
+    assert timing.timed_cells([seen(replace(SLOT, **change))]) == []
+
+
+@pytest.mark.parametrize("outcome", [Outcome.CRASHED, Outcome.INVALID, Outcome.DIVERGED, Outcome.NOT_INSTALLED])
+def test_what_has_no_answer_has_no_time_and_no_other_cell_stands_in_for_it(outcome):
+    again = replace(SLOT, params=(("e", 0.8),))
+    assert timing.timed_cells([seen(outcome=outcome), seen(again)]) == []
+
+
+# ---- what is kept --------------------------------------------------------------------------------------------------
+
+
+def stored(tmp_path, laps, version="1.0"):
+    store = Store(tmp_path)
+    run, _ = store.start(f"{RELEASE_TITLE}toy=={version}: times", [], fresh=True, apart=version)
+    void = timing.kept(laps, version, lambda timings: store.add_timings(run, timings))
+    store.finish(run)
+    return store, void
+
+
+def test_a_time_is_the_median_over_rounds_of_its_ratio_to_the_yardstick(tmp_path):
+    """A machine that is four times slower in a round slows both; one lap that was disturbed is outvoted."""
+    rounds = [(0.5, 0.25), (2.0, 1.0), (0.5, 0.25), (9.0, 0.25)]
+    laps = [lap(round_=k, seconds=taken, yardstick=beside) for k, (taken, beside) in enumerate(rounds)]
+    store, void = stored(tmp_path, laps)
+    assert history.times(store, "toy", "1.0") == {("toy", "default", "impact", 2): pytest.approx(2.0)}
+    assert void == {} and history.times(store, "toy", "2.0") == {} and history.versions(store, "toy") == ["1.0"]
+    store.close()
+
+
+def test_profiles_of_a_scene_have_a_yardstick_each_and_what_is_void_has_no_time(tmp_path):
+    other, gone = replace(SLOT, profile="other"), replace(SLOT, profile="gone")
+    laps = []
+    for k in range(3):
+        laps += [lap(round_=k), lap(other, k, 0.75, 0.125), lap(gone, k, 0.0, 0.25, "it crashed")]
+    store, void = stored(tmp_path, laps)
+    assert history.times(store, "toy", "1.0") == {
+        ("toy", "default", "impact", 2): pytest.approx(2.0), ("toy", "other", "impact", 2): pytest.approx(6.0)
+    }  # fmt: skip
+    assert list(void.values()) == ["gone impact 2-D: it crashed"]
+    store.close()
+
+
+def test_the_newest_times_of_a_release_count(tmp_path):
+    stored(tmp_path, [lap(round_=k) for k in range(3)])[0].close()
+    store, _ = stored(tmp_path, [lap(round_=k, seconds=1.0) for k in range(3)])
+    assert list(history.times(store, "toy", "1.0").values()) == [pytest.approx(4.0)]
+    store.close()
+
+
+def test_a_pace_is_the_median_over_scenes_that_both_releases_have():
+    def told(**times):
+        return Told("toy", "1", (), times={("toy", "p", scene, 2): time for scene, time in times.items()})
+
+    first = told(a=1.0, b=2.0, c=4.0, gone=9.0)
+    assert told(a=2.0, b=2.0, c=1.0, new=50.0).pace(first) == 1.0
+    assert told(a=3.0, b=6.0, c=4.0).pace(first) == 3.0
+    assert told(new=1.0).pace(first) is None and told().pace(first) is None
+
+
+def test_a_lap_is_measured_by_the_yardsticks_on_both_of_its_sides_and_one_that_fails_is_not_asked_again(monkeypatch):
+    class FakeLane:
+        started = 0
+
+        def __init__(self, patience):
+            pass
+
+        def start(self):
+            FakeLane.started += 1
+
+        def time(self, unit):
+            void = "it crashed" if unit.slot.profile == "gone" else ""
+            return Lap("1.0", 4.0, 5.0, 6.0, "ab", None, void=void)
+
+        def stop(self):
+            FakeLane.started = -FakeLane.started
+
+    ticks = iter(range(1, 100))
+    monkeypatch.setattr(timing, "Lane", FakeLane)
+    monkeypatch.setattr(timing, "yardstick", lambda: float(next(ticks)))
+    gone = replace(SLOT, profile="gone")
+    found = list(timing.laps([SLOT, gone], rounds=2))
+    assert [(lap["round"], lap["timed"]["profile"], lap["yardstick"], lap["void"]) for lap in found] == [
+        (0, "default", 1.5, ""), (0, "gone", 2.5, "it crashed"), (1, "default", 4.5, "")]  # fmt: skip
+    assert (found[0]["seconds"], found[0]["wall_seconds"], found[0]["order"], found[1]["order"]) == (4.0, 5.0, 0, 1)
+    assert FakeLane.started == -2  # a process per round, and none is left
+
+
+def test_a_yardstick_is_milliseconds_of_cpu_time():
+    assert 1e-4 < timing.yardstick() < 1.0
+
+
+# ---- on real environments of tiny releases -------------------------------------------------------------------------
+
+
+def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatch):
+    def call(*more):
+        registry.find.cache_clear()
+        words = ["releases", "toy", "1.0.0,1.2.0", "impact", "--dim", "2", "--param", "e=0.5", "--param", "v=10"]
+        done = CliRunner().invoke(main, [*words, "--jobs", "1", "--out", str(tmp_path), *more])
+        assert done.exit_code == 0, done.output + repr(done.exception)
+        return done
+
+    assert [each["time"] for each in json.loads(call("--json").stdout)["releases"]] == [None, None]
+    told = json.loads(call("--times", "--json").stdout)["releases"]
+    assert told[0]["time"] == 1.0 and 0.2 < told[1]["time"] < 5.0  # the same code, on a machine that is shared
+    store = Store(tmp_path)
+    runs = [run for run in store.runs() if run.title.endswith(": times")]
+    timings = [each for run in runs for each in store.timings(run)]
+    assert len(runs) == 2 and len(timings) == 2 * 2 * timing.ROUNDS
+    assert {t.slot.engine for t in timings} == {"toy", "python"} and not any(t.void for t in timings)
+    (panel,) = [panel for panel in panels(store, tmp_path) if panel.over == "releases"]
+    assert panel.opponent == "a loop of Python" and all(point.ratio for point in panel.points)
+    text = call("--times").stdout
+    assert "time: the first release" in text and "x1" in text
+    assert len([run for run in store.runs() if run.title.endswith(": times")]) == 2  # what is stored is not timed again
+    store.close()

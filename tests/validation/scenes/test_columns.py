@@ -1,0 +1,126 @@
+"""Columns at rest: each number is read from motions and loads that are written down by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.trajectory import ContactRecord, Sampling, Trajectory
+from validation import columns
+from validation.catalogue import CATALOGUE
+
+DT, G = 1 / 64, 8.0  # powers of two: sums and quotients below are exact
+STEPS = 192  # three seconds
+STILL = 0.01 * G * DT
+
+
+def column(dimension=2, n=3, mass=2.0):
+    return CATALOGUE["stack"].scene(dimension, {"n": n, "mass": mass, "g": G, "duration": STEPS * DT})
+
+
+def resting(scene, shares=None, first=0):
+    """The scene at rest; interface i carries ``shares[i]`` (one number, or one per step) of the weight above it."""
+    d, n, steps = scene.dimension, len(scene.bodies) - 1, np.arange(first, STEPS + 1)
+    pose = np.array([[body.pose for body in scene.bodies]] * (STEPS + 1))
+    twist = np.zeros((STEPS + 1, n + 1, 3 if d == 2 else 6))
+    contacts = None
+    if shares is not None:
+        impulse = np.zeros((len(steps), n, d))
+        for i in range(n):
+            impulse[:, i, -1] = np.broadcast_to(shares[i], STEPS + 1)[first:] * (n - i) * 2.0 * G * DT
+        a = np.tile(np.arange(n), len(steps))
+        flat = impulse.reshape(-1, d)
+        rows = Contacts(a, a + 1, np.zeros_like(flat), np.zeros_like(flat), flat, np.zeros(len(a)))
+        contacts = ContactRecord(steps, n * np.arange(len(steps) + 1), rows)
+    return Trajectory(np.arange(STEPS + 1) * DT, pose, twist, contacts, DT, "completed")
+
+
+def values(scene, trajectory):
+    return {name: value for name, (value, _) in columns.measure(scene, trajectory).items()}
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_column_that_rests_measures_as_its_truth_and_says_nothing(dimension):
+    scene = column(dimension)
+    measured = columns.measure(scene, resting(scene, [1.0, 1.0, 1.0]))
+    assert {name: value for name, (value, _) in measured.items()} == columns.exact(scene)
+    assert {said for _, said in measured.values()} == {""}
+
+
+def test_loads_are_those_of_the_last_second_each_relative_to_its_own_weight():
+    scene, late = column(), np.arange(STEPS + 1) * DT > 2.0
+    shares = [
+        np.where(late, 0.5, 9.0),
+        np.where(late, 1.25, 9.0),
+        np.where(late, 1.0 + 0.25 * (-1.0) ** np.arange(193), 9),
+    ]
+    found = values(scene, resting(scene, shares))
+    assert [found[f"interface_impulse[{i}]"] for i in (1, 2, 3)] == [0.5, 1.25, 1.0]
+    assert found["impulse_scatter"] == 0.25  # the largest of all interfaces
+
+
+def test_loads_that_were_not_recorded_are_missing_with_their_reasons():
+    scene = column()
+    measured = columns.measure(scene, resting(scene))
+    assert measured["interface_impulse[1]"] == (None, "contacts were not recorded")
+    assert measured["impulse_scatter"] == (None, "impulses are not available")
+
+
+def test_energy_is_the_mean_of_the_last_second_and_rest_begins_after_the_last_motion():
+    scene = column(n=1)
+    trajectory = resting(scene)
+    twist = trajectory.twist.copy()
+    twist[:64, 1, 0] = 4.0  # before: counts for neither
+    twist[129:, 1, 1] = 2.0 * STILL
+    assert values(scene, replace(trajectory, twist=twist))["kinetic_energy"] == pytest.approx(
+        0.5 * 2 * (2 * STILL) ** 2
+    )
+    twist[130:] = 0.0
+    found = values(scene, replace(trajectory, twist=twist))
+    assert found["kinetic_energy"] == pytest.approx((2 * STILL) ** 2 / 64)
+    assert found["settle_time"] == 130 * DT
+
+
+def test_rest_is_judged_by_the_fastest_body_at_a_hundredth_of_a_step_of_gravity():
+    scene = column()
+    trajectory = resting(scene)
+    twist = trajectory.twist.copy()
+    twist[:100, 2, 0] = math.nextafter(STILL, 1.0)
+    twist[:180, 1, 0] = STILL
+    assert values(scene, replace(trajectory, twist=twist))["settle_time"] == 100 * DT
+
+
+def test_displacements_are_seen():
+    scene = column()
+    trajectory = resting(scene)
+    pose = trajectory.pose.copy()
+    pose[-1, 3, 0] += 0.25
+    pose[50, 2:, 1] -= 0.125
+    found = values(scene, replace(trajectory, pose=pose))
+    assert (found["drift"], found["penetration"]) == (0.25, 0.125)
+
+
+def test_contacts_are_recorded_over_the_last_second_at_every_step():
+    assert columns.sampling(column()) == Sampling(1, 2.0)
+    assert columns.sampling(replace(column(), duration=0.5)) == Sampling(1, 0.0)
+
+
+def test_overlaps_are_rounded_relative_to_the_height_of_the_topmost_body():
+    found = {check.metric: check.bound for check in columns.checks(column(n=3), DT, columns.exact(column(n=3)))}
+    assert found["penetration"] == pytest.approx(G * DT**2 + 1e-12 * 2.5, rel=1e-13, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("drift", "penetration", "found"),
+    [
+        ((0.5, ""), (0.25, ""), (2.0, "")),
+        ((0.125, ""), (0.25, ""), (1.0, "")),
+        ((None, "it left"), (0.25, ""), (None, "it left")),
+        ((0.5, ""), (None, "no shape"), (None, "no shape")),
+        ((None, "it left"), (None, "no shape"), (None, "it left")),
+    ],
+)
+def test_a_displacement_is_the_larger_of_drift_and_overlap_in_sizes(drift, penetration, found):
+    assert columns.displacement({"drift": drift, "penetration": penetration}, 0.25) == found

@@ -1,0 +1,305 @@
+"""A row says all that its cell was asked, what came out, and why it is judged as it is."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from adapters.engine import EngineError
+from adapters.law import Deviation
+from validation import rows
+from validation.catalogue import CATALOGUE
+from validation.cells import Observation, Outcome, Slot
+from validation.findings import FindingsError
+from validation.rows import Row, frame, predictions_of, rows_of
+
+#: A box below the edge of the friction cone: one check, its creep.
+SLOT = Slot("incline", (("ratio", 0.99),), 3, "nameless", "soft", 1 / 240, 7)
+OWN = replace(SLOT, iterations=None)
+CHECK = CATALOGUE["incline"].checks(CATALOGUE["incline"].scene(3, {"ratio": 0.99}), 1 / 240)[0]
+SEEN = Observation(
+    SLOT, "c0ffee", 1, "1.2", Outcome.OK, "", {"creep": (0.5, "read late"), "acceleration": (2.0, "")}, "5ta7e", 480,
+    0.25, initial_change=("box lowered",), log="its words",
+)  # fmt: skip
+
+
+def judged(observation=SEEN, **changes):
+    (row,) = rows_of("run1", [replace(observation, **changes)])
+    return row
+
+
+def test_a_row_says_its_cell_field_by_field():
+    params = {p.name: p.default for p in CATALOGUE["incline"].parameters} | {"ratio": 0.99}
+    assert judged() == Row(
+        run="run1", engine="nameless", engine_version="1.2", profile="soft", scene="incline", dimension=3,
+        params=params, dt=1 / 240, iterations=7, check="incline/creep", metric="creep", unit="m/s", value=0.5,
+        truth=0.0, error=0.5, tolerance=CHECK.bound, because=CHECK.because, outcome="ok", physics="fail",
+        standing=None, reason="read late; the engine has no list of findings", state_hash="5ta7e", steps=480,
+        wall_time_s=0.25, source=CHECK.source, log="its words", initial_change=["box lowered"], slot=SLOT.as_dict(),
+        cells=["c0ffee"], floor=None, certificate="",
+    )  # fmt: skip
+
+
+def test_a_row_as_plain_data_has_every_field():
+    plain = judged().as_dict()
+    assert list(plain) == list(Row.__dataclass_fields__)
+    assert Row(**plain) == judged()
+
+
+def test_what_the_metric_says_stands_once_before_what_the_verdict_says():
+    assert judged(metrics={"creep": (0.0, "")}).reason == ""
+    assert judged(metrics={"creep": (0.0, "read late")}).reason == "read late"
+    assert judged(metrics={"creep": (0.5, "the engine has no list of findings")}).reason == (
+        "the engine has no list of findings"
+    )
+    assert judged(metrics={"creep": (None, "it never touched")}).reason == "the engine has no list of findings"
+    assert judged(metrics={}).value is None
+
+
+def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
+    monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
+    monkeypatch.setattr(rows, "findings_of", lambda engine: None)
+    said = "has no value, and is not listed as having none; it never touched"
+    assert judged(metrics={"creep": (None, "it never touched")}).reason == said
+    assert judged(metrics={}).reason.endswith("; it was not measured")
+
+
+@pytest.mark.parametrize("outcome", ["not_installed", "crashed", "timed_out", "invalid"])
+def test_a_cell_without_an_answer_has_its_reason_and_no_verdict(outcome):
+    row = judged(outcome=Outcome(outcome), reason="it is so", metrics={})
+    assert (row.outcome, row.physics, row.standing, row.reason) == (outcome, None, None, "it is so")
+
+
+def test_unsupported_and_diverged_cells_say_why():
+    assert judged(outcome=Outcome.UNSUPPORTED, reason="only planar", metrics={}).reason == "only planar"
+    row = judged(outcome=Outcome.DIVERGED, reason="not finite after 3 steps", metrics={})
+    assert (row.physics, row.reason) == ("fail", "not finite after 3 steps; the engine has no list of findings")
+
+
+def test_an_unsupported_cell_of_a_listed_engine_says_why_as_well(monkeypatch):
+    class Listed:
+        def unsupported_by(self, slot):
+            return None
+
+    monkeypatch.setattr(rows, "findings_of", lambda engine: Listed())
+    row = judged(outcome=Outcome.UNSUPPORTED, reason="only planar", metrics={})
+    assert (row.standing, row.reason) == ("new", "only planar")
+
+
+def test_a_missing_cell_is_shown_with_nothing_that_it_has_not():
+    (row,) = rows_of("run1", [], [SLOT])
+    said = "the plan has this cell, the run has no observation of it"
+    assert (row.run, row.outcome, row.engine_version, row.cells, row.reason) == ("run1", "missing", "", [""], said)
+    assert (row.value, row.steps, row.physics, row.standing, row.alarming) == (None, 0, None, None, True)
+    assert [row.outcome for row in rows_of("run1", [SEEN], [SLOT])] == ["ok"]
+    assert rows._missing(SLOT) == Observation(SLOT, "", 0, "", Outcome.MISSING, said)
+
+
+# ---- what moves by itself ------------------------------------------------------------------------------------------
+
+
+def moved(ulp, value, outcome=Outcome.OK):
+    return replace(SEEN, slot=replace(SLOT, ulp=ulp), outcome=outcome, metrics={"creep": (value, "")} if value else {})
+
+
+@pytest.mark.parametrize(
+    ("others", "floor"),
+    [
+        ([], None),
+        ([moved(1, 0.5)], 0.0),
+        ([moved(1, 0.625), moved(2, 0.25)], 0.25),
+        ([moved(1, 0.625), moved(2, None)], 0.125),
+        ([moved(1, None)], None),
+        ([moved(1, 0.625), moved(2, 9.0, Outcome.INVALID)], 0.125),
+        ([moved(1, math.inf), moved(2, 0.625)], 0.125),
+        ([replace(moved(1, 9.0), slot=replace(OWN, ulp=1))], None),  # of another cell
+    ],
+)
+def test_the_floor_of_a_value_is_the_largest_move_of_its_moved_starts(others, floor):
+    (row,) = rows_of("run1", [SEEN, *others])
+    assert row.floor == floor
+
+
+@pytest.mark.parametrize(
+    ("value", "other", "found"),
+    [(0.75, 0.5, 0.25), (None, 0.5, None), (0.5, None, None), (1e308, -1e308, None), (1e308, 1e308, 0.0)],
+)
+def test_a_difference_that_is_no_number_is_missing(value, other, found):
+    assert rows._difference(value, other) == found
+
+
+# ---- certificates --------------------------------------------------------------------------------------------------
+
+MOST = 0.1 * CHECK.bound
+
+
+@pytest.mark.parametrize(
+    ("certificate", "shown"),
+    [
+        ({}, ""),
+        ({"kernel": "blocks"}, ""),
+        ({"certified": True}, "light"),
+        ({"certified": True, "full": True}, "full"),
+        ({"certified": True, "full": True, "metric_errors": {"acceleration": 1e-9}}, "full"),
+        ({"certified": True, "full": True, "metric_errors": {"creep": 1.234e-9}}, "full, to 1.2e-09 m/s"),
+    ],
+)
+def test_a_row_says_which_certificate_ran_and_how_exact_its_value_is(certificate, shown):
+    assert judged(certificate=certificate).certificate == shown
+
+
+def test_a_unit_that_is_empty_leaves_no_space_behind():
+    observation = replace(SEEN, certificate={"certified": True, "full": True, "metric_errors": {"m": 0.25}})
+    assert rows._certificate(observation, replace(CHECK, metric="m", unit="")) == "full, to 0.25"
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome", "said"),
+    [
+        (0.0, "ok", ""),
+        (MOST, "ok", ""),
+        (math.nextafter(MOST, 1.0), "invalid", f"{MOST:.3g}"),
+        (0.25, "invalid", "0.25"),
+        (None, "invalid", "infinite"),
+    ],
+)
+def test_a_run_whose_step_errs_by_more_than_a_tenth_of_the_tolerance_is_no_truth(error, outcome, said):
+    row = judged(metrics={"creep": (0.0, "")}, certificate={"metric_errors": {"creep": error}})
+    wanted = f"certificate: error for the step {said}, at most {MOST:.3g}, a tenth of the tolerance" if said else ""
+    assert (row.outcome, row.reason) == (outcome, wanted)
+    assert row.physics == ("pass" if outcome == "ok" else None)
+    assert (row.value, row.cells) == (0.0, ["c0ffee"])  # what was measured stays to be seen
+
+
+def test_errors_of_other_metrics_and_of_cells_without_an_answer_cast_no_doubt():
+    sound = {"metrics": {"creep": (0.0, "")}}
+    assert judged(**sound, certificate={"metric_errors": {"acceleration": 9.0}}).outcome == "ok"
+    bad = {"metric_errors": {"creep": 9.0}}
+    row = judged(outcome=Outcome.CRASHED, reason="gone", metrics={}, certificate=bad)
+    assert (row.outcome, row.reason) == ("crashed", "gone")
+    observation = replace(SEEN, certificate=bad)
+    assert rows._doubt(observation, replace(CHECK, bound=None)) == ""  # shown and not judged
+
+
+# ---- laws and lists ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def law(monkeypatch):
+    """One law of the engine, that speaks of exactly this row; it predicts ``centre`` and remembers what it got."""
+    given = []
+
+    def predict(scene, dt, measure):
+        given.append((scene.name, scene.dimension, scene.params["ratio"], dt, measure))
+        return 0.5, 1e-3
+
+    own = Deviation("nameless", ("soft",), "incline", "creep", predict, "it is soft", "its manual", ("1.2",))
+    monkeypatch.setattr(rows, "covering", lambda *row: [own] if own.covers(*row) else [])
+    return given
+
+
+GIVEN = [("incline", 3, 0.99, 1 / 240, CATALOGUE["incline"].measure)]
+
+
+def test_a_law_explains_a_failing_row_at_the_settings_of_its_profile(law):
+    row = judged(slot=OWN)
+    assert row.standing == "explained" and "it is soft" in row.reason
+    assert law == GIVEN
+
+
+def test_laws_say_nothing_of_rows_that_pass_nor_at_iterations_asked_for(law):
+    judged(slot=OWN, metrics={"creep": (0.0, "")})
+    judged(slot=SLOT)
+    judged(slot=replace(OWN, profile="other"))
+    assert law == []
+
+
+def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
+    row = replace(judged(slot=OWN), standing="known")
+    law.clear()
+    ((_, centre, band),) = predictions_of(row)
+    assert (centre, band) == (0.5, 1e-3)
+    assert law == GIVEN
+    for other in (replace(row, physics="pass"), replace(row, iterations=7), replace(row, cells=["a", "b"]),
+                  replace(row, engine_version="1.3"), replace(row, engine="other"), replace(row, profile="hard"),
+                  replace(row, metric="acceleration")):  # fmt: skip
+        assert predictions_of(other) == []
+
+
+def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
+    def gone(*row):
+        raise EngineError("nameless: its laws cannot be had: no such file")
+
+    monkeypatch.setattr(rows, "covering", gone)
+    row = judged(slot=OWN)
+    said = "read late; the engine has no list of findings; nameless: its laws cannot be had: no such file"
+    assert (row.physics, row.reason) == ("fail", said)
+    assert predictions_of(row) == []
+
+
+@pytest.mark.parametrize("outcome", [Outcome.OK, Outcome.UNSUPPORTED])
+def test_wrong_findings_of_another_package_are_said_and_leave_no_standing(monkeypatch, outcome):
+    def wrong(engine):
+        raise FindingsError(f"{engine}: families.toml: no such field")
+
+    monkeypatch.setattr(rows, "findings_of", wrong)
+    row = judged(slot=OWN, outcome=outcome, reason="only planar" if outcome is Outcome.UNSUPPORTED else "")
+    assert (row.standing, row.alarming) == (None, False)
+    said = "read late; nameless: families.toml: no such field" if outcome is Outcome.OK else "read late; only planar"
+    assert row.reason == said
+    with pytest.raises(FindingsError):  # our own are a mistake of ours
+        judged(slot=replace(OWN, engine="mujoco"), outcome=outcome)
+
+
+# ---- what several cells say together -------------------------------------------------------------------------------
+
+
+def inclines(*slides):
+    """One observation per (ratio, slides) at the profile's own settings, then the row of their threshold."""
+    observations = []
+    for k, (ratio, does) in enumerate(slides):
+        slot = replace(OWN, params=(("ratio", ratio),))
+        metrics = {"creep": (0.0, ""), "acceleration": (9.0 if does else 0.0, "")}
+        observations.append(replace(SEEN, slot=slot, cell=f"cell{k}", metrics=metrics))
+    return rows_of("run1", observations)[-1]
+
+
+def test_a_study_is_a_row_of_its_cells_and_of_no_single_run():
+    row = inclines((0.9, False), (0.99, False), (1.01, True), (1.1, True))
+    assert (row.run, row.metric, row.unit, row.value, row.truth) == ("run1", "threshold", "1", 1.0, 1.0)
+    assert (row.physics, row.reason) == ("pass", "sticks at 0.99, slides at 1.01")
+    assert (row.cells, row.params) == (["cell0", "cell1", "cell2", "cell3"], {})
+    assert (row.state_hash, row.steps, row.wall_time_s, row.floor) == ("", 0, 0.0, None)
+    assert row.slot == replace(OWN, params=()).as_dict()
+    assert not predictions_of(replace(row, physics="fail"))
+
+
+def test_a_study_that_fails_says_what_was_found_and_how_it_stands():
+    row = inclines((0.9, True), (0.99, True), (1.01, True))
+    assert (row.physics, row.value) == ("fail", 0.9)
+    assert row.reason == "it never sticks; the engine has no list of findings"
+
+
+def test_a_study_without_a_value_says_why(monkeypatch):
+    result = next(iter(rows.results([replace(SEEN, slot=replace(OWN, params=(("ratio", r),))) for r in (0.9, 1.1)])))
+    monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
+    row = rows._study_row("run1", replace(result, value=None, reason="it never ran"))
+    assert row.reason == "has no value, and is not listed as having none; it never ran"
+
+
+# ---- as a table ----------------------------------------------------------------------------------------------------
+
+
+def test_a_table_has_a_column_per_field_and_per_parameter():
+    other = replace(judged(), scene="impact", params={"e": 0.8}, value=None)
+    table = frame([judged(), other])
+    fields = list(Row.__dataclass_fields__)
+    assert list(table.columns[: len(fields)]) == fields
+    assert list(table.index) == [0, 1] and len(table) == 2
+    assert table["param.ratio"].tolist()[0] == 0.99 and math.isnan(table["param.ratio"].tolist()[1])
+    assert table["param.e"].tolist()[1] == 0.8
+    assert table["metric"].tolist() == ["creep", "creep"]
+
+
+def test_no_rows_are_a_table_with_all_columns():
+    assert list(frame([]).columns) == list(Row.__dataclass_fields__)
