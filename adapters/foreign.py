@@ -265,6 +265,7 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         {str(name): _role(role) for name, role in data["roles"].items()},
         _colour(data["colour"]),
         _precision(data["precision"]),
+        bool(data["apart"]),
     )
 
 

@@ -48,6 +48,25 @@ def names() -> list[str]:
     return sorted(registered, key=lambda name: (not is_ours(registered[name]), *_place(registered[name]), name))
 
 
+def usual() -> list[str]:
+    """Names of the engines of a run that names none: all, but those set apart that are neither here nor required.
+
+    An engine of `all` that is missing keeps its rows, which say so.
+    """
+    wanted = _wanted()
+    return [name for name in names() if name in wanted or not _set_apart(name) or find(name).engine is not None]
+
+
+def _set_apart(name: str) -> bool:
+    told = facts(name) if is_ours(_entries()[name]) else None
+    return told is not None and told.apart
+
+
+def _wanted() -> list[str]:
+    """Names in `REQUIRED`."""
+    return os.environ.get(REQUIRED, "").replace(",", " ").split()
+
+
 def _place(entry: EntryPoint) -> tuple[bool, int]:
     """Where an engine is shown among ours, or among those of others, which nobody asks for it."""
     told = _facts(entry) if is_ours(entry) else None
@@ -167,8 +186,7 @@ def check_required() -> None:
     EngineError
         Naming those that cannot, with the reason of each.
     """
-    wanted = os.environ.get(REQUIRED, "").replace(",", " ").split()
-    absent = [f"{name} ({reason})" for name in wanted if (reason := _why_not(name))]
+    absent = [f"{name} ({reason})" for name in _wanted() if (reason := _why_not(name))]
     if absent:
         raise EngineError(f"{REQUIRED}: not installed: {', '.join(absent)}")
 

@@ -74,7 +74,7 @@ def own_words():
     for name in FOLDERS:
         facts = registry.facts(name)
         spoken = {name, facts.package, facts.package.partition("-")[0]} - {"contact-crosscheck", "contact"}
-        words[name] = spoken | set(registry.adapter(name).profiles) | {facts.colour}
+        words[name] = (spoken | set(registry.adapter(name).profiles) | {facts.colour}) - {""}
     return words
 
 
