@@ -91,11 +91,22 @@ def find(name: str) -> Found:
         hint = f", did you mean {close[0]!r}?" if close else f"; known: {', '.join(names())}"
         raise EngineError(f"engine: there is no engine called {name!r}{hint}")
     entry = registered[name]
-    return loaded(entry) if _here or is_ours(entry) else probe(entry)
+    return loaded(entry, brought_by(entry)) if _here or is_ours(entry) else probe(entry)
 
 
-def loaded(entry: EntryPoint) -> Found:
-    """Load an engine in this process; a broken one is a reason."""
+def brought_by(entry: EntryPoint) -> str:
+    """Name of the distribution that registers an engine; empty where nobody knows."""
+    return one_line(entry.dist.name, NAME) if entry.dist is not None else ""
+
+
+def loaded(entry: EntryPoint, distribution: str = "") -> Found:
+    """Load an engine in this process; a broken one is a reason.
+
+    Parameters
+    ----------
+    distribution
+        What registers it, for the reason why it cannot be loaded.
+    """
     engine: Engine | None = None
     facts: EngineFacts | None = None
     name = entry.name
@@ -112,10 +123,18 @@ def loaded(entry: EntryPoint) -> Found:
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
         return Found(name, engine, one_line(engine.version(), NAME), "", facts)
     except ImportError as error:
-        package = facts.package if facts else name
-        return Found(name, None, "", f"{one_line(error)}; pip install 'contact-crosscheck[{name}]' ({package})", facts)
+        return Found(name, None, "", f"{one_line(error)}; {_remedy(entry, facts, distribution)}", facts)
     except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
         return Found(name, None, "", said_by(error), facts)
+
+
+def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:
+    """What to install where an import fails: ours has extras, an engine of others its own package."""
+    if is_ours(entry):
+        return f"pip install 'contact-crosscheck[{entry.name}]' ({facts.package if facts else entry.name})"
+    if facts is not None:
+        return f"pip install {one_line(facts.package, NAME)}"
+    return f"it is an engine of {distribution or 'another distribution'}, which must be installed with all it needs"
 
 
 def adapter(name: str) -> Engine | None:
@@ -172,7 +191,7 @@ def load(name: str) -> Engine:
     """
     found = find(name)
     if found.engine is not None and not is_ours(_entries()[name]) and not _here:
-        found = loaded(_entries()[name])
+        found = loaded(_entries()[name], brought_by(_entries()[name]))
     if found.engine is None:
         raise EngineError(f"engine: {name} is not installed: {found.reason}")
     return found.engine
