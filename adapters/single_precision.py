@@ -44,10 +44,21 @@ Restitution = Callable[[float, float], float]
 
 @dataclass(frozen=True)
 class Method:
-    """What of an engine's method a blow depends on: its restitution, and its sweeps over contacts (0: exact)."""
+    """What of an engine's method a blow depends on.
+
+    Parameters
+    ----------
+    restitution
+        What it makes of a pair's coefficient.
+    sweeps
+        Over the contacts of a moment; 0: nothing is said of several at once.
+    unit
+        Round-off of its numbers, as a share.
+    """
 
     restitution: Restitution
     sweeps: int = 0
+    unit: float = UNIT
 
 
 @dataclass
@@ -69,19 +80,20 @@ def rounded_law(metric: str, method: Method) -> Law:
             return None
         motion, blows = found
         value = measure(scene, motion)[metric][0]
-        return None if value is None else (value, _band(scene, motion, blows, metric, value, measure))
+        share = ROUNDINGS * blows * method.unit
+        return None if value is None else (value, _band(scene, motion, share, metric, value, measure))
 
     return law
 
 
-def _band(scene: Scene, motion: Trajectory, blows: int, metric: str, value: float, measure: Measure) -> float:
+def _band(scene: Scene, motion: Trajectory, share: float, metric: str, value: float, measure: Measure) -> float:
     """Sum of what the roundings of each body's velocities and of each pair's impulses do to the metric."""
-    share, total = ROUNDINGS * blows * UNIT, 0.0
+    total = 0.0
     for rounded in _rounded(motion, share):
         other = measure(scene, rounded)[metric][0]
         total += math.inf if other is None else abs(other - value)
     # Places and times are rounded too, which shifts a blow but changes no velocity; a number itself is rounded once.
-    return total + share * abs(value) + UNIT
+    return total + share * (1.0 + abs(value))
 
 
 def _rounded(motion: Trajectory, share: float) -> Iterator[Trajectory]:
@@ -280,7 +292,7 @@ class _Flight:
         other, self.v = self.v, before
         forwards = self._swept(contacts, self.method.sweeps)
         # Not solved to round-off: what comes out depends on the order of the contacts, which nobody states.
-        return forwards if np.abs(other - self.v).max() <= UNIT and backwards else None
+        return forwards if np.abs(other - self.v).max() <= self.method.unit and backwards else None
 
     def _alone(self, c: _Contact, contacts: list[_Contact]) -> bool:
         """Whether no other contact of this moment has a free body of this one."""

@@ -37,7 +37,7 @@ class RapierSimulation(Simulation):
         import rapier3d
 
         self.scene, self.dt, self.settings = scene, dt, settings
-        self.world = rapier3d.PhysicsWorld(gravity=scene.gravity)
+        self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
         self._set(rapier3d, dt, settings)
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
         found = set(self.materials.values())
