@@ -70,7 +70,8 @@ def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
         if set(settings) & {"iterations", "tolerance"}:
             raise EngineError("iterations: dantzig pivots, it has neither iterations nor a tolerance")
         return dict(settings)
-    count, tolerance = settings.get("iterations"), settings.get("tolerance")
+    count: Any = settings.get("iterations")
+    tolerance: Any = settings.get("tolerance")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10**6:
         raise EngineError(f"iterations: {count!r} must be a whole number from 1 to 1000000")
     number = isinstance(tolerance, int | float) and not isinstance(tolerance, bool) and math.isfinite(tolerance)

@@ -7,6 +7,7 @@ points and gaps to where bodies stood before it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,8 @@ class RapierSimulation(Simulation):
     """One ``PhysicsWorld``; bodies in the scene's order."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import rapier3d
-
+        # Its type stubs would be looked at only where it is installed.
+        rapier3d: Any = import_module("rapier3d")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
         self._set(rapier3d, dt, settings)
