@@ -188,6 +188,8 @@ class EngineFacts:
     colour: str = ""
     #: Numbers that the engine computes with.
     precision: Precision = "double"
+    #: Whether an extra of its own alone installs it: a run that names no engine leaves it out where it is not there.
+    apart: bool = False
 
     @property
     def epsilon(self) -> float:

@@ -25,9 +25,12 @@ class Experiment:
     profile, scene, dimension, params, iterations, metric
         The row: it must FAIL as it is.
     off
-        Settings that switch the mechanism off: the row must PASS with them.
+        Settings that switch the mechanism off: the row must PASS with them, or come ``within``.
     idle
         Settings that another explanation would blame: with them the row must still FAIL.
+    within
+        How near the truth counts as a PASS with the mechanism off, in the metric's unit: round-off of an engine whose
+        numbers are coarser than what the check allows. A row that is this near as it is shows nothing.
     """
 
     family: str
@@ -40,6 +43,7 @@ class Experiment:
     dimension: int = 2
     iterations: int | None = None
     idle: Sequence[Mapping[str, Any]] = ()
+    within: float = 0.0
 
 
 @dataclass(frozen=True)

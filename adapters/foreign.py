@@ -111,8 +111,10 @@ def probe(entry: EntryPoint) -> Found:
 
 
 def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
+    from adapters.registry import brought_by
+
     child = Child(serve)
-    child.send(json.dumps([entry.name, entry.value, entry.group]).encode())
+    child.send(json.dumps([entry.name, entry.value, entry.group, brought_by(entry)]).encode())
     try:
         told: dict[str, Any] = json.loads(child.receive(PATIENCE))
     except Lost as lost:
@@ -127,8 +129,8 @@ def serve(connection: Connection) -> None:
     """Answer for one plugin until the other end closes; runs in the child."""
     from adapters.registry import loaded
 
-    name, value, group = json.loads(connection.recv_bytes())
-    found = loaded(EntryPoint(name, value, group))
+    name, value, group, distribution = json.loads(connection.recv_bytes())
+    found = loaded(EntryPoint(name, value, group), distribution)
     told: dict[str, Any] = {"version": found.version, "reason": found.reason}
     if found.facts is not None:
         told["facts"] = plain_facts(found.facts)
@@ -265,6 +267,7 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         {str(name): _role(role) for name, role in data["roles"].items()},
         _colour(data["colour"]),
         _precision(data["precision"]),
+        bool(data["apart"]),
     )
 
 

@@ -48,6 +48,25 @@ def names() -> list[str]:
     return sorted(registered, key=lambda name: (not is_ours(registered[name]), *_place(registered[name]), name))
 
 
+def usual() -> list[str]:
+    """Names of the engines of a run that names none: all, but those set apart that are neither here nor required.
+
+    An engine of `all` that is missing keeps its rows, which say so.
+    """
+    wanted = _wanted()
+    return [name for name in names() if name in wanted or not _set_apart(name) or find(name).engine is not None]
+
+
+def _set_apart(name: str) -> bool:
+    told = facts(name) if is_ours(_entries()[name]) else None
+    return told is not None and told.apart
+
+
+def _wanted() -> list[str]:
+    """Names in `REQUIRED`."""
+    return os.environ.get(REQUIRED, "").replace(",", " ").split()
+
+
 def _place(entry: EntryPoint) -> tuple[bool, int]:
     """Where an engine is shown among ours, or among those of others, which nobody asks for it."""
     told = _facts(entry) if is_ours(entry) else None
@@ -72,11 +91,22 @@ def find(name: str) -> Found:
         hint = f", did you mean {close[0]!r}?" if close else f"; known: {', '.join(names())}"
         raise EngineError(f"engine: there is no engine called {name!r}{hint}")
     entry = registered[name]
-    return loaded(entry) if _here or is_ours(entry) else probe(entry)
+    return loaded(entry, brought_by(entry)) if _here or is_ours(entry) else probe(entry)
 
 
-def loaded(entry: EntryPoint) -> Found:
-    """Load an engine in this process; a broken one is a reason."""
+def brought_by(entry: EntryPoint) -> str:
+    """Name of the distribution that registers an engine; empty where nobody knows."""
+    return one_line(entry.dist.name, NAME) if entry.dist is not None else ""
+
+
+def loaded(entry: EntryPoint, distribution: str = "") -> Found:
+    """Load an engine in this process; a broken one is a reason.
+
+    Parameters
+    ----------
+    distribution
+        What registers it, for the reason why it cannot be loaded.
+    """
     engine: Engine | None = None
     facts: EngineFacts | None = None
     name = entry.name
@@ -93,10 +123,18 @@ def loaded(entry: EntryPoint) -> Found:
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
         return Found(name, engine, one_line(engine.version(), NAME), "", facts)
     except ImportError as error:
-        package = facts.package if facts else name
-        return Found(name, None, "", f"{one_line(error)}; pip install 'contact-crosscheck[{name}]' ({package})", facts)
+        return Found(name, None, "", f"{one_line(error)}; {_remedy(entry, facts, distribution)}", facts)
     except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
         return Found(name, None, "", said_by(error), facts)
+
+
+def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:
+    """What to install where an import fails: ours has extras, an engine of others its own package."""
+    if is_ours(entry):
+        return f"pip install 'contact-crosscheck[{entry.name}]' ({facts.package if facts else entry.name})"
+    if facts is not None:
+        return f"pip install {one_line(facts.package, NAME)}"
+    return f"it is an engine of {distribution or 'another distribution'}, which must be installed with all it needs"
 
 
 def adapter(name: str) -> Engine | None:
@@ -153,7 +191,7 @@ def load(name: str) -> Engine:
     """
     found = find(name)
     if found.engine is not None and not is_ours(_entries()[name]) and not _here:
-        found = loaded(_entries()[name])
+        found = loaded(_entries()[name], brought_by(_entries()[name]))
     if found.engine is None:
         raise EngineError(f"engine: {name} is not installed: {found.reason}")
     return found.engine
@@ -167,8 +205,7 @@ def check_required() -> None:
     EngineError
         Naming those that cannot, with the reason of each.
     """
-    wanted = os.environ.get(REQUIRED, "").replace(",", " ").split()
-    absent = [f"{name} ({reason})" for name in wanted if (reason := _why_not(name))]
+    absent = [f"{name} ({reason})" for name in _wanted() if (reason := _why_not(name))]
     if absent:
         raise EngineError(f"{REQUIRED}: not installed: {', '.join(absent)}")
 

@@ -129,7 +129,7 @@ def doctor() -> dict[str, Any]:
     problems += broken() + engine_folder.problems()
     found = engines()
     for engine in found:
-        if engine["reason"]:
+        if engine["reason"] and engine["name"] in registry.usual():
             problems.append(f"{engine['name']}: {engine['reason']}")
         loaded = registry.find(engine["name"]).engine
         bad = loaded.facts.known_bad_versions.get(engine["version"]) if loaded else None

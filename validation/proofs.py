@@ -6,6 +6,7 @@ plausible it reads.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -38,25 +39,35 @@ class Proof:
     @property
     def holds(self) -> bool:
         """Whether the experiment shows what it says."""
-        return fails(self.before) and passes(self.after) and all(fails(each) for each in self.idle)
+        within = self.experiment.within
+        return (
+            fails(self.before, within) and passes(self.after, within) and all(fails(each, within) for each in self.idle)
+        )
 
     @property
     def why_not(self) -> str:
         """What did not come out; empty if it holds."""
-        said = [] if fails(self.before) else ["the row does not fail as it is"]
-        said += [] if passes(self.after) else ["it does not pass with the mechanism off"]
-        said += [f"it passes with {dict(each.slot.switched)}" for each in self.idle if not fails(each)]
+        within = self.experiment.within
+        said = [] if fails(self.before, within) else ["the row does not fail as it is"]
+        said += [] if passes(self.after, within) else ["it does not pass with the mechanism off"]
+        said += [f"it passes with {dict(each.slot.switched)}" for each in self.idle if not fails(each, within)]
         return "; ".join(said)
 
 
-def passes(found: Reading) -> bool:
-    """Measured, and within the tolerance."""
-    return found.value is not None and found.badness <= 1.0
+def passes(found: Reading, within: float = 0.0) -> bool:
+    """Measured, and within the tolerance, or within the round-off that an experiment allows."""
+    return found.value is not None and (found.badness <= 1.0 or _off(found) <= within)
 
 
-def fails(found: Reading) -> bool:
-    """Measured, and outside the tolerance: a cell without an answer proves nothing."""
-    return found.value is not None and found.badness > 1.0
+def fails(found: Reading, within: float = 0.0) -> bool:
+    """Measured, and outside of both: a cell without an answer proves nothing."""
+    return found.value is not None and found.badness > 1.0 and _off(found) > within
+
+
+def _off(found: Reading) -> float:
+    """Distance from the truth; infinite where there is none."""
+    truth = found.check.truth
+    return math.inf if truth is None or found.value is None else abs(found.value - truth)
 
 
 def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list[Proof]:

@@ -159,6 +159,11 @@ def _tilted(world: World, told: Contacts, size: float) -> Contacts:
     return replace(told, normal=np.column_stack([c * x - s * z, y, s * x + c * z]))
 
 
+def _tilted_once(world: World, told: Contacts, size: float) -> Contacts:
+    """The last normal alone: others beside it are right."""
+    return replace(told, normal=np.vstack([told.normal[:-1], _tilted(world, told, size).normal[-1:]]))
+
+
 def _backwards(world: World, told: Contacts, size: float) -> Contacts:
     return Contacts(told.b, told.a, told.point, told.normal, told.impulse, told.gap)
 
@@ -244,6 +249,8 @@ FAULTS: dict[str, Fault] = {
     ),
     "another mass held than told": Fault("readback", SHARES, "share", readback=_held),
     "nothing read back": Fault("readback", readback=lambda world, held, _: {}),
+    "one normal of several tilted": Fault("contacts", (0.1, 0.03, 0.01), "rad", contacts=_tilted_once),
+    "recoil felt too little": Fault("impulse", SHARES, "share", twist=_scaled(0, LINEAR, lambda world: 1.0)),
     "half a step of gravity too much": Fault(
         "free_fall", COARSE, "steps", pose=_at(ALL, 2, lambda world: -0.5 * 9.81 * world.dt * world.steps * world.dt)
     ),

@@ -32,7 +32,7 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
     """
     found: dict[str, list[Experiment]] = {}
     families: list[str] = []
-    for engine in engines or registry.names():
+    for engine in engines or registry.usual():
         known = findings_of(engine)
         families += list(known.families) if known else []
         wanted = [e for e in experiments_of(engine) if reason in ("all", e.family)]

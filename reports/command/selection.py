@@ -72,7 +72,7 @@ def request_from(options: dict[str, Any]) -> Request:
     dimensions = list(options["dim"])
     return Request(
         scenes=_scene_names(options["scenes"]),
-        engines=list(options["engine"]) or registry.names(),
+        engines=list(options["engine"]) or registry.usual(),
         profiles=list(options["profile"]),
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],

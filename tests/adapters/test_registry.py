@@ -104,7 +104,7 @@ def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
         ("no_module", "tests_plugin_nowhere"),
         ("no_class", "Nowhere"),
         ("syntax", "SyntaxError"),
-        ("two_lines", "two; pip install"),
+        ("two_lines", "two; it is an engine of another distribution"),
     ],
 )
 def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: None, name: str, reason: str) -> None:
@@ -116,9 +116,49 @@ def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: N
     assert registry.find("healthy").engine is not None
 
 
-def test_a_missing_package_comes_with_its_pip_line(plugins: None) -> None:
+def test_a_missing_package_of_others_comes_with_its_own_pip_line_and_no_extra_of_ours(plugins: None) -> None:
     reason = registry.find("missing_package").reason
-    assert reason.endswith("pip install 'contact-crosscheck[missing_package]' (healthy-package)")
+    assert reason.endswith("; pip install healthy-package") and "contact-crosscheck" not in reason
+
+
+def test_the_distribution_of_an_engine_that_cannot_be_imported_at_all_is_named(tmp_path, monkeypatch):
+    (tmp_path / "hollow.py").write_text("import a_package_that_is_not_there")
+    info = tmp_path / "hollow_adapter-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hollow-adapter\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\nhollow = hollow:Engine\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    registry.find.cache_clear()
+    reason = registry.find("hollow").reason
+    assert "a_package_that_is_not_there" in reason and "it is an engine of hollow-adapter" in reason
+    registry.find.cache_clear()
+
+
+def test_a_missing_engine_of_ours_comes_with_our_extra(monkeypatch) -> None:
+    name = registry.names()[1]
+    adapter = type(registry.adapter(name))
+
+    def missing(self):
+        raise ImportError("No module named 'it'")
+
+    monkeypatch.setattr(adapter, "version", missing)
+    registry.find.cache_clear()
+    reason = registry.find(name).reason
+    assert f"pip install 'contact-crosscheck[{name}]'" in reason and registry.facts(name).package in reason
+    registry.find.cache_clear()
+
+
+def test_an_engine_set_apart_is_left_out_of_a_run_that_names_none_unless_it_is_there_or_required(monkeypatch):
+    apart = [name for name in registry.names() if registry.facts(name).apart]
+    usual = [name for name in registry.names() if name not in apart]
+    assert apart and "chipmunk" in usual
+    monkeypatch.delenv(registry.REQUIRED, raising=False)
+    monkeypatch.setattr(registry, "find", lambda name: registry.Found(name, None, "", "not here"))
+    assert registry.usual() == usual
+    monkeypatch.setenv(registry.REQUIRED, apart[0])
+    assert registry.usual() == [name for name in registry.names() if name in (*usual, apart[0])]
+    monkeypatch.setattr(registry, "find", lambda name: registry.Found(name, registry.adapter(name), "1"))
+    assert registry.usual() == registry.names()
 
 
 @pytest.mark.parametrize(("asked", "hint"), [("helthy", "did you mean 'healthy'"), ("qqq", "known: broken_init")])

@@ -9,7 +9,8 @@ from adapters import registry
 from adapters.engine import ROLES
 from reports.palette import MARKS, OTHERS, PAPER, colours_of, dash_of, shape_of
 
-ENGINES = colours_of(registry.names())
+#: Engines that are set apart bring no colour: the band between both papers holds no more than five that stay apart.
+ENGINES = {name: colour for name, colour in colours_of(registry.names()).items() if not registry.facts(name).apart}
 
 #: Machado, Oliveira and Fernandes, IEEE TVCG 15 (2009) 1291: full protanopia, deuteranopia, tritanopia, in linear RGB.
 VISION = {
@@ -61,10 +62,15 @@ def test_an_engine_keeps_its_colour_in_any_company():
 
 
 def test_profiles_of_one_engine_differ_in_shape_and_dash():
-    for engine in ENGINES:
+    for engine in filter(registry.adapter, registry.names()):
         profiles = list(registry.adapter(engine).profiles)
         assert len({shape_of(p) for p in profiles}) == len({dash_of(p) for p in profiles}) == len(profiles)
     assert shape_of("of somebody") not in {shape for shape, _ in MARKS.values()}
+
+
+def test_an_engine_that_is_set_apart_brings_no_colour():
+    apart = [name for name in registry.names() if registry.facts(name).apart]
+    assert apart and not [name for name in apart if registry.facts(name).colour]
 
 
 def test_every_role_has_a_mark_and_every_engine_of_ours_a_colour_of_its_own():

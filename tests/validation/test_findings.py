@@ -70,7 +70,9 @@ def judged(slot, version="1.2", outcome=Outcome.OK, **metrics):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
     findings = files.findings_of(engine)
-    assert findings is not None
+    if findings is None:  # unlisted, which only an engine that is set apart may be
+        assert registry.facts(engine).apart
+        return
     for family in findings.families.values():
         assert len(family.reason) > 20 and family.source
         assert SpecifierSet(family.releases)
@@ -78,7 +80,8 @@ def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_member_is_a_row_that_the_quick_suite_states(engine):
-    for key in files.findings_of(engine).members:
+    findings = files.findings_of(engine)
+    for key in findings.members if findings else ():
         profile, scene, dimension, params, dt, iterations, metric = key
         numbers = dict(pair.split("=") for pair in params.split())
         given = tuple((name, float(value)) for name, value in numbers.items())

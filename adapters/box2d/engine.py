@@ -1,0 +1,142 @@
+"""Box2D 2.3 behind the plugin line: planar, sequential impulses, warm starting, and positions put right afterwards.
+
+    step:  detect  ->  v += (g + f/m) dt  ->  restitution from v  ->  warm start  ->  N sweeps over velocities
+           ->  x += v dt  ->  sweeps over positions (no velocities)  ->  sweep what moves against what does not
+
+It computes in single precision. Names in the sources are those of Box2D's own files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.box2d.profiles import PROFILES, checked
+from adapters.box2d.simulation import Box2DSimulation
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.probes import HALF_EXTENTS, LANDING_SPEED
+from adapters.scene import Scene
+
+
+@final
+class Box2DEngine(Engine):
+    """Planar engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="box2d",
+        title="Box2D 2.3",
+        package="Box2D",
+        dimensions=frozenset({2}),
+        scheme=Scheme("detect, forces, sample restitution, solve, position, correct positions, sweep", 1),
+        customary_dt=1.0 / 60.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        precision="single",
+        apart=True,
+        quirks=(
+            Quirk(
+                "polygons have a skin of 1 cm: boxes rest 1.5 cm above the ground",
+                "left alone in `default`, 0 in `tuned`",
+                "b2Settings.h, b2_polygonRadius",
+            ),
+            Quirk(
+                "nothing rebounds below 1 unit/s, and 5 mm of overlap are left alone; neither can be set",
+                "left alone in `default`; `tuned` chooses a finer unit of length",
+                "b2Settings.h, b2_velocityThreshold, b2_linearSlop",
+            ),
+            Quirk(
+                "what moves farther than 2 units or turns farther than 90 degrees in a step is cut",
+                "`tuned` chooses its unit by the scene's speeds",
+                "b2Settings.h, b2_maxTranslation, b2_maxRotation",
+            ),
+            Quirk(
+                "restitution looks at the velocity after this step's gravity: e g dt too much",
+                "left alone",
+                "b2Island.cpp, Solve: velocities are integrated before constraints are initialised",
+            ),
+            Quirk(
+                "friction of a pair is the root of a product, restitution the larger of two",
+                "where pairs differ, each contact gets its own numbers when it begins",
+                "b2Contact.h, b2MixFriction, b2MixRestitution",
+            ),
+            Quirk(
+                "impulses of bodies that were swept are kept in no manifold",
+                "a listener adds up what the solver reports",
+                "b2Island.cpp, SolveTOI: impulses are not stored for warm starting",
+            ),
+            Quirk(
+                "bodies sleep, also where the world was made with doSleep=False",
+                "every body is made with allowSleep=False",
+                "measured with 2.3.10",
+            ),
+            Quirk(
+                "an edge keeps boxes 2 cm away whatever their skin",
+                "the ground is a polygon, in a frame of its own",
+                "b2CollideEdge.cpp, m_radius",
+            ),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of the installed distribution."""
+        import Box2D
+
+        return str(Box2D.__version__)
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse numbers that single precision cannot hold."""
+        for body in scene.bodies:
+            assert isinstance(body.inertia, float | int)
+            for name, value in (("mass", body.mass), ("inertia", body.inertia)):
+                if body.motion == "free" and not 1e-30 <= value <= 1e30:
+                    return f"{body.name}.{name}: {value:g} has no place in single precision"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a spatial scene, a scene that `refuses` names, a bad step or setting.
+        """
+        if scene.dimension != 2:
+            raise EngineError("dimension: box2d is planar and cannot run a spatial scene")
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        chosen = checked(settings)
+        reason = self.refuses(scene, "")
+        if reason:
+            raise EngineError(reason)
+        return Box2DSimulation(scene, dt, chosen)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """The skin around what is landed on and what lands."""
+        settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
+        skin = settings["skin"] / settings["units_per_metre"]
+        declared = {}
+        if skin > 0.0:
+            step = (1.0 + needs.restitution) * LANDING_SPEED * dt
+            most = 2.0 * skin
+            because = "skins around the ground and the box, and one step of motion"
+            declared["size"] = Declared(
+                1.0 + 0.5 * most / HALF_EXTENTS[0], (0.5 * most + step) / HALF_EXTENTS[0], because
+            )
+        return declared
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: arguments of a step, attributes of the world and of shapes, and the unit to choose."""
+        lines = [
+            f"# world: your b2World, stepped with world.Step({dt:.9g}, {settings['iterations']}, "
+            f"{settings['position_iterations']})"
+        ]
+        if "continuous" in names:
+            lines.append(f"world.continuousPhysics = {settings['continuous']}")
+        if "skin" in names:
+            lines.append(f"shape.radius = {settings['skin']:g}  # of every polygon, before CreateFixture")
+        if "units_per_metre" in names:
+            lines.append(f"# and measure in units of 1/{settings['units_per_metre']:g} m: lengths, gravity, forces")
+        return "\n".join(lines)

@@ -1,0 +1,120 @@
+"""Experiments on Box2D 2.3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Experiment
+
+CANDIDATES: dict[str, tuple[Any, ...]] = {
+    "iterations": (8, 100, 1000),
+    "position_iterations": (3, 10),
+    "skin": (0.0, 1e-4, 0.01),
+    "units_per_metre": (1.0, 4.0, 16.0, 64.0),
+    "continuous": (False, True),
+}
+
+_BARE: dict[str, Any] = {"skin": 0.0}
+_THIN: dict[str, Any] = {"skin": 1e-4}
+#: Ten roundings of a single number of order 1.
+_SINGLE = 1e-6
+
+EXPERIMENTS: tuple[Experiment, ...] = tuple(
+    Experiment(
+        f"{scene.replace('_', '-')}-skin",
+        "without a skin the row passes; ten times the sweeps do not help",
+        "default",
+        scene,
+        metric,
+        _BARE,
+        params,
+        idle=({"iterations": 80},),
+    )
+    for scene, metric, params in (
+        ("stack", "penetration", {"n": 2.0}),
+        ("v_groove", "displacement", {}),
+        ("slide", "hop", {}),
+        ("slide_to_roll", "final_speed", {}),
+        ("roll_incline", "turning", {"ratio": 1.5}),
+        ("pivot", "edge_moved", {}),
+        ("rocking_block", "slid", {"aspect": 0.25, "height": 10.0}),
+        ("rocker", "amplitude", {}),
+    )
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        family,
+        f"with a skin of a hundredth and {sweeps} sweeps it passes; either alone does not help",
+        "default",
+        scene,
+        metric,
+        {**_THIN, "iterations": sweeps},
+        params,
+        idle=(_THIN, {"iterations": sweeps}),
+    )
+    for family, scene, metric, params, sweeps in (
+        ("stack-skin", "stack", "penetration", {"n": 10.0}, 100),
+        ("overhang-skin", "overhang", "penetration", {"margin": 0.02}, 100),
+        ("heavy-on-light-skin-and-sweeps", "heavy_on_light", "penetration", {"ratio": 100.0}, 1000),
+        ("heavy-on-light-skin-and-sweeps", "heavy_on_light", "drift", {"ratio": 10000.0}, 30000),
+    )
+)
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "stack-few-sweeps",
+        "with 100 sweeps the column stands",
+        "tuned",
+        "stack",
+        "penetration",
+        {"iterations": 100},
+        {"n": 10.0},
+        iterations=count,
+        idle=({"units_per_metre": 64.0},),
+    )
+    for count in (1, 4)
+)
+
+EXPERIMENTS += (
+    Experiment(
+        "cradle-few-sweeps",
+        "with 100 sweeps the touching balls keep their energy to round-off",
+        "default",
+        "cradle",
+        "energy_defect",
+        {"iterations": 100},
+        {"n": 3.0, "apart": 0.0},
+        idle=({"position_iterations": 30}, {"units_per_metre": 64.0}),
+        within=_SINGLE,
+    ),
+    *(
+        Experiment(
+            "galperin-threshold",
+            "in a finer unit the threshold is 1/64 m/s, and every blow rebounds",
+            "default",
+            "galperin",
+            metric,
+            {"units_per_metre": 64.0},
+            {"ratio": 16.0},
+            idle=({"iterations": 1000}, {"continuous": False}),
+            within=_SINGLE,
+        )
+        for metric in ("small_speed", "large_speed", "energy_defect")
+    ),
+    *(
+        Experiment(
+            "bounce-gravity-in-rebound",
+            "with restitution of the velocity before gravity, no sweeping and a finer unit it passes; without the "
+            "first it does not",
+            profile,
+            "bounce",
+            metric,
+            {"early_restitution": True, "continuous": False, "units_per_metre": 64.0},
+            params,
+            idle=({"continuous": False, "units_per_metre": 64.0}, {"iterations": 1000}, {"position_iterations": 30}),
+        )
+        for profile in ("default", "tuned")
+        for metric, params in (("rest_time", {"e": 0.95}), ("apex[5]", {"e": 1.0}))
+    ),
+)

@@ -1,0 +1,77 @@
+"""What Box2D does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.box2d.profiles import PROFILES
+from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
+from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.needs import needs
+from adapters.scene import Scene
+from adapters.single_precision import Method, rounded_law
+
+#: Metrics of blows in free space, by scene.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost", "momentum_defect"),
+    "flat_box": ("rebound_ratio", "impulse"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "oblique": ("rebound_ratio", "forward_speed", "spin_speed"),
+    "pair_matrix": tuple(f"{name}[{k}]" for name in ("restitution", "friction") for k in range(1, 5)),
+}
+
+
+def blow_law(profile: str, metric: str) -> Law:
+    """Blows in single precision, and none that rebounds at up to one unit a second."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+        return _law(metric, chosen["units_per_metre"], chosen["iterations"])(scene, dt, measure)
+
+    return law
+
+
+def _law(metric: str, units: float, sweeps: int) -> Law:
+    return rounded_law(metric, _method(units, sweeps))
+
+
+def _method(units: float, sweeps: int) -> Method:
+    threshold = VELOCITY_THRESHOLD / units
+    return Method(_Threshold(threshold), sweeps)
+
+
+class _Threshold:
+    """Restitution above a speed of approach; equal for equal thresholds, so that motions are computed once."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = speed
+
+    def __call__(self, e: float, speed: float) -> float:
+        return e if speed > self.speed else 0.0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Threshold) and other.speed == self.speed
+
+    def __hash__(self) -> int:
+        return hash(self.speed)
+
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "box2d",
+        (profile,),
+        scene,
+        exactly(metric),
+        blow_law(profile, metric),
+        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to one unit a second",
+        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_precision.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for scene, metrics in BLOWS.items()
+    for metric in metrics
+)

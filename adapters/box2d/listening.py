@@ -1,0 +1,111 @@
+"""What Box2D tells of contacts while it makes a step: geometry before it is solved, impulses after.
+
+A manifold keeps the impulses of the step itself only, not those of bodies that were swept and met something within it.
+Both are reported to a listener, and a step's impulses are the sum of what it hears.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import Box2D
+
+#: Row of a contact: bodies, point, normal, impulse on the second one, gap.
+Row = tuple[int, int, tuple[float, float], tuple[float, float], tuple[float, float], float]
+
+
+class Listener(Box2D.b2ContactListener):
+    """Sets the materials of pairs when they meet, and keeps the contacts of a step while it is told to.
+
+    Parameters
+    ----------
+    radii
+        Skin or radius of each body's shape [length].
+    materials
+        Restitution and friction by pair of bodies; a pair that is missing keeps what Box2D mixes.
+    early
+        Gravity of a step [length/s], if restitution is to be sampled before it.
+    """
+
+    def __init__(
+        self,
+        radii: list[float],
+        materials: Mapping[tuple[int, int], tuple[float, float]],
+        early: tuple[float, float] | None,
+    ) -> None:
+        super().__init__()
+        self.radii, self.materials, self.early = radii, materials, early
+        self.hears = False
+        self.geometry: dict[tuple[int, int], tuple[Any, list[Any], list[float]]] = {}
+        self.rows: list[Row] = []
+        self.failure: Exception | None = None
+
+    def BeginContact(self, contact: Any) -> None:
+        """Give the pair its own material: what Box2D mixes of two bodies' numbers is overwritten."""
+        a, b = contact.fixtureA.body.userData, contact.fixtureB.body.userData
+        material = self.materials.get((min(a, b), max(a, b)))
+        if material is not None:
+            contact.restitution, contact.friction = material
+
+    def PreSolve(self, contact: Any, oldManifold: Any) -> None:
+        """Keep where the contact is: the solver works with these normals, and the bodies move afterwards."""
+        try:
+            if self.early is not None:
+                self._correct(contact, self.early)
+            if self.hears:
+                self._keep(contact)
+        except Exception as error:  # the binding prints and swallows what a callback raises
+            self.failure = error
+
+    def PostSolve(self, contact: Any, impulse: Any) -> None:
+        """Add what the solver found."""
+        if self.hears:
+            try:
+                self._add(contact, impulse)
+            except Exception as error:
+                self.failure = error
+
+    def _keep(self, contact: Any) -> None:
+        a, b = contact.fixtureA.body, contact.fixtureB.body
+        world, manifold = contact.worldManifold, contact.manifold
+        normal = world.normal
+        points = [tuple(point) for point in world.points[: manifold.pointCount]]
+        self.geometry[a.userData, b.userData] = (tuple(normal), points, self._gaps(a, b, manifold, normal))
+
+    def _correct(self, contact: Any, kick: tuple[float, float]) -> None:
+        """Lower the restitution so that the rebound is that of the velocity before this step's gravity."""
+        a, b = contact.fixtureA.body, contact.fixtureB.body
+        world = contact.worldManifold
+        n, p = world.normal, world.points[0]
+        va, vb = a.GetLinearVelocityFromWorldPoint(p), b.GetLinearVelocityFromWorldPoint(p)
+        before = (vb[0] - va[0]) * n[0] + (vb[1] - va[1]) * n[1]
+        falls = (b.type == Box2D.b2_dynamicBody) - (a.type == Box2D.b2_dynamicBody)
+        after = before + falls * (kick[0] * n[0] + kick[1] * n[1])
+        asked, _ = self.materials[min(a.userData, b.userData), max(a.userData, b.userData)]
+        contact.restitution = max(0.0, asked * before / after) if after < 0.0 else asked
+
+    def _gaps(self, a: Any, b: Any, manifold: Any, normal: Any) -> list[float]:
+        """Gap of each point as the solver of positions sees it [b2PositionSolverManifold::Initialize]."""
+        skins = self.radii[a.userData] + self.radii[b.userData]
+        kind, gaps = manifold.type_, []
+        for point in manifold.points[: manifold.pointCount]:
+            if kind == 0:  # two circles
+                p, q = a.GetWorldPoint(manifold.localPoint), b.GetWorldPoint(point.localPoint)
+                gaps.append(math.hypot(q[0] - p[0], q[1] - p[1]) - skins)
+                continue
+            face, other = (a, b) if kind == 1 else (b, a)
+            sign = 1.0 if kind == 1 else -1.0
+            p, q = face.GetWorldPoint(manifold.localPoint), other.GetWorldPoint(point.localPoint)
+            gaps.append(sign * ((q[0] - p[0]) * normal[0] + (q[1] - p[1]) * normal[1]) - skins)
+        return gaps
+
+    def _add(self, contact: Any, impulse: Any) -> None:
+        a, b = contact.fixtureA.body.userData, contact.fixtureB.body.userData
+        (nx, ny), points, gaps = self.geometry[a, b]
+        # Of two points that are nearly one the solver drops the second, which then has no impulse.
+        solved = zip(points, gaps, impulse.normalImpulses, impulse.tangentImpulses, strict=False)
+        for point, gap, jn, jt in solved:
+            # The tangent is the normal turned by -90 degrees [b2Cross(normal, 1)].
+            self.rows.append((a, b, point, (nx, ny), (jn * nx + jt * ny, jn * ny - jt * nx), gap))

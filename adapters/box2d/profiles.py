@@ -1,0 +1,124 @@
+"""Profiles of Box2D 2.3: settings with their reasons.
+
+default   as shipped
+tuned     best stock settings for what a scene needs
+
+Most numbers of Box2D are lengths that are compiled in. What a user can choose instead is the unit: its manual says to
+scale a world whose bodies are not between 0.1 and 10 units large. ``units_per_metre`` is that choice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters.box2d.shipped import (
+    MAX_TRANSLATION,
+    POLYGON_RADIUS,
+    POSITION_ITERATIONS,
+    VELOCITY_ITERATIONS,
+)
+from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.needs import Needs
+from adapters.probes import slide_speed
+
+SETTING_NAMES = ("iterations", "position_iterations", "continuous", "skin", "units_per_metre", "early_restitution")
+#: Largest unit that `tuned` chooses: slop and threshold are then 0.08 mm and 16 mm/s.
+FINEST = 64.0
+#: Skin of boxes that rest, in `tuned` [length].
+THIN = 1e-4
+
+
+def default_profile(needs: Needs, dt: float) -> list[Setting]:
+    """As shipped, in metres."""
+    said = "as shipped"
+    return [
+        Setting("iterations", VELOCITY_ITERATIONS, f"{said}: sweeps over velocities", "manual, Simulating the World"),
+        Setting("position_iterations", POSITION_ITERATIONS, f"{said}", "manual, Simulating the World"),
+        Setting("continuous", True, f"{said}: bodies are swept against what does not move", "b2World.h"),
+        Setting("skin", POLYGON_RADIUS, f"{said}: around each polygon", "b2Settings.h, b2_polygonRadius"),
+        Setting("units_per_metre", 1.0, "the manual's MKS units", "manual, Units"),
+        Setting("early_restitution", False, f"{said}: sampled after this step's gravity", "b2Island.cpp, Solve"),
+    ]
+
+
+def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Best stock settings for what the scene needs."""
+    return [
+        Setting(
+            "iterations",
+            _sweeps(needs.mass_ratio),
+            "100 hold a column of twenty; a load needs as many as it is times heavier than what carries it",
+            "measured: columns and unequal masses",
+        ),
+        Setting("position_iterations", 10, "as many as its testbed allows by default", "measured"),
+        Setting(
+            "continuous",
+            True,
+            "as shipped: without it a fast body passes through a thin one",
+            "b2World.h, SetContinuousPhysics",
+        ),
+        Setting(
+            "skin",
+            THIN if needs.regime == "rest" else 0.0,
+            "a hundredth of the shipped one: faces that touch at the start stay in touch whatever their rounding"
+            if needs.regime == "rest"
+            else "boxes are as large as they are",
+            "b2PolygonShape, m_radius",
+        ),
+        Setting("units_per_metre", units(needs, dt), _WHY_UNITS, "manual, Units; b2Settings.h"),
+        Setting("early_restitution", False, "as shipped: a user would have to correct it in PreSolve", "b2Island.cpp"),
+    ]
+
+
+def _sweeps(ratio: float) -> int:
+    return 100 if ratio < 100.0 else 1000 if ratio < 1000.0 else 10000
+
+
+_WHY_UNITS = (
+    "slop and threshold of restitution are lengths that are compiled in, and small in a finer unit; "
+    "what moves farther than 2 units in a step is cut, so that speed sets a limit"
+)
+
+
+def units(needs: Needs, dt: float) -> float:
+    """Largest power of two, at most `FINEST` and at least 1, in which the fastest body of a scene is not cut."""
+    # A rebound can double a speed, and blows can give the energy of a heavy body to a light one.
+    gain = max(2.0, math.sqrt(needs.mass_ratio)) if needs.regime == "impact" else 2.0
+    # Receipts are measured with these settings too, on a box that slides so fast.
+    fastest = dt * max(gain * needs.top_speed, slide_speed(needs.friction))
+    return min(FINEST, max(1.0, 2.0 ** math.floor(math.log2(MAX_TRANSLATION / fastest))))
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
+
+
+def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take.
+
+    Raises
+    ------
+    EngineError
+        Naming the first setting that is unknown, missing or of the wrong kind.
+    """
+    for name in settings:
+        if name not in SETTING_NAMES:
+            raise EngineError(f"{name}: box2d has no such setting, it has {', '.join(SETTING_NAMES)}")
+    for name in SETTING_NAMES:
+        if name not in settings:
+            raise EngineError(f"{name}: this setting is missing")
+    for name in ("iterations", "position_iterations"):
+        value = settings[name]
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value < 2**31:
+            raise EngineError(f"{name}: {value!r} must be a whole number from 1 to 2147483647")
+    for name in ("continuous", "early_restitution"):
+        if not isinstance(settings[name], bool):
+            raise EngineError(f"{name}: {settings[name]!r} must be true or false")
+    for name, least in (("skin", 0.0), ("units_per_metre", 1e-6)):
+        value = settings[name]
+        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or not least <= value <= 1e6:
+            raise EngineError(f"{name}: {value!r} must be a number from {least:g} to 1e6")
+    return dict(settings)

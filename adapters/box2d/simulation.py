@@ -1,0 +1,196 @@
+"""One ``b2World`` and what is read from it.
+
+Velocities first, then positions: poses and impulses read after a step belong together, points and gaps to the places
+where bodies stood before it. Lengths are handed over in the units of the profile, and are metres again when read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.needs import needs
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+
+#: Least half width of the ground [m], and how far beyond all that moves it reaches.
+GROUND = 100.0
+
+
+class Box2DSimulation(Simulation):
+    """One ``b2World``; bodies in the scene's order."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import Box2D
+
+        from adapters.box2d.listening import Listener
+
+        self.scene, self.dt, self.settings = scene, dt, settings
+        self.units = float(settings["units_per_metre"])
+        gravity = self._vector(scene.gravity)
+        self.world = Box2D.b2World(gravity=gravity)
+        self.world.continuousPhysics = settings["continuous"]
+        self.reach = reach(scene)
+        self.single = _single(scene)
+        self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
+        early = (gravity[0] * dt, gravity[1] * dt) if settings["early_restitution"] else None
+        materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
+        radii = [float(body.fixtures[0].shape.radius) for body in self.bodies]
+        needed = {} if self.single and early is None else materials
+        self.listener = self.world.contactListener = Listener(radii, needed, early)
+        self.loads = [
+            (self.bodies[i], self._vector(body.force), body.torque[0] * self.units**2)
+            for i, body in enumerate(scene.bodies)
+            if body.motion == "free" and (any(body.force) or any(body.torque))
+        ]
+
+    def _vector(self, v: tuple[float, ...]) -> tuple[float, float]:
+        return (v[0] * self.units, v[1] * self.units)
+
+    def _made(self, index: int, asked: Body) -> Any:
+        import Box2D
+
+        make = {
+            "free": self.world.CreateDynamicBody,
+            "fixed": self.world.CreateStaticBody,
+            "prescribed": self.world.CreateKinematicBody,
+        }[asked.motion]
+        if isinstance(asked.shape, HalfSpace):
+            (nx, ny), offset = asked.shape.normal, asked.shape.offset
+            turn = 0.0 if 0.0 in (nx, ny) else math.atan2(-nx, ny)
+            body = make(position=self._vector((offset * nx, offset * ny)), angle=turn)
+        else:
+            x, y, theta = asked.pose
+            body = make(position=self._vector((x, y)), angle=theta, allowSleep=False)
+        body.userData = index
+        restitution, friction = self.single or (0.0, 0.0)
+        body.CreateFixture(
+            Box2D.b2FixtureDef(shape=self._shape(asked), density=1.0, restitution=restitution, friction=friction)
+        )
+        if asked.motion == "free":
+            assert isinstance(asked.inertia, float | int)
+            inertia = asked.inertia * self.units**2
+            body.massData = Box2D.b2MassData(mass=asked.mass, I=inertia, center=(0.0, 0.0))
+        if asked.motion != "fixed":
+            vx, vy, omega = asked.twist
+            body.linearVelocity, body.angularVelocity = self._vector((vx, vy)), omega
+        return body
+
+    def _shape(self, asked: Body) -> Any:
+        import Box2D
+
+        shape = asked.shape
+        if isinstance(shape, Disc):
+            return Box2D.b2CircleShape(radius=shape.radius * self.units)
+        if isinstance(shape, Box):
+            made = Box2D.b2PolygonShape(box=self._vector(shape.half_extents))
+        else:
+            assert isinstance(shape, HalfSpace)
+            # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision;
+            # and without a turn along an axis of the world, of which a single angle would miss by 4e-8.
+            wide = self.reach * self.units
+            nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
+            made = Box2D.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
+        made.radius = self.settings["skin"]
+        return made
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`; only the last step is listened to, since only its contacts are ever read."""
+        step, dt, listener = self.world.Step, self.dt, self.listener
+        counts = self.settings["iterations"], self.settings["position_iterations"]
+        listener.rows, listener.hears = [], False
+        for k in range(steps):
+            listener.hears = k == steps - 1
+            for body, force, torque in self.loads:
+                body.ApplyForceToCenter(force, True)
+                body.ApplyTorque(torque, True)
+            step(dt, *counts)
+        if listener.failure is not None:
+            raise EngineError(f"contacts: {type(listener.failure).__name__}: {listener.failure}")
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`; a half-space's own pose is the origin, wherever its polygon stands."""
+        per_metre = 1.0 / self.units
+        rows = [(p[0] * per_metre, p[1] * per_metre, body.angle) for body in self.bodies for p in (body.position,)]
+        for row, body in enumerate(self.scene.bodies):
+            if isinstance(body.shape, HalfSpace):
+                rows[row] = (0.0, 0.0, 0.0)
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        per_metre = 1.0 / self.units
+        return np.array(
+            [
+                (v[0] * per_metre, v[1] * per_metre, body.angularVelocity)
+                for body in self.bodies
+                for v in (body.linearVelocity,)
+            ],
+            float,
+        )
+
+    def contacts(self) -> Contacts:
+        """Up to two points per pair; a pair that is swept into touch within the step has them twice."""
+        per_metre = 1.0 / self.units
+        rows: list[tuple[int, int, Any, Any, Any, float]] = [
+            (a, b, np.multiply(point, per_metre), normal, np.multiply(impulse, per_metre), gap * per_metre)
+            for a, b, point, normal, impulse, gap in self.listener.rows
+        ]
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 2)
+
+    def readback(self) -> dict[str, Any]:
+        """What the world, its bodies and shapes hold."""
+        world, units = self.world, self.units
+        held: dict[str, Any] = {
+            "dt": self.dt,
+            "gravity": [g / units for g in world.gravity],
+            "continuous": bool(world.continuousPhysics),
+            "warm_starting": bool(world.warmStarting),
+            "sub_stepping": bool(world.subStepping),
+            "bodies": {
+                asked.name: {
+                    "mass": body.mass,
+                    "inertia": body.inertia / units**2,
+                    "size": self._size(body.fixtures[0].shape),
+                    "may_sleep": bool(body.sleepingAllowed),
+                    "damping": [body.linearDamping, body.angularDamping],
+                }
+                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
+                if asked.motion == "free"
+            },
+        }
+        if self.single:
+            fixtures = [body.fixtures[0] for body in self.bodies]
+            held["pairs"] = {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": max(fixtures[i].restitution, fixtures[j].restitution),
+                    "friction": math.sqrt(fixtures[i].friction * fixtures[j].friction),
+                }
+                for i, j, _ in self.scene.contact_pairs()
+            }
+        return held
+
+    def _size(self, shape: Any) -> list[float]:
+        """Radius, or half extents without the skin [m]."""
+        if hasattr(shape, "vertices"):
+            return [float(x) / self.units for x in np.max(np.abs(shape.vertices), axis=0)]
+        return [float(shape.radius) / self.units]
+
+
+def _single(scene: Scene) -> tuple[float, float] | None:
+    """Restitution and friction, if they are the same for all pairs: what Box2D mixes of equal numbers is the number."""
+    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
+    return found.pop() if len(found) == 1 else None
+
+
+def reach(scene: Scene) -> float:
+    """Half width and depth of the ground [m]: farther than anything of the scene gets."""
+    wanted, farthest = needs(scene), 0.0
+    for body in scene.bodies:
+        if not isinstance(body.shape, HalfSpace):
+            farthest = max(farthest, math.hypot(*body.pose[:2]))
+    return max(GROUND, 2.0 * (farthest + wanted.top_speed * scene.duration))

@@ -1,0 +1,112 @@
+"""DART behind the plugin line: spatial, velocity-level contact, one engine with pyramids and exact cones of friction.
+
+    step:  v += (g + f/m) dt  ->  detect  ->  restitution from v  ->  solve the contact problem of all islands
+           ->  v += M^-1 J  ->  x += v dt
+
+Profiles differ in what solves the contact problem, and in nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.dart.profiles import PROFILES, checked
+from adapters.dart.shipped import MIXING, PUSH_OUT, SOLVED, restitution
+from adapters.dart.simulation import DartSimulation
+from adapters.dart.translation import frictions, restitutions
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.probes import REBOUND_SPEED
+from adapters.scene import Scene
+
+
+@final
+class DartEngine(Engine):
+    """Spatial engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="dart",
+        title="DART",
+        package="dartpy",
+        dimensions=frozenset({3}),
+        scheme=Scheme("forces, detect, sample restitution, solve, position", 1),
+        customary_dt=1.0 / 1000.0,
+        roles=MappingProxyType({"default": "shipped", "nsgs": "tuned", "fbf": "one"}),
+        apart=True,
+        quirks=(
+            Quirk(
+                "bodies come to rest by themselves: deactivation is on as shipped",
+                "it is off in every profile",
+                "World.getDeactivationOptions; measured with 6.20.0",
+            ),
+            Quirk(
+                "a plane meets a box at one point: it tips over its corners",
+                "half-spaces are slabs, which meet a box at four",
+                "measured with 6.20.0, all detectors",
+            ),
+            Quirk(
+                "friction of a pair is the smaller number of two, restitution their product",
+                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "measured with 6.20.0",
+            ),
+            Quirk(
+                "solvers of pyramids have no constructor in Python",
+                "PGS is taken from another world, whose second choice it is",
+                "dartpy 6.20.0, PgsBoxedLcpSolver",
+            ),
+            Quirk(
+                "contacts give way by 1e-5 of the speed that they are to change, and nothing rebounds at up to 0.1 m/s",
+                "declared; laws predict what blows make of it",
+                "ContactConstraint, constraint force mixing and bounce threshold; measured: 0.8 comes out as 0.799982",
+            ),
+            Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 6.20.0"),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of the installed distribution."""
+        import dartpy  # noqa: F401  (a release that cannot be imported has no version)
+
+        return version("dartpy")
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse bodies that are moved as prescribed, and tables that no numbers of single bodies give."""
+        for body in scene.bodies:
+            if body.motion == "prescribed":
+                return f"{body.name}.motion: the adapter moves no body as prescribed"
+        if restitutions(scene) is None:
+            return "pairs: restitution of a pair is a product of two factors here, this table has none"
+        if frictions(scene) is None:
+            return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a scene that `refuses` names, a bad step or setting.
+        """
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        chosen = checked(settings)
+        reason = self.refuses(scene, "")
+        if reason:
+            raise EngineError(reason)
+        return DartSimulation(scene, dt, chosen)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Restitution under the compliance of contacts, and friction under its own."""
+        if needs.regime != "impact":
+            return {}
+        if needs.restitution == 0.0:
+            half = 0.5 * PUSH_OUT / REBOUND_SPEED
+            return {"restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s")}
+        value = restitution(needs.restitution, REBOUND_SPEED)
+        return {"restitution": Declared(value, SOLVED, "a contact gives way by 1e-5 of the speed it is to change")}

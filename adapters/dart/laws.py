@@ -1,0 +1,49 @@
+"""What DART does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.dart.profiles import PROFILES
+from adapters.dart.shipped import SOLVED, restitution
+from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.scene import Scene
+from adapters.single_precision import ROUNDINGS, Method, rounded_law
+
+#: Metrics of blows in free space, by scene, that friction does not change.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "impulse", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "oblique": ("rebound_ratio",),
+}
+
+
+def blow_law(metric: str) -> Law:
+    """Blows that rebound; what does not is pushed out as far as it overlaps, of which nothing is said."""
+    rounded = rounded_law(metric, Method(restitution, unit=SOLVED / ROUNDINGS))
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        plastic = any(material.restitution == 0.0 for _, _, material in scene.contact_pairs())
+        return None if plastic else rounded(scene, dt, measure)
+
+    return law
+
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "dart",
+        tuple(PROFILES),
+        scene,
+        exactly(metric),
+        blow_law(metric),
+        "a contact gives way by 1e-5 of the speed that it is to change; nothing rebounds at up to 0.1 m/s",
+        "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
+        ("6.20.",),
+    )
+    for scene, metrics in BLOWS.items()
+    for metric in metrics
+)

@@ -1,0 +1,194 @@
+"""One DART world and what is read from it: velocities first, then positions; contacts are those of the step's start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.dart.translation import frictions, restitutions
+from adapters.engine import Array, Contacts, Simulation
+from adapters.needs import needs
+from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+
+#: Least half width and depth of the ground [m].
+GROUND = 100.0
+#: Names of the detectors' classes.
+DETECTORS = {
+    "fcl": "FCLCollisionDetector",
+    "dart": "DARTCollisionDetector",
+    "ode": "OdeCollisionDetector",
+    "bullet": "BulletCollisionDetector",
+}
+
+
+class DartSimulation(Simulation):
+    """One world; bodies in the scene's order, each a skeleton of its own."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import dartpy
+
+        self.scene, self.dt, self.settings = scene, dt, settings
+        self.world: Any = dartpy.simulation.World()
+        self.world.setTimeStep(dt)
+        self.world.setGravity(list(scene.gravity))
+        self.world.setCollisionDetector(getattr(dartpy.collision, DETECTORS[settings["detector"]])())
+        rest = self.world.getDeactivationOptions()
+        rest.mEnabled = False
+        self.world.setDeactivationOptions(rest)
+        self.solver: Any = self._solver(dartpy, settings)
+        self.reach = reach(scene)
+        self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
+        self.nodes: list[Any] = []
+        for index, body in enumerate(scene.bodies):
+            self.nodes.append(self._made(dartpy, index, body))
+        self.loaded = [
+            (node, list(body.force), list(body.torque))
+            for node, body in zip(self.nodes, scene.bodies, strict=True)
+            if body.motion == "free" and (any(body.force) or any(body.torque))
+        ]
+        self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
+
+    def _solver(self, dartpy: Any, settings: Mapping[str, Any]) -> Any:
+        """Make and set the solver of the contact problem; Dantzig's is there already."""
+        held, name = self.world.getConstraintSolver(), settings["solver"]
+        if name == "dantzig":
+            return held.getBoxedLcpSolver()
+        if name == "pgs":
+            # Its class has no constructor in Python; every world brings one as its second choice.
+            self.other = dartpy.simulation.World()
+            solver = self.other.getConstraintSolver().getSecondaryBoxedLcpSolver()
+            option = dartpy.constraint.PgsBoxedLcpSolverOption()
+            option.mMaxIteration, option.mDeltaXThreshold = settings["iterations"], settings["tolerance"]
+            option.mRelativeDeltaXTolerance = settings["tolerance"]
+            solver.setOption(option)
+        else:
+            solver = getattr(dartpy.constraint, {"nsgs": "Nsgs", "fbf": "Fbf"}[name] + "FrictionSolver")()
+            options = solver.getOptions()
+            count = "maxSweeps" if name == "nsgs" else "maxOuterIterations"
+            setattr(options, count, settings["iterations"])
+            options.tolerance = settings["tolerance"]
+            solver.setOptions(options)
+        held.setBoxedLcpSolver(solver)
+        return solver
+
+    def _made(self, dartpy: Any, index: int, asked: Body) -> Any:
+        skeleton = dartpy.dynamics.Skeleton(f"body {index}")
+        free = asked.motion == "free"
+        joint, node = skeleton.createFreeJointAndBodyNodePair() if free else skeleton.createWeldJointAndBodyNodePair()
+        node.setName(f"body {index}")
+        place = dartpy.math.Isometry3()
+        shape = asked.shape
+        if isinstance(shape, HalfSpace):
+            # A plane meets a box at one point only: a slab, whose upper face is the surface.
+            normal = np.array(shape.normal)
+            place.set_rotation(_turned(normal))
+            place.set_translation(list((shape.offset - self.reach) * normal))
+            body = dartpy.dynamics.BoxShape([2.0 * self.reach] * 3)
+        else:
+            place.set_quaternion(dartpy.math.Quaternion(*asked.pose[3:]))
+            place.set_translation(list(asked.pose[:3]))
+            if isinstance(shape, Sphere):
+                body = dartpy.dynamics.SphereShape(shape.radius)
+            else:
+                assert isinstance(shape, Box)
+                body = dartpy.dynamics.BoxShape([2.0 * half for half in shape.half_extents])
+        part = node.createShapeNode(body)
+        part.createCollisionAspect()
+        material = part.createDynamicsAspect()
+        material.setRestitutionCoeff(self.restitutions[index])
+        material.setFrictionCoeff(self.frictions[index])
+        if free:
+            assert isinstance(asked.inertia, tuple)
+            node.setInertia(dartpy.dynamics.Inertia(asked.mass, np.zeros(3), np.diag(asked.inertia)))
+            joint.setTransform(place)
+            joint.setLinearVelocity(list(asked.twist[:3]))
+            joint.setAngularVelocity(list(asked.twist[3:]))
+        else:
+            joint.setTransformFromParentBodyNode(place)
+        self.world.addSkeleton(skeleton)
+        return node
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`; loads are cleared by every step."""
+        step = self.world.step
+        for _ in range(steps):
+            for node, force, torque in self.loaded:
+                node.setExtForce(force, [0.0, 0.0, 0.0], False, True)
+                node.setExtTorque(torque, False)
+            step()
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`; a half-space's own pose is the origin."""
+        rows = []
+        for node, asked in zip(self.nodes, self.scene.bodies, strict=True):
+            if asked.motion != "free":
+                rows.append(asked.pose)
+                continue
+            place = node.getTransform()
+            q = place.quaternion()
+            rows.append((*place.translation(), q.w(), q.x(), q.y(), q.z()))
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        return np.array([(*node.getLinearVelocity(), *node.getAngularVelocity()) for node in self.nodes], float)
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step; the force is on the first body, along a normal that points to it."""
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for contact in self.world.getLastCollisionResult().getContacts():
+            first, second = (
+                self.index[one.getShapeFrame().getBodyNode().getName()]
+                for one in (contact.collisionObject1, contact.collisionObject2)
+            )
+            impulse = np.multiply(self.dt, contact.force)
+            rows.append((second, first, contact.point, contact.normal, impulse, -contact.penetrationDepth))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 3)
+
+    def readback(self) -> dict[str, Any]:
+        """What the world and its bodies hold."""
+        held = self.world.getConstraintSolver()
+        return {
+            "dt": self.world.getTimeStep(),
+            "gravity": [float(g) for g in self.world.getGravity()],
+            "solver": type(held.getBoxedLcpSolver()).__name__,
+            "detector": type(self.world.getCollisionDetector()).__name__,
+            "may_sleep": bool(self.world.getDeactivationOptions().mEnabled),
+            "split_impulse": bool(held.isSplitImpulseEnabled()),
+            "bodies": {
+                asked.name: {
+                    "mass": node.getMass(),
+                    "inertia": [float(x) for x in np.diag(node.getInertia().getMoment())],
+                }
+                for asked, node in zip(self.scene.bodies, self.nodes, strict=True)
+                if asked.motion == "free"
+            },
+            "pairs": {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": self.restitutions[i] * self.restitutions[j],
+                    "friction": min(self.frictions[i], self.frictions[j]),
+                }
+                for i, j, _ in self.scene.contact_pairs()
+            },
+        }
+
+
+def _turned(normal: Array) -> Array:
+    """Rotation that takes the z axis to ``normal``; exact along the axes."""
+    helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    x = np.cross(helper, normal)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(normal, x), normal])
+
+
+def reach(scene: Scene) -> float:
+    """Half width and depth of the ground [m]: farther than anything of the scene gets."""
+    wanted, farthest = needs(scene), 0.0
+    for body in scene.bodies:
+        if not isinstance(body.shape, HalfSpace):
+            farthest = max(farthest, math.hypot(*body.pose[:3]))
+    return max(GROUND, 2.0 * (farthest + wanted.top_speed * scene.duration))

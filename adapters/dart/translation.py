@@ -1,0 +1,34 @@
+"""Materials of pairs as one number per body: DART takes the product of restitutions and the smaller friction."""
+
+from __future__ import annotations
+
+import math
+
+from adapters.scene import Scene
+
+#: What a root and a product may miss of a number.
+ROUNDING = 1e-15
+
+
+def restitutions(scene: Scene) -> list[float] | None:
+    """Factors whose products are the pairs' restitutions: against what is fixed, or roots; None if neither works."""
+    pairs = [(i, j, material.restitution) for i, j, material in scene.contact_pairs()]
+    against, roots = [1.0] * len(scene.bodies), [0.0] * len(scene.bodies)
+    for i, j, e in pairs:
+        for body, other in ((i, j), (j, i)):
+            roots[body] = math.sqrt(e)
+            if scene.bodies[other].motion != "free":
+                against[body] = e
+    for found in (against, roots):
+        if all(abs(found[i] * found[j] - e) <= ROUNDING for i, j, e in pairs):
+            return found
+    return None
+
+
+def frictions(scene: Scene) -> list[float] | None:
+    """Numbers of which the smaller one is each pair's friction; None if there are none."""
+    pairs = [(i, j, material.friction) for i, j, material in scene.contact_pairs()]
+    found = [0.0] * len(scene.bodies)
+    for i, j, friction in pairs:
+        found[i], found[j] = max(found[i], friction), max(found[j], friction)
+    return found if all(min(found[i], found[j]) == friction for i, j, friction in pairs) else None

@@ -1,0 +1,42 @@
+"""What Rapier does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.law import Deviation, exactly
+from adapters.single_precision import Method, rounded_law
+
+#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "impulse", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "thin_wall": ("rebound_ratio",),
+    "oblique": ("rebound_ratio",),
+    "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
+}
+
+
+def newton(e: float, speed: float) -> float:
+    """Restitution at any speed of approach."""
+    return e
+
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "rapier",
+        ("default", "tuned"),
+        scene,
+        exactly(metric),
+        rounded_law(metric, Method(newton)),
+        "numbers are singles, 2^-24 of their size",
+        "rapier3d, built for f32; motion in adapters/single_precision.py",
+        ("0.36.",),
+    )
+    for scene, metrics in BLOWS.items()
+    for metric in metrics
+)

@@ -1,0 +1,196 @@
+"""One ``PhysicsWorld`` and what is read from it.
+
+A step is made of small ones, each velocity first: poses, velocities and the impulses of the whole step belong together,
+points and gaps to where bodies stood before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Array, Contacts, Simulation
+from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+
+#: Share of a unit normal's other components that single precision leaves along an axis.
+ALONG = 1e-5
+
+
+class Hooks:
+    """Gives each pair its own material before a step is solved."""
+
+    def __init__(self, index: Mapping[Any, int], materials: Mapping[tuple[int, int], tuple[float, float]]) -> None:
+        self.index, self.materials = index, materials
+
+    def modify_solver_contacts(self, context: Any) -> None:
+        """Overwrite what the engine combines of two colliders' numbers."""
+        i, j = self.index[context.collider1], self.index[context.collider2]
+        context.restitution, context.friction = self.materials[min(i, j), max(i, j)]
+
+
+class RapierSimulation(Simulation):
+    """One ``PhysicsWorld``; bodies in the scene's order."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        # Its type stubs would be looked at only where it is installed.
+        rapier3d: Any = import_module("rapier3d")
+        self.scene, self.dt, self.settings = scene, dt, settings
+        self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
+        self._set(rapier3d, dt, settings)
+        self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
+        found = set(self.materials.values())
+        self.single = next(iter(found)) if len(found) == 1 else None
+        self.index: dict[Any, int] = {}
+        self.bodies = [self._made(rapier3d, index, body) for index, body in enumerate(scene.bodies)]
+        if self.single is None and self.materials:
+            self.world.physics_hooks = Hooks(self.index, self.materials)
+
+    def _set(self, rapier3d: Any, dt: float, settings: Mapping[str, Any]) -> None:
+        held = self.world.integration_parameters
+        held.dt = dt
+        held.num_solver_iterations = settings["substeps"]
+        held.num_internal_pgs_iterations = settings["iterations"]
+        damping = settings["damping_ratio"]
+        held.contact_softness = rapier3d.SpringCoefficients(settings["frequency"], damping)
+        held.static_contact_softness = rapier3d.SpringCoefficients(settings["static_frequency"], damping)
+        held.normalized_allowed_linear_error = settings["allowed_error"]
+        held.normalized_prediction_distance = settings["prediction"]
+        held.contact_recycling = settings["recycling"]
+        held.friction_model = getattr(rapier3d.FrictionModel, settings["friction_model"].upper())
+
+    def _made(self, rapier3d: Any, index: int, asked: Body) -> Any:
+        make = {
+            "free": rapier3d.RigidBody.dynamic,
+            "fixed": rapier3d.RigidBody.fixed,
+            "prescribed": rapier3d.RigidBody.kinematic_velocity_based,
+        }[asked.motion]
+        x, y, z, qw, qx, qy, qz = asked.pose
+        pose = rapier3d.Isometry3((x, y, z), rapier3d.Rotation3(qw, qx, qy, qz))
+        builder = make(position=pose, can_sleep=False)
+        if asked.motion != "fixed":
+            builder = builder.linvel(asked.twist[:3]).angvel(asked.twist[3:])
+        if asked.motion == "free":
+            assert isinstance(asked.inertia, tuple)
+            builder = builder.additional_mass_properties(
+                rapier3d.MassProperties((0.0, 0.0, 0.0), asked.mass, asked.inertia)
+            )
+        handle = self.world.add_body(builder)
+        collider = self.world.add_collider(self._shape(rapier3d, asked), handle)
+        self.index[collider] = index
+        body = self.world.rigid_bodies[handle]
+        if asked.motion == "free":
+            body.recompute_mass_properties_from_colliders(self.world.colliders)
+            if any(asked.force):
+                body.add_force(asked.force, True)
+            if any(asked.torque):
+                body.add_torque(asked.torque, True)
+        return handle
+
+    def _shape(self, rapier3d: Any, asked: Body) -> Any:
+        restitution, friction = self.single or (0.0, 0.0)
+        numbers = {"restitution": restitution, "friction": friction}
+        if self.single is None:
+            numbers["active_hooks"] = rapier3d.ActiveHooks.MODIFY_SOLVER_CONTACTS
+        shape = asked.shape
+        if isinstance(shape, HalfSpace):
+            place = tuple(shape.offset * n for n in shape.normal)
+            return rapier3d.Collider.halfspace(shape.normal, translation=place, **numbers)
+        if isinstance(shape, Sphere):
+            return rapier3d.Collider.ball(shape.radius, density=0.0, **numbers)
+        assert isinstance(shape, Box)
+        return rapier3d.Collider.cuboid(*shape.half_extents, density=0.0, **numbers)
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`."""
+        step = self.world.step
+        for _ in range(steps):
+            step()
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`."""
+        bodies, rows = self.world.rigid_bodies, []
+        for handle in self.bodies:
+            body = bodies[handle]
+            p, q = body.translation, body.rotation
+            rows.append((p.x, p.y, p.z, q.w, q.i, q.j, q.k))
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        bodies, rows = self.world.rigid_bodies, []
+        for handle, asked in zip(self.bodies, self.scene.bodies, strict=True):
+            v, w = bodies[handle].linvel, bodies[handle].angvel
+            rows.append((v.x, v.y, v.z, w.x, w.y, w.z) if asked.motion != "fixed" else (0.0,) * 6)
+        return np.array(rows, float)
+
+    def contacts(self) -> Contacts:
+        """Up to four points per manifold, with their normal impulses; what friction gave to a manifold is not told."""
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for pair in self.world.narrow_phase.contact_pairs():
+            i, j = self.index[pair.collider1], self.index[pair.collider2]
+            rough = self.materials.get((min(i, j), max(i, j)), (0.0, 0.0))[1] > 0.0
+            for manifold in pair.manifolds:
+                n = manifold.data.normal
+                normal = np.array((n.x, n.y, n.z))
+                # A solver's own point is relative to a body; in the world each body has one, as it now stands.
+                bodies = self.world.rigid_bodies
+                places = {
+                    each.contact_id: manifold.data.solver_contact_world_points(each, bodies)
+                    for each in manifold.data.solver_contacts
+                }
+                for k, point in enumerate(manifold.points):
+                    if k not in places:
+                        continue
+                    p, q = places[k]
+                    middle = (0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.5 * (p.z + q.z))
+                    rows.append((i, j, middle, normal, _told(point.impulse, normal, rough), point.dist))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 3)
+
+    def readback(self) -> dict[str, Any]:
+        """What the world, its bodies and colliders hold."""
+        held, bodies = self.world.integration_parameters, self.world.rigid_bodies
+        g = self.world.gravity
+        told: dict[str, Any] = {
+            "dt": held.dt,
+            "gravity": [g.x, g.y, g.z],
+            "iterations": held.num_internal_pgs_iterations,
+            "substeps": held.num_solver_iterations,
+            "frequency": held.contact_softness.natural_frequency,
+            "static_frequency": held.static_contact_softness.natural_frequency,
+            "allowed_error": held.normalized_allowed_linear_error,
+            "prediction": held.normalized_prediction_distance,
+            "recycling": held.contact_recycling,
+            "friction_model": str(held.friction_model),
+            "threads": self.world.num_threads,
+            "bodies": {
+                asked.name: {"mass": bodies[handle].mass, "damping": bodies[handle].linear_damping}
+                for asked, handle in zip(self.scene.bodies, self.bodies, strict=True)
+                if asked.motion == "free"
+            },
+        }
+        if self.single:
+            restitution, friction = self.single
+            told["pairs"] = {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": restitution,
+                    "friction": friction,
+                }
+                for i, j in self.materials
+            }
+        return told
+
+
+def _told(impulse: float, normal: Array, rough: bool) -> Array:
+    """Impulse on the second body as far as it is known: without friction all of it, with friction along the normal.
+
+    Components across the normal are known to be unknown (NaN); where the normal is not along an axis, all are.
+    """
+    told = impulse * normal
+    if rough:
+        along = np.abs(normal) > 1.0 - ALONG
+        told = np.where(along, told, np.nan)
+    return told

@@ -1,0 +1,89 @@
+"""The DART adapter, on small scenes with known answers."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("dartpy", reason="DART is set apart: pip install 'contact-crosscheck[dart]'")
+
+from adapters.conformance import items
+from adapters.dart import DartEngine
+from adapters.dart.shipped import restitution
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling
+
+ENGINE = DartEngine()
+DT = 1.0 / 240.0
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+
+
+def sliding(heading=0.0, mu=0.3, **changes):
+    box = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
+    twist = (3.0 * math.cos(heading), 3.0 * math.sin(heading), 0.0, 0.0, 0.0, 0.0)
+    return Scene(
+        "slide", 1, 3, (FLOOR, replace(box, twist=twist, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.25
+    )
+
+
+def settings(scene, profile="default", **changes):
+    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
+
+
+def drive(scene, profile="default", **changes):
+    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
+
+
+@pytest.mark.parametrize("item", items(ENGINE), ids=str)
+def test_conformance(item):
+    item.hold()
+
+
+@pytest.mark.parametrize(("profile", "share"), [("default", math.sqrt(2.0)), ("nsgs", 1.0), ("fbf", 1.0)])
+def test_the_cone_is_a_pyramid_as_shipped_and_exact_with_the_other_solvers(profile, share):
+    """Along an axis both give mu g; along the diagonal a pyramid gives sqrt(2) of it."""
+    for heading, expected in ((0.0, 1.0), (math.pi / 4.0, share)):
+        found = drive(sliding(heading), profile)
+        speed = math.hypot(*found.twist[-1, 1, :2])
+        assert (3.0 - speed) / (0.3 * 9.81 * 0.25) == pytest.approx(expected, rel=2e-3), heading
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+def test_a_rebound_is_short_by_the_compliance_of_a_contact(profile):
+    ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.52, 1, 0, 0, 0), (0.0, 0.0, -2.0, 0, 0, 0))
+    found = drive(Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=0.8),), (0.0, 0.0, 0.0), 0.1), profile)
+    assert found.twist[-1, 1, 2] / 2.0 == pytest.approx(restitution(0.8, 2.0), abs=1e-9)
+    assert restitution(0.8, 2.0) == pytest.approx(0.799982, abs=1e-9)
+
+
+def test_loads_act_in_every_step_and_contacts_carry_the_weight():
+    still = replace(sliding(), pairs=(Pair(),))
+    pushed = replace(still, bodies=(FLOOR, replace(still.bodies[1], twist=(), force=(3.0, 0.0, 0.0))))
+    found = drive(pushed)
+    assert found.twist[-1, 1, 0] == pytest.approx(0.25, rel=1e-6)
+    assert found.contacts.impulse_between(0, 1)[-20:, 2].mean() / DT == pytest.approx(3.0 * 9.81, rel=1e-4)
+
+
+def test_what_cannot_be_said_in_numbers_of_single_bodies_is_refused():
+    a, b, c = (Body(n, Sphere(0.5), 1.0, (1.0, 1.0, 1.0), (2.0 * k, 0, 0, 1.0, 0, 0, 0)) for k, n in enumerate("abc"))
+    odd = (Pair("a", "b", 0.9), Pair("b", "c", 0.5), Pair("a", "c", 0.0))
+    assert ENGINE.refuses(Scene("odd", 1, 3, (a, b, c), odd, (0.0, 0.0, 0.0), 0.1), "default").startswith("pairs: rest")
+    rough = (Pair("a", "b", 0.0, 0.9), Pair("b", "c", 0.0, 0.9), Pair("a", "c", 0.0, 0.1))
+    assert "friction" in ENGINE.refuses(Scene("rough", 1, 3, (a, b, c), rough, (0.0, 0.0, 0.0), 0.1), "default")
+    moved = Scene("moved", 1, 3, (FLOOR, replace(a, motion="prescribed")), (Pair(),), (0.0, 0.0, 0.0), 0.1)
+    assert ENGINE.refuses(moved, "default").startswith("a.motion: ")
+
+
+@pytest.mark.parametrize(
+    ("profile", "changes", "field"),
+    [("default", {"solver": "lemke"}, "solver"), ("default", {"iterations": 5}, "iterations"),
+     ("pgs", {"iterations": 0}, "iterations"), ("nsgs", {"tolerance": math.nan}, "tolerance"),
+     ("fbf", {"detector": "none"}, "detector"), ("default", {"cfm": 0.0}, "cfm")],
+)  # fmt: skip
+def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, field):
+    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+        ENGINE.build(sliding(), DT, settings(sliding(), profile, **changes))
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,97 @@
+"""The Rapier adapter, on small scenes with known answers."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rapier3d", reason="Rapier is set apart: pip install 'contact-crosscheck[rapier]'")
+
+from adapters.conformance import items
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.rapier import RapierEngine
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling
+
+ENGINE = RapierEngine()
+DT = 1.0 / 240.0
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+
+
+def resting(mu=0.5, duration=0.5, **changes):
+    box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
+    return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
+
+
+def settings(scene, profile="default", **changes):
+    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
+
+
+def drive(scene, profile="default", **changes):
+    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
+
+
+@pytest.mark.parametrize("item", items(ENGINE), ids=str)
+def test_conformance(item):
+    item.hold()
+
+
+def test_default_is_what_fresh_parameters_hold():
+    import rapier3d
+
+    held, chosen = rapier3d.IntegrationParameters(), settings(resting())
+    assert chosen["iterations"] == held.num_internal_pgs_iterations and chosen["substeps"] == held.num_solver_iterations
+    assert chosen["frequency"] == held.contact_softness.natural_frequency
+    assert chosen["static_frequency"] == held.static_contact_softness.natural_frequency
+    assert chosen["damping_ratio"] == held.contact_softness.damping_ratio == held.static_contact_softness.damping_ratio
+    assert chosen["allowed_error"] == pytest.approx(held.normalized_allowed_linear_error)
+    assert chosen["prediction"] == pytest.approx(held.normalized_prediction_distance)
+    assert chosen["recycling"] == held.contact_recycling
+    assert held.friction_model == rapier3d.FrictionModel.SIMPLIFIED
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [({"iterations": 0}, "iterations"), ({"substeps": True}, "substeps"), ({"frequency": -1.0}, "frequency"),
+     ({"damping_ratio": math.inf}, "damping_ratio"), ({"recycling": 1}, "recycling"),
+     ({"friction_model": "dry"}, "friction_model"), ({"slop": 0.1}, "slop")],
+)  # fmt: skip
+def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+        ENGINE.build(resting(), DT, settings(resting(), **changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_along_the_normal_only():
+    smooth, rough = (drive(resting(mu)).contacts.impulse_between(0, 1)[-60:] / DT for mu in (0.0, 0.5))
+    assert np.isfinite(smooth).all() and smooth[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3)
+    assert rough[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3) and np.isnan(rough[:, :2]).all()
+
+
+def test_loads_act_in_every_step():
+    found = drive(resting(0.0, force=(3.0, 0.0, 0.0)))
+    assert found.twist[-1, 1, 0] == pytest.approx(0.5, rel=1e-4)
+
+
+def test_each_pair_has_its_own_material():
+    balls = tuple(
+        Body(
+            name, Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (3.0 * k, 0.0, 0.52, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -2.0, 0, 0, 0)
+        )
+        for k, name in enumerate("abc")
+    )
+    pairs = tuple(Pair("floor", name, e) for name, e in (("a", 0.9), ("b", 0.4), ("c", 0.0)))
+    found = drive(Scene("pairs", 1, 3, (FLOOR, *balls), pairs, (0.0, 0.0, 0.0), 0.2))
+    assert found.twist[-1, 1:, 2] == pytest.approx([1.8, 0.8, 0.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
+def test_friction_of_a_blow_knows_the_impulse_of_compression_only(e):
+    """A quirk that is stated: mu / (1 + e) of the whole blow."""
+    ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.52, 1, 0, 0, 0), (6.0, 0.0, -2.0, 0, 0, 0))
+    found = drive(Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e, friction=0.2),), (0.0, 0.0, 0.0), 0.2))
+    assert found.twist[-1, 1, 2] == pytest.approx(2.0 * e, abs=2e-3)
+    assert 6.0 - found.twist[-1, 1, 0] == pytest.approx(0.2 * 2.0, rel=2e-3)
