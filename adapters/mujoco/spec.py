@@ -47,11 +47,11 @@ def _turn_z_to(normal: tuple[float, ...]) -> list[float]:
 class Spec:
     """Writes a scene as an `MjSpec`: bodies, then either one material on all geoms or one entry per pair."""
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], spec: Any = None) -> None:
         import mujoco
 
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
-        self.spec = empty_spec(mujoco)
+        self.spec = spec or empty_spec(mujoco)
         pairs = list(scene.contact_pairs())
         materials = {(material.restitution, material.friction) for _, _, material in pairs}
         self.shared = materials.pop() if len(materials) == 1 and settings["solreffriction"] is None else None
@@ -139,9 +139,31 @@ class Spec:
             model = self.spec.compile()
         except ValueError as error:
             raise EngineError(f"scene: MuJoCo does not compile it: {' '.join(str(error).split())}") from None
-        if any(body.motion == "prescribed" for body in self.scene.bodies):
-            # The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
-            free = [b for b in self.scene.bodies if b.motion == "free"]
-            inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
-            model.stat.meaninertia = sum(inertias) / max(1, len(inertias)) or 1.0
+        told = mean_inertia(self.scene)
+        if told is not None:
+            model.stat.meaninertia = told
         return model
+
+
+def mean_inertia(scene: Scene) -> float | None:
+    """Mean inertia of the free bodies, where MuJoCo's own would count a prescribed one; None elsewhere.
+
+    The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
+    """
+    if not any(body.motion == "prescribed" for body in scene.bodies):
+        return None
+    free = [b for b in scene.bodies if b.motion == "free"]
+    inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
+    return sum(inertias) / max(1, len(inertias)) or 1.0
+
+
+def start(scene: Scene) -> tuple[list[float], list[float]]:
+    """``qpos`` and ``qvel`` of the moving bodies at the start; MuJoCo keeps angular velocity in body axes."""
+    qpos: list[float] = []
+    qvel: list[float] = []
+    for body in scene.bodies:
+        if body.motion != "fixed":
+            turn = rotation(np.array([body.pose[3:]]))[0]
+            qpos += map(float, body.pose)
+            qvel += map(float, (*body.twist[:3], *(turn.T @ np.array(body.twist[3:]))))
+    return qpos, qvel
