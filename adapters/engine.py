@@ -223,6 +223,8 @@ class Engine(ABC):
     #: What a run can be written as for the engine alone, by the name of the format (``crosscheck export --to``). The
     #: scene has a dimension the engine knows; what a format has no word for is an `EngineError`.
     exports: Mapping[str, Writer] = MappingProxyType({})
+    #: Readers of models that people have for this engine, by the ending of their files (`adapters.model`).
+    reads: Mapping[str, Callable[[str, bool], Any]] = MappingProxyType({})
 
     @property
     def name(self) -> str:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.mujoco.model import read
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
@@ -86,6 +87,7 @@ class MujocoEngine(Engine):
     profiles = PROFILES
     releases = RELEASES
     exports = MappingProxyType({"python": python, "mjcf": mjcf})
+    reads = MappingProxyType({".xml": read})
 
     def version(self) -> str:
         """Version of `mujoco-core` or `mujoco`, whichever is installed."""

@@ -123,16 +123,21 @@ class Mjcf:
         """The model as MJCF, to be called once."""
         ElementTree.SubElement(self._root, "compiler", {"angle": "radian"})
         said = dict(vars(self.option))
-        flags = said.pop("disableflags", 0)  # its only bit is autoreset's, which old releases do not have
         mj = self._mujoco
+        flags = int(said.pop("disableflags", 0))
         said["integrator"] = mj.mjtIntegrator(said["integrator"]).name.removeprefix("mjINT_")
         said["integrator"] = {"EULER": "Euler"}.get(said["integrator"], said["integrator"])
         if said["integrator"].startswith("IMPLICIT"):
             said["integrator"] = said["integrator"].lower()
         said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
         option = ElementTree.SubElement(self._root, "option", _text(said))
-        if flags:
-            ElementTree.SubElement(option, "flag", {"autoreset": "disable"})
+        if "solver" in said:
+            option.set("solver", mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_"))
+        members = mj.mjtDisableBit.__members__.values()  # one of them is their number
+        bits = [bit for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
+        if bits:
+            names = [bit.name.removeprefix("mjDSBL_").lower() for bit in bits]
+            ElementTree.SubElement(option, "flag", dict.fromkeys(names, "disable"))
         if self.stat.meaninertia is not None:
             ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
         self.worldbody.finish()

@@ -100,5 +100,6 @@ def _slot(scene: str, options: dict[str, Any]) -> Slot:
     dimension = options["dim"] or (own or list(canonical.dimensions))[0]
     profile = options["profile"] or engine.facts.profile("shipped") or next(iter(engine.profiles))
     params = canonical.minimal(dict(map(parameter, options["param"])))
-    dt = parse_dt(options["dt"]) if options["dt"] else QUICK_DT
+    brought = canonical.brought(options["engine"], profile)
+    dt = parse_dt(options["dt"]) if options["dt"] else brought.dt if brought else QUICK_DT
     return Slot(name, params, dimension, options["engine"], profile, dt, options["iterations"])

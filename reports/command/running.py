@@ -20,13 +20,15 @@ from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
+from reports.spread import spread_lines
 from reports.stages import warm_up
 from reports.summary import show
 from reports.terminal import terminal
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
-from validation.posed import pinned, resolve
+from validation.posed import is_file, pinned, resolve
 from validation.rows import Row, rows_of
+from validation.spread import spreads
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
 
@@ -38,12 +40,13 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
+@click.option("--drop", is_flag=True, help="Leave out of a model what has no place in a scene, and say so.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
-    """Run SCENES (names, globs or files; all by default) and judge them.
+    """Run SCENES (names, globs or files; all by default) and judge them; MJCF models (.xml) as well.
 
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
     if not all of it ran.
@@ -68,9 +71,13 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
     done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
-    rows = rows_of(done.id, store.observations(done), chosen)
+    observations = store.observations(done)
+    rows = rows_of(done.id, observations, chosen)
+    apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     store.close()
     _show(rows, out, as_json, console, options)
+    for line in spread_lines(apart):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -57,10 +57,10 @@ def parameter(text: str) -> tuple[str, float]:
         raise SceneError(f"param: {name}={value!r} is not a number") from None
 
 
-def _scene_names(arguments: Sequence[str]) -> list[str]:
+def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
     names: list[str] = []
     for argument in arguments or ["*"]:
-        names += [pinned(argument)] if is_file(argument) else [scene.name for scene in matching(argument)]
+        names += [pinned(argument, drop)] if is_file(argument) else [scene.name for scene in matching(argument)]
     return list(dict.fromkeys(names))
 
 
@@ -71,7 +71,7 @@ def request_from(options: dict[str, Any]) -> Request:
         registry.find(name)
     dimensions = list(options["dim"])
     return Request(
-        scenes=_scene_names(options["scenes"]),
+        scenes=_scene_names(options["scenes"], options.get("drop", False)),
         engines=list(options["engine"]) or registry.names(),
         profiles=list(options["profile"]),
         dimensions=dimensions,
