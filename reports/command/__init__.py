@@ -15,6 +15,7 @@ from reports.command import (
     reporting,
     running,
     showing,
+    sweeping,
     tuning,
 )
 from reports.command.group import main
@@ -32,5 +33,6 @@ __all__ = [
     "reporting",
     "running",
     "showing",
+    "sweeping",
     "tuning",
 ]
