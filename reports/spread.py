@@ -21,5 +21,6 @@ def spread_lines(found: Sequence[Spread]) -> Iterator[str]:
         sure = "" if first.certified else "; that run is not certified"
         yield ""
         yield f"How far from our own solution: {scene} {dimension}-D, after {first.time:.3g} s{sure}"
-        for each in members:
-            yield f"  {each.engine}/{each.profile:<10} {quantity(each.distance, 'm', 2)} ({each.body})"
+        names = [f"{each.engine}/{each.profile}" for each in members]
+        for name, each in zip(names, members, strict=True):
+            yield f"  {name:<{max(map(len, names))}}  {quantity(each.distance, 'm', 2):>9}  ({each.body})"

@@ -18,12 +18,13 @@ from reports import exports
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
+from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
 from reports.spread import spread_lines
 from reports.stages import warm_up
 from reports.summary import show
 from reports.terminal import terminal
+from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
 from validation.posed import is_file, pinned, resolve
@@ -39,6 +40,7 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
 @click.option("--drop", is_flag=True, help="Leave out of a model what has no place in a scene, and say so.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
@@ -63,6 +65,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if options["dry_run"]:
         click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
         return
+    if options["cluster"] and options["keep_trajectories"]:
+        raise SceneError("keep_trajectories: a cluster sends observations only; run those cells here")
     folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:
@@ -70,7 +74,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
-    done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
+    limits = options["jobs"], options["timeout"]
+    done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"])
     observations = store.observations(done)
     rows = rows_of(done.id, observations, chosen)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
@@ -117,8 +122,9 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive.
 
-    With --batch every line gets an answer: an observation, or {"line": N, "error": "..."} for a line that is no slot
-    or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
+    With --batch a first line {"scenes": {...}} hands over the texts of scene files, by their pinned names, so that the
+    files need not be here; every other line gets an answer: an observation, or {"line": N, "error": "..."} for a line
+    that is no slot or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
     """
     text = sys.stdin.buffer.read().decode(errors="replace")
     cells: dict[Slot, int] = {}
@@ -131,6 +137,8 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
         if not line.strip():
             continue
         try:
+            if batch and _handed(line):
+                continue
             cells.setdefault(_slot(line), number)
         except (SceneError, EngineError) as error:
             if not batch:
@@ -148,6 +156,17 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     for observation in run_cells(list(cells), jobs, timeout, leave=leave):
         click.echo(json.dumps(observation.as_dict(), default=str))
     sys.exit(statuses.WRONG_CALL if wrong else statuses.INCOMPLETE if left else statuses.FINE)
+
+
+def _handed(line: str) -> bool:
+    """Whether a line hands over texts of scene files, which are known from then on."""
+    if not line.lstrip().startswith('{"scenes"'):
+        return False
+    try:
+        posed.remember({str(name): str(text) for name, text in json.loads(line)["scenes"].items()})
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise SceneError(f"scenes: are not a table of texts: {one_line(error)}") from None
+    return True
 
 
 def _slot(text: str) -> Slot:

@@ -38,6 +38,21 @@ SECONDS = _Seconds()
 JOBS = click.IntRange(0, 4096)
 
 
+def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
+    """An address that can be one, refused before anything runs."""
+    if not value:
+        return ""
+    from validation.workers.cluster import checked
+
+    return checked(value)
+
+
+#: Where cells run, if not here.
+CLUSTER = click.option(
+    "--cluster", callback=_cluster, metavar="ADDRESS", help="Run on Dask: tcp://HOST:PORT, or local:N processes."
+)
+
+
 def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
     """A line for each engine that was named and is not there, and one if none of the chosen is there at all."""
     absent = [found for found in map(registry.find, chosen) if found.engine is None]

@@ -14,7 +14,7 @@ from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
-from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
+from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import terminal
@@ -35,6 +35,7 @@ from validation.workers import TIMEOUT
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
+@CLUSTER
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--csv", "csv_file", type=FILE, help="Table of the cells; OUT/sweep.csv by default.")
 @click.option("--parquet", type=FILE, help="Also write the table as Parquet to this file.")
@@ -67,7 +68,8 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
             import pyarrow  # noqa: F401
     store = Store(out)
     title = f"sweep: {' '.join(request.scenes)}"
-    done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], fresh=options["fresh"])
+    limits = options["jobs"], options["timeout"]
+    done = run_plan(store, title, chosen, console, *limits, fresh=options["fresh"], cluster=options["cluster"])
     rows = rows_of(done.id, store.observations(done), chosen)
     store.close()
     found = table(rows)
