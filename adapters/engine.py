@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -151,6 +152,8 @@ class Simulation(ABC):
 
 
 ProfileRule = Callable[[Needs, float], list[Setting]]
+#: ``write(scene, dt, settings, steps)``: the run of so many steps of a scene, as a text that needs the engine alone.
+Writer = Callable[[Scene, float, Mapping[str, Any], int], str]
 
 
 #: What a profile is among those of its engine. Comparisons and marks select on it, never on a profile's name.
@@ -219,6 +222,11 @@ class Engine(ABC):
     releases: Releases | None = None
     #: Conformance checks that it is known to fail.
     expected: tuple[Expected, ...] = ()
+    #: What a run can be written as for the engine alone, by the name of the format (``crosscheck export --to``). The
+    #: scene has a dimension the engine knows; what a format has no word for is an `EngineError`.
+    exports: Mapping[str, Writer] = MappingProxyType({})
+    #: Readers of models that people have for this engine, by the ending of their files (`adapters.model`).
+    reads: Mapping[str, Callable[[str, bool], Any]] = MappingProxyType({})
 
     @property
     def name(self) -> str:

@@ -62,6 +62,46 @@ def _lift_body(body: Body) -> Body:
     )
 
 
+def lowered(scene: Scene) -> Scene | None:
+    """The planar scene that a spatial one is, if all of it lies in the plane y = 0 and moves and acts along it.
+
+    None for a scene that does not: a body beside the plane, tilted out of it, moved, turned or pulled out of it.
+    """
+    bodies = [_lowered_body(body) for body in scene.bodies]
+    if scene.gravity[1] != 0.0 or None in bodies:
+        return None
+    gravity = (scene.gravity[0], scene.gravity[2])
+    return replace(scene, dimension=2, bodies=tuple(body for body in bodies if body is not None), gravity=gravity)
+
+
+def _lowered_body(body: Body) -> Body | None:
+    x, y, z, w, qx, qy, qz = body.pose
+    vx, vy, vz, wx, wy, wz = body.twist
+    shape = body.shape
+    out = (y, qx, qz, vy, wx, wz, body.force[1], body.torque[0], body.torque[2])
+    if any(out) or (isinstance(shape, HalfSpace) and shape.normal[1] != 0.0):
+        return None
+    if isinstance(shape, HalfSpace):
+        flat: Shape = HalfSpace((shape.normal[0], shape.normal[2]), shape.offset)
+    else:
+        flat = Disc(shape.radius) if isinstance(shape, Sphere) else Box(_ends(shape))
+    return replace(
+        body,
+        shape=flat,
+        inertia=body.inertia[1] if isinstance(body.inertia, tuple) else body.inertia,
+        pose=(x, z, float(-2.0 * np.arctan2(qy, w))),
+        twist=(vx, vz, -wy),
+        force=(body.force[0], body.force[2]),
+        torque=(-body.torque[1],),
+    )
+
+
+def _ends(shape: Shape) -> tuple[float, float]:
+    """Half extents of a box within the plane [m]."""
+    assert isinstance(shape, Box)
+    return shape.half_extents[0], shape.half_extents[2]
+
+
 def lower_pose(pose: Array) -> tuple[Array, float]:
     """Planar poses (n, 3) of spatial ones (n, 7), and how far they left the plane [m, rad]."""
     w, qx, qy, qz = pose[:, 3:].T

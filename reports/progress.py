@@ -16,6 +16,7 @@ from validation.cells import Slot
 from validation.store import Run, Store
 from validation.tracks import representatives
 from validation.workers import TIMEOUT, run_cells
+from validation.workers.cluster import run_cells_on
 
 
 def run_plan(
@@ -28,11 +29,13 @@ def run_plan(
     keep: Path | None = None,
     fresh: bool = False,
     finish: bool = True,
+    cluster: str = "",
 ) -> Run:
     """Run what the store does not have yet of this plan; the observations are in the store afterwards.
 
     ``finish`` marks the run as complete; a bench does so itself, after its timings. A run of which cells were left
-    after time-outs is not complete: it says so, and the same command resumes it.
+    after time-outs is not complete: it says so, and the same command resumes it. ``cluster`` is the address of a Dask
+    cluster to run on instead of here; its motions are not recorded, and OUT/cluster.jsonl says what ran where.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
@@ -51,7 +54,8 @@ def run_plan(
     def leave(slot: Slot, reason: str) -> None:
         left[reason] = left.get(reason, 0) + 1
 
-    warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
+    if not cluster:
+        warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
@@ -63,7 +67,10 @@ def run_plan(
         task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
         try:
             record = partial(store.add_recording, run)
-            cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave)
+            if cluster:
+                cells = run_cells_on(cluster, todo, timeout, store.path.parent / "cluster.jsonl", leave)
+            else:
+                cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave)
             for observation in cells:
                 store.add(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")

@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from adapters.engine import Setting
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Measured, Sampling, Trajectory
 
@@ -301,6 +302,18 @@ class Frontier:
     whole: bool = False
 
 
+@dataclass(frozen=True)
+class Brought:
+    """A profile that a scene brings for an engine: its settings are those of a model made for that engine.
+
+    It declares nothing, so nothing is measured of it beforehand; ``dt`` is the model's own step [s].
+    """
+
+    profile: str
+    dt: float
+    settings: tuple[Setting, ...]
+
+
 @dataclass(frozen=True, kw_only=True)
 class CanonicalScene:
     """A scene of the catalogue; see the module's docstring.
@@ -358,6 +371,8 @@ class CanonicalScene:
         What it tells the report's explorer of restitution.
     notes
         What was filled in or put right in a scene from a file, one line each; said wherever it is run or described.
+    brings
+        Profiles of its own, by engine: a model made for one engine runs there as it was made.
     """
 
     name: str
@@ -389,6 +404,12 @@ class CanonicalScene:
     seen_as: Mapping[str, Callable[[Params, float], float]] = field(default_factory=dict)
     restitution: Restitution | None = None
     notes: tuple[str, ...] = ()
+    brings: Mapping[str, Brought] = field(default_factory=dict)
+
+    def brought(self, engine: str, profile: str) -> Brought | None:
+        """The profile of that name that the scene brings for an engine, if it does."""
+        found = self.brings.get(engine)
+        return found if found is not None and found.profile == profile else None
 
     def variations(self, suite: Suite) -> Sequence[Variation]:
         """Cells of a suite."""

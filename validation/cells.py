@@ -289,7 +289,11 @@ def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
     EngineError
         For an unknown profile, or an iteration count that the profile does not have.
     """
-    own = checked_settings(engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
+    brought = resolve(slot.scene).brought(slot.engine, slot.profile)
+    if brought is not None:
+        own = list(brought.settings)
+    else:
+        own = checked_settings(engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
     switched = {name: Setting(name, value, "switched for an experiment") for name, value in slot.switched}
     kept = [switched.pop(setting.name, setting) for setting in own]
     return [*kept, *switched.values()]

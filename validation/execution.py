@@ -86,8 +86,10 @@ def _observe(
     settings = settings_of(engine, slot, scene)
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
-        # What a profile declares holds for its own settings; an experiment with others is about what they change.
-        slips = () if slot.switched else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # What a profile declares holds for its own settings; an experiment with others is about what they change, and
+        # a model's are its author's.
+        own = prepared.canonical.brought(slot.engine, slot.profile) is None and not slot.switched
+        slips = () if not own else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start

@@ -61,7 +61,9 @@ def slots(request: Request) -> list[Slot]:
         For unknown engines, profiles or parameters, before anything runs.
     """
     engines = [(name, find(name).engine) for name in request.engines]
+    scenes = [resolve(argument) for argument in map(pinned, request.scenes)]
     known = {profile for _, engine in engines if engine for profile in engine.profiles}
+    known |= {brought.profile for scene in scenes for brought in scene.brings.values()}
     for profile in request.profiles:
         if known and profile not in known:
             raise EngineError(f"profile: no chosen engine has a profile {profile!r}; known: {', '.join(sorted(known))}")
@@ -81,6 +83,8 @@ def _engine_slots(
 ) -> Iterable[Slot]:
     # An engine that is not installed still gets its rows, under one profile.
     profiles = list(engine.profiles) if engine else [_one_profile(name)]
+    if engine and name in canonical.brings:
+        profiles.append(canonical.brings[name].profile)
     for profile in profiles:
         if request.profiles and profile not in request.profiles:
             continue
@@ -88,7 +92,8 @@ def _engine_slots(
             if not variation.runs_in(dimension):
                 continue
             params = canonical.minimal(variation.params)
-            for dt in _steps(request, engine, profile):
+            brought = canonical.brought(name, profile)
+            for dt in (brought.dt,) if brought and not request.dts else _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
                 scene = canonical.scene(dimension, variation.params)
                 check_size(scene, dt)
@@ -147,7 +152,10 @@ def _iterations(request: Request, variation: Variation, engine: Engine | None, s
 
 def has_iterations(engine: Engine, slot: Slot) -> bool:
     """Whether the profile stops at an iteration count that can be replaced; one that fails says so in its cells."""
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    canonical = resolve(slot.scene)
+    if canonical.brought(slot.engine, slot.profile) is not None:
+        return False
+    scene = canonical.scene(slot.dimension, dict(slot.params))
     try:
         settings = engine.settings(slot.profile, needs(scene), slot.dt)
     except EngineError:

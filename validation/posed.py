@@ -19,7 +19,9 @@ from adapters.scene import SceneError
 from validation.canonical import CanonicalScene, Primary
 from validation.catalogue import CATALOGUE, matching
 
-_FILE = re.compile(r"(?P<path>.+\.(?:toml|json))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
+_FILE = re.compile(r"(?P<path>.+\.(?:toml|json|xml))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
+#: Endings of scene files; others are models of an engine.
+_OWN = (".toml", ".json")
 #: Texts of pinned scene files by pinned name.
 _texts: dict[str, str] = {}
 #: What pinned scene files state, read and checked elsewhere, by pinned name.
@@ -31,8 +33,10 @@ def is_file(argument: str) -> bool:
     return argument not in CATALOGUE and _FILE.fullmatch(argument) is not None
 
 
-def pinned(argument: str) -> str:
+def pinned(argument: str, drop: bool = False) -> str:
     """Name of a scene that stays what it is: a file's name gets the hash of its text.
+
+    A model's text is what `validation.model_files` makes of it; with ``drop`` what has no place in a scene is left out.
 
     Raises
     ------
@@ -48,6 +52,10 @@ def pinned(argument: str) -> str:
     if not is_visible(path):
         raise SceneError(f"scene: the name of {one_line(path)} has characters that steer a terminal; rename the file")
     text = read_text(Path(path))
+    if Path(path).suffix.lower() not in _OWN:
+        from validation import model_files
+
+        text = model_files.text_of(text, Path(path).suffix, drop)
     digest = _digest(text)
     if wanted and wanted.lower() != digest:
         raise SceneError(f"scene: {path} has changed since it was {wanted}; it is {digest} now")

@@ -162,6 +162,8 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
+    if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
+        return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
     findings, why_not = _findings(slot.engine)
     if why_not:
         return Known(None, False, why_not)

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
+from validation import model_files
 from validation.canonical import CanonicalScene
 from validation.scene_format import SceneModel, stated
 from validation.scene_text import parsed, read_text, said
@@ -59,4 +60,6 @@ def canonical_from_file(path: Path) -> CanonicalScene:
 
 def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     """Wrap the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    if path.suffix.lower() not in (".toml", ".json"):
+        return model_files.canonical_from_text(text, path)
     return canonical_of(stated_from_text(text, path), f"Scene file {path.name}")

@@ -103,7 +103,9 @@ def representatives(slots: Iterable[Slot]) -> set[Slot]:
     for slot in sorted(candidates, key=_distance):
         series = chosen.setdefault((slot.scene, slot.dimension), {})
         first = next(iter(series.values()), slot)
-        if (slot.params, slot.dt) == (first.params, first.dt):
+        brought = resolve(slot.scene).brought(slot.engine, slot.profile)
+        own_step = brought is not None and slot.dt == brought.dt  # a model's own step is its own
+        if slot.params == first.params and (slot.dt == first.dt or own_step):
             series.setdefault((slot.engine, slot.profile), slot)
     return {slot for series in chosen.values() for slot in series.values()}
 

@@ -14,6 +14,7 @@ from typing import Any
 from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
 from adapters.bullet.profiles import BODY, PROFILES, WORLD, law_of
 from adapters.bullet.releases import RELEASES
+from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE
 from adapters.bullet.simulation import BulletSimulation
 from adapters.bullet.translation import factors, moments
@@ -97,6 +98,7 @@ class BulletEngine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed wheel; PyBullet itself does not know it."""

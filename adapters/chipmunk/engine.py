@@ -15,6 +15,7 @@ from typing import Any
 
 from adapters.chipmunk.profiles import PROFILES, checked
 from adapters.chipmunk.releases import RELEASES, installed_version
+from adapters.chipmunk.script import python
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
@@ -74,6 +75,7 @@ class ChipmunkEngine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of pymunk; strings of its own and of the bundled C library are stale in some releases."""

@@ -92,11 +92,16 @@ def made_shape(shape: Any, body: Any, skin: float) -> Any:
 
     if isinstance(shape, Disc):
         return pymunk.Circle(body, shape.radius + skin)
+    return pymunk.Poly(body, corners(shape), radius=skin)
+
+
+def corners(shape: Any) -> list[tuple[float, float]]:
+    """Corners of the polygon that a box or a half-space becomes, in body axes."""
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
-        return pymunk.Poly(body, [(-hx, -hy), (hx, -hy), (hx, hy), (-hx, hy)], radius=skin)
+        return [(-hx, -hy), (hx, -hy), (hx, hy), (-hx, hy)]
     assert isinstance(shape, HalfSpace)
-    return pymunk.Poly(body, _ground(shape), radius=skin)
+    return _ground(shape)
 
 
 def _ground(shape: HalfSpace) -> list[tuple[float, float]]:

@@ -15,9 +15,11 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.mujoco.model import read
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
+from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
@@ -84,6 +86,8 @@ class MujocoEngine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    exports = MappingProxyType({"python": python, "mjcf": mjcf})
+    reads = MappingProxyType({".xml": read})
 
     def version(self) -> str:
         """Version of `mujoco-core` or `mujoco`, whichever is installed."""

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.mujoco.options import CARRIED
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
 from adapters.needs import Needs
 
@@ -119,6 +120,10 @@ NUMBERS = {
 }
 NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
 ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
+#: Settings that only a model brings (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
+#: switched off, and pairs (indices of bodies) with a softness of their own.
+BROUGHT = frozenset({"solver", "disabled", "apart"})
+SOLVERS = ("PGS", "CG", "NEWTON")
 
 
 def check_settings(settings: Mapping[str, Any]) -> None:
@@ -130,7 +135,7 @@ def check_settings(settings: Mapping[str, Any]) -> None:
         Naming the setting.
     """
     wanted = NAMES if settings.get("solref") == "reflect" else NAMES - ONLY_REFLECT
-    for name in sorted(set(settings) ^ wanted):
+    for name in sorted((set(settings) - BROUGHT) ^ wanted):
         raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
     for name, words in WORDS.items():
         if settings[name] not in words:
@@ -138,13 +143,39 @@ def check_settings(settings: Mapping[str, Any]) -> None:
     for name, (low, whole) in NUMBERS.items():
         if name in settings:
             _check_number(name, settings[name], low, whole)
+    _check_brought(settings)
     _check_row("solimp", settings["solimp"], 5)
     if settings["solref"] != "reflect":
-        _check_row("solref", settings["solref"], 2)
+        _check_solref("solref", settings["solref"])
     if settings["solreffriction"] not in (None, "stick"):
-        _check_row("solreffriction", settings["solreffriction"], 2)
+        _check_solref("solreffriction", settings["solreffriction"])
         if settings["cone"] != "elliptic":
             raise EngineError("solreffriction: acts on elliptic cones only")
+
+
+def _check_brought(settings: Mapping[str, Any]) -> None:
+    """Settings that a model brings; a file may hold anything under their names."""
+    if settings.get("solver", "NEWTON") not in SOLVERS:
+        raise EngineError(f"solver: {settings['solver']!r} must be one of {', '.join(SOLVERS)}")
+    for name in settings.get("disabled", ()):
+        if name not in CARRIED:
+            raise EngineError(f"disabled: {name!r} must be one of {', '.join(sorted(CARRIED))}")
+    for row in settings.get("apart", ()):
+        if not (isinstance(row, tuple | list) and len(row) == 6):
+            raise EngineError(f"apart: {row!r} must be two bodies and their softness")
+        _check_number("apart", row[0], 0, True)
+        _check_number("apart", row[1], 0, True)
+        _check_solref("apart", row[2])
+        _check_row("apart", row[3], 5)
+        if row[4] is not None:
+            _check_solref("apart", row[4])
+        _check_number("apart", row[5], 0.0, False)
+
+
+def _check_solref(name: str, values: Any) -> None:
+    """A time constant and a damping ratio, or, both negative, a stiffness and a damping."""
+    direct = isinstance(values, tuple | list) and all(isinstance(v, int | float) and v <= 0.0 for v in values)
+    _check_row(name, tuple(-v for v in values) if direct else values, 2)
 
 
 def _check_number(name: str, value: Any, low: float, whole: bool) -> None:

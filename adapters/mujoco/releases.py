@@ -106,6 +106,8 @@ class Mjcf:
         self._root = ElementTree.Element("mujoco")
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
         self._contact = ElementTree.Element("contact")
+        self.stat = SimpleNamespace(meaninertia=None)
+        self._keys: list[ElementTree.Element] = []
 
     def add_pair(self, *, geomname1: str, geomname2: str, **attributes: Any) -> None:
         """Add a pair of geoms by their names."""
@@ -114,23 +116,43 @@ class Mjcf:
             given.pop("solreffriction", None)  # MuJoCo's own way of saying: as solref
         ElementTree.SubElement(self._contact, "pair", _text(given))
 
+    def add_key(self, **attributes: Any) -> None:
+        """Add a state to start from."""
+        self._keys.append(ElementTree.Element("key", _text(attributes)))
+
     def compile(self) -> Any:
         """Return the compiled ``MjModel``; raises ValueError as MuJoCo does."""
+        return self._mujoco.MjModel.from_xml_string(self.text())
+
+    def text(self) -> str:
+        """The model as MJCF, to be called once."""
         ElementTree.SubElement(self._root, "compiler", {"angle": "radian"})
         said = dict(vars(self.option))
-        said.pop("disableflags", None)  # its only bit is autoreset's, which these releases do not have
         mj = self._mujoco
+        flags = int(said.pop("disableflags", 0))
         said["integrator"] = mj.mjtIntegrator(said["integrator"]).name.removeprefix("mjINT_")
         said["integrator"] = {"EULER": "Euler"}.get(said["integrator"], said["integrator"])
         if said["integrator"].startswith("IMPLICIT"):
             said["integrator"] = said["integrator"].lower()
         said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
-        ElementTree.SubElement(self._root, "option", _text(said))
+        option = ElementTree.SubElement(self._root, "option", _text(said))
+        if "solver" in said:
+            option.set("solver", mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_"))
+        members = mj.mjtDisableBit.__members__.values()  # one of them is their number
+        bits = [bit for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
+        if bits:
+            names = [bit.name.removeprefix("mjDSBL_").lower() for bit in bits]
+            ElementTree.SubElement(option, "flag", dict.fromkeys(names, "disable"))
+        if self.stat.meaninertia is not None:
+            ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
         self.worldbody.finish()
         self._root.append(self.worldbody.element)
         if len(self._contact):
             self._root.append(self._contact)
-        return mj.MjModel.from_xml_string(ElementTree.tostring(self._root, encoding="unicode"))
+        if self._keys:
+            ElementTree.SubElement(self._root, "keyframe").extend(self._keys)
+        ElementTree.indent(self._root)
+        return ElementTree.tostring(self._root, encoding="unicode") + "\n"
 
 
 class _Body:

@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.mujoco.releases import check_state, silence
-from adapters.mujoco.spec import Spec, rotation
+from adapters.mujoco.spec import Spec, rotation, start
 from adapters.scene import Scene
 
 
@@ -38,12 +38,10 @@ class MujocoSimulation(Simulation):
         self._set_start()
 
     def _set_start(self) -> None:
-        """Start state and loads; MuJoCo keeps angular velocity in body axes."""
-        for slot, index in enumerate(self._moving):
+        """Start state and loads."""
+        self._data.qpos[:], self._data.qvel[:] = start(self._scene)
+        for index in self._moving:
             body = self._scene.bodies[index]
-            turn = rotation(np.array([body.pose[3:]]))[0]
-            self._data.qpos[7 * slot : 7 * slot + 7] = body.pose
-            self._data.qvel[6 * slot : 6 * slot + 6] = (*body.twist[:3], *(turn.T @ np.array(body.twist[3:])))
             if body.motion == "free":
                 row = self._model.body(f"body{index}").id
                 self._data.xfrc_applied[row] = (*body.force, *body.torque)

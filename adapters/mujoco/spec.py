@@ -47,14 +47,17 @@ def _turn_z_to(normal: tuple[float, ...]) -> list[float]:
 class Spec:
     """Writes a scene as an `MjSpec`: bodies, then either one material on all geoms or one entry per pair."""
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], spec: Any = None) -> None:
         import mujoco
 
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
-        self.spec = empty_spec(mujoco)
+        self.spec = spec or empty_spec(mujoco)
         pairs = list(scene.contact_pairs())
         materials = {(material.restitution, material.friction) for _, _, material in pairs}
-        self.shared = materials.pop() if len(materials) == 1 and settings["solreffriction"] is None else None
+        #: Softness of pairs that have one of their own: solref, solimp, solreffriction, margin.
+        self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
+        one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
+        self.shared = materials.pop() if one else None
         self._options()
         free = [body for body in scene.bodies if body.motion == "free"]
         self.heavy = PRESCRIBED_MASS * max((b.mass for b in free), default=1.0)
@@ -74,6 +77,10 @@ class Spec:
         for name in ("impratio", "iterations", "tolerance", "noslip_iterations"):
             setattr(option, name, settings[name])
         option.disableflags = no_autoreset(mj)
+        for name in settings.get("disabled", ()):
+            option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{name.upper()}"))
+        if "solver" in settings:
+            option.solver = getattr(mj.mjtSolver, f"mjSOL_{settings['solver'].upper()}")
 
     def _body(self, index: int, body: Body) -> None:
         world = self.spec.worldbody
@@ -121,16 +128,24 @@ class Spec:
     def _pair(self, a: int, b: int, restitution: float, friction: float) -> None:
         if all(isinstance(self.scene.bodies[i].shape, HalfSpace) for i in (a, b)):
             return
+        settings = self.settings
+        usual = (
+            pair_solref(settings, restitution, self.dt),
+            settings["solimp"],
+            pair_solreffriction(settings, self.dt),
+            settings["margin"],
+        )
+        solref, solimp, solreffriction, margin = self.apart.get((a, b), usual)
         self.spec.add_pair(
             name=f"pair{a}-{b}",
             geomname1=f"geom{a}",
             geomname2=f"geom{b}",
             condim=self._condim(friction),
             friction=[friction, friction, 0.0, 0.0, 0.0],
-            solref=pair_solref(self.settings, restitution, self.dt),
-            solreffriction=pair_solreffriction(self.settings, self.dt),
-            solimp=self.settings["solimp"],
-            margin=self.settings["margin"],
+            solref=solref,
+            solreffriction=solreffriction or (0.0, 0.0),  # MuJoCo's own way of saying: as solref
+            solimp=solimp,
+            margin=margin,
         )
 
     def compile(self) -> Any:
@@ -139,9 +154,31 @@ class Spec:
             model = self.spec.compile()
         except ValueError as error:
             raise EngineError(f"scene: MuJoCo does not compile it: {' '.join(str(error).split())}") from None
-        if any(body.motion == "prescribed" for body in self.scene.bodies):
-            # The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
-            free = [b for b in self.scene.bodies if b.motion == "free"]
-            inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
-            model.stat.meaninertia = sum(inertias) / max(1, len(inertias)) or 1.0
+        told = mean_inertia(self.scene)
+        if told is not None:
+            model.stat.meaninertia = told
         return model
+
+
+def mean_inertia(scene: Scene) -> float | None:
+    """Mean inertia of the free bodies, where MuJoCo's own would count a prescribed one; None elsewhere.
+
+    The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
+    """
+    if not any(body.motion == "prescribed" for body in scene.bodies):
+        return None
+    free = [b for b in scene.bodies if b.motion == "free"]
+    inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
+    return sum(inertias) / max(1, len(inertias)) or 1.0
+
+
+def start(scene: Scene) -> tuple[list[float], list[float]]:
+    """``qpos`` and ``qvel`` of the moving bodies at the start; MuJoCo keeps angular velocity in body axes."""
+    qpos: list[float] = []
+    qvel: list[float] = []
+    for body in scene.bodies:
+        if body.motion != "fixed":
+            turn = rotation(np.array([body.pose[3:]]))[0]
+            qpos += map(float, body.pose)
+            qvel += map(float, (*body.twist[:3], *(turn.T @ np.array(body.twist[3:]))))
+    return qpos, qvel

@@ -22,6 +22,7 @@ import numpy as np
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.reference.profiles import PROFILES, SOURCE
+from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start
 from adapters.scene import Scene
@@ -57,6 +58,7 @@ class ReferenceEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Package version and eight hex digits over the solver's sources.

@@ -77,7 +77,9 @@ def laws() -> Iterator[Gate]:
         case = f"{name}, {len(kind.seeds)} piles"
         broken = sum(not reason.startswith("bodies overlap") for run in runs for reason in run.reasons)
         yield Gate.at_most("pile: laws broken, overlap apart", case, broken, 0, kind.profile)
-        yield Gate.at_most("pile: energy gained, of all", case, max(run.gained for run in runs), GAINED[kind.dimension], kind.profile)
+        yield Gate.at_most(
+            "pile: energy gained, of all", case, max(run.gained for run in runs), GAINED[kind.dimension], kind.profile
+        )
 
 
 class Fall(NamedTuple):

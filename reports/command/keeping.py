@@ -1,4 +1,4 @@
-"""``export``, ``merge``, ``prune``: results for other tools, results of several machines, and results that may go."""
+"""``merge``, ``prune``: results of several machines, and results that may go."""
 
 from __future__ import annotations
 
@@ -8,34 +8,11 @@ from pathlib import Path
 import click
 
 from adapters.scene import SceneError
-from reports.command.files import folder as writable_folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.reporting import extra
 from reports.wording import plural
 from validation.keeping import Rules, doomed, prune
 from validation.keeping import merge as merge_stores
 from validation.store import Store
-
-
-@main.command()
-@click.argument("runs", metavar="[RUN]...", nargs=-1)
-@click.option("--parquet", "target", type=Path, metavar="FOLDER", required=True, help="Write Parquet files there.")
-@click.option("--all", "every", is_flag=True, help="All runs, not the latest.")
-@AS_JSON
-@OUT
-def export(runs: tuple[str, ...], target: Path, every: bool, as_json: bool, out: Path) -> None:
-    """Write RUNs (the latest by default) as Parquet: judged rows, raw metrics, kept trajectories."""
-    with extra("export", "parquet"):
-        from reports import parquet
-    writable_folder(target, "parquet")
-    store = Store(out, create=False)
-    try:
-        chosen = store.runs() if every else [store.run(name) for name in dict.fromkeys(runs or ("latest",))]
-        counts = parquet.write(store, chosen, out / "trajectories", target)
-    finally:
-        store.close()
-    said = ", ".join(f"{name}.parquet {count} lines" for name, count in counts.items())
-    click.echo(json.dumps({"folder": str(target), **counts}) if as_json else f"{target}: {said}")
 
 
 @main.command()

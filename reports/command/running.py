@@ -19,16 +19,19 @@ from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.posing import cells_of, compare_and_show
-from reports.command.selection import JOBS, SECONDS, missing, request_from, selection
+from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
+from reports.spread import spread_lines
 from reports.stages import warm_up
 from reports.summary import show
 from reports.terminal import terminal
 from reports.wording import plural
+from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.plan import slots
-from validation.posed import pinned, resolve
+from validation.posed import is_file, pinned, resolve
 from validation.rows import Row, rows_of
+from validation.spread import spreads
 from validation.store import Store
 from validation.workers import TIMEOUT, run_cells
 
@@ -40,13 +43,15 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
 @click.option("--invariance", is_flag=True, help="Ask instead what must not change an answer: order, heading, place.")
+@CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
+@click.option("--drop", is_flag=True, help="Leave out of a model what has no place in a scene, and say so.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
-    """Run SCENES (names, globs or files; all by default) and judge them.
+    """Run SCENES (names, globs or files; all by default) and judge them; MJCF models (.xml) as well.
 
     With --invariance nothing is stored or judged against a truth: the representative cell of each scene, engine and
     profile is run again with bodies renumbered, the world turned, mirrored, carried along or moved away, with a body
@@ -70,6 +75,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if options["invariance"]:
         cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
         sys.exit(statuses.verdict(not compare_and_show(cells, as_json), True))
+    if options["cluster"] and options["keep_trajectories"]:
+        raise SceneError("keep_trajectories: a cluster sends observations only; run those cells here")
     folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:
@@ -77,13 +84,17 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {' '.join(request.scenes)}"
-    done = run_plan(store, title, chosen, console, options["jobs"], options["timeout"], keep, options["fresh"])
+    limits = options["jobs"], options["timeout"]
+    done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"])
     observations = store.observations(done)
     rows = rows_of(done.id, observations, chosen)
     if done.finished:
         brief.keep(out, done.id, observations, rows)
+    apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     store.close()
     _show(rows, out, as_json, console, options)
+    for line in spread_lines(apart):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -123,8 +134,9 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive.
 
-    With --batch every line gets an answer: an observation, or {"line": N, "error": "..."} for a line that is no slot
-    or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
+    With --batch a first line {"scenes": {...}} hands over the texts of scene files, by their pinned names, so that the
+    files need not be here; every other line gets an answer: an observation, or {"line": N, "error": "..."} for a line
+    that is no slot or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
     """
     text = sys.stdin.buffer.read().decode(errors="replace")
     cells: dict[Slot, int] = {}
@@ -137,6 +149,8 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
         if not line.strip():
             continue
         try:
+            if batch and _handed(line):
+                continue
             cells.setdefault(_slot(line), number)
         except (SceneError, EngineError) as error:
             if not batch:
@@ -154,6 +168,17 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     for observation in run_cells(list(cells), jobs, timeout, leave=leave):
         click.echo(json.dumps(observation.as_dict(), default=str))
     sys.exit(statuses.WRONG_CALL if wrong else statuses.INCOMPLETE if left else statuses.FINE)
+
+
+def _handed(line: str) -> bool:
+    """Whether a line hands over texts of scene files, which are known from then on."""
+    if not line.lstrip().startswith('{"scenes"'):
+        return False
+    try:
+        posed.remember({str(name): str(text) for name, text in json.loads(line)["scenes"].items()})
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise SceneError(f"scenes: are not a table of texts: {one_line(error)}") from None
+    return True
 
 
 def _slot(text: str) -> Slot:

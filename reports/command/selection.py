@@ -38,6 +38,21 @@ SECONDS = _Seconds()
 JOBS = click.IntRange(0, 4096)
 
 
+def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
+    """An address that can be one, refused before anything runs."""
+    if not value:
+        return ""
+    from validation.workers.cluster import checked
+
+    return checked(value)
+
+
+#: Where cells run, if not here.
+CLUSTER = click.option(
+    "--cluster", callback=_cluster, metavar="ADDRESS", help="Run on Dask: tcp://HOST:PORT, or local:N processes."
+)
+
+
 def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
     """A line for each engine that was named and is not there, and one if none of the chosen is there at all."""
     absent = [found for found in map(registry.find, chosen) if found.engine is None]
@@ -57,10 +72,10 @@ def parameter(text: str) -> tuple[str, float]:
         raise SceneError(f"param: {name}={value!r} is not a number") from None
 
 
-def _scene_names(arguments: Sequence[str]) -> list[str]:
+def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
     names: list[str] = []
     for argument in arguments or ["*"]:
-        names += [pinned(argument)] if is_file(argument) else [scene.name for scene in matching(argument)]
+        names += [pinned(argument, drop)] if is_file(argument) else [scene.name for scene in matching(argument)]
     return list(dict.fromkeys(names))
 
 
@@ -71,7 +86,7 @@ def request_from(options: dict[str, Any]) -> Request:
         registry.find(name)
     dimensions = list(options["dim"])
     return Request(
-        scenes=_scene_names(options["scenes"]),
+        scenes=_scene_names(options["scenes"], options.get("drop", False)),
         engines=list(options["engine"]) or registry.usual(),
         profiles=list(options["profile"]),
         dimensions=dimensions,

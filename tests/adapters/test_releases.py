@@ -69,9 +69,8 @@ def test_a_model_written_as_mjcf_is_the_model_of_mjspec_to_the_last_bit(monkeypa
                 monkeypatch.setattr(adapter, "empty_spec", make)
                 written.append(dict(arrays(adapter.Spec(scene, 1.0 / 240.0, settings).compile())))
             ours, theirs = written
-            # The only difference: releases that need MJCF have no bit to disable autoreset.
             differing = [name for name in ours if not np.array_equal(ours[name], theirs[name], equal_nan=True)]
-            assert differing == ["MjOption.disableflags"]
+            assert differing == []
             assert int(ours["MjOption.disableflags"]) == mujoco.mjtDisableBit.mjDSBL_AUTORESET
             compared += 1
     assert compared > 40

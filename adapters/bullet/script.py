@@ -1,0 +1,106 @@
+"""A run on Bullet as a stand-alone script: the calls of `adapters.bullet.simulation`, with their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+from adapters.bullet.profiles import checked
+from adapters.bullet.simulation import HEAVY, WAITING_ROOM
+from adapters.bullet.translation import factors, moments, placement
+from adapters.engine import EngineError
+from adapters.scene import Body, HalfSpace, Scene, Sphere
+from adapters.script import constants, keywords, literal, stepped, text
+
+
+def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
+    """Python of a run with pybullet; see `adapters.engine.Writer`."""
+    world, material = checked(settings)
+    restitution, friction = factors(scene, "restitution"), factors(scene, "friction")
+    if restitution is None or friction is None:
+        raise EngineError("pairs: no product of two bodies' values gives this table of materials")
+    heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
+    masses = [{"free": b.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[b.motion] for b in scene.bodies]
+    lines = ["import json", "", "import pybullet as p", "", *constants(dt, steps), "", "p.connect(p.DIRECT)"]
+    lines += [f"p.setPhysicsEngineParameter(fixedTimeStep=DT, {keywords(world)})", "p.setGravity(0.0, 0.0, 0.0)"]
+    lines += ["bodies = {}", ""]
+    lines.append("# A new inertia or orientation acts a step late: bodies wait far away, already turned, for one step.")
+    maximal = int(settings.get("useMaximalCoordinates", 0))
+    for i, body in enumerate(scene.bodies):
+        values = {"restitution": restitution[i], "lateralFriction": friction[i], **material}
+        lines += _made(i, body, scene, masses[i], maximal, values)
+    for a, b in combinations([body.name for body in scene.bodies if body.motion != "free"], 2):
+        lines.append(f"p.setCollisionFilterPair(bodies[{a!r}], bodies[{b!r}], -1, -1, 0)")
+    lines += ["p.stepSimulation()", "", "# Now to their places."]
+    for body in scene.bodies:
+        lines += _placed(body, scene)
+    lines += [f"p.setGravity{literal(scene.gravity)}", "", *_state(scene)]
+    return text(lines + stepped([*_loads(scene, masses), "p.stepSimulation()"]))
+
+
+def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any]) -> list[str]:
+    """Lines that make a body in its place in the waiting room."""
+    sizes, _, quaternion = placement(body, scene)
+    round_ = isinstance(body.shape, Sphere)
+    shape = f"p.GEOM_SPHERE, radius={sizes[0]!r}" if round_ else f"p.GEOM_BOX, halfExtents={literal(sizes)}"
+    waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
+    given = f"{mass!r}, shape, -1, {literal(waiting)}, {literal(quaternion)}, useMaximalCoordinates={maximal}"
+    lines = [
+        f"shape = p.createCollisionShape({shape})",
+        f"body = bodies[{body.name!r}] = p.createMultiBody({given})",
+        f"p.changeDynamics(body, -1, {keywords(material)})",
+    ]
+    if body.motion != "fixed":
+        lines.append(f"p.changeDynamics(body, -1, mass={mass!r}, localInertiaDiagonal={literal(moments(body, mass))})")
+    if body.motion == "prescribed":
+        lines.append("p.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)")
+    return lines
+
+
+def _placed(body: Body, scene: Scene) -> list[str]:
+    """Lines that move a body to where it starts; its pose first, since that zeroes its velocity."""
+    _, position, quaternion = placement(body, scene)
+    lines = [f"p.resetBasePositionAndOrientation(bodies[{body.name!r}], {literal(position)}, {literal(quaternion)})"]
+    if body.motion != "fixed":
+        lines.append(
+            f"p.resetBaseVelocity(bodies[{body.name!r}], {literal(body.twist[:3])}, {literal(body.twist[3:])})"
+        )
+    return lines
+
+
+def _velocity(body: Body) -> str:
+    return f"{literal(body.twist[:3])}, {literal(body.twist[3:])}"
+
+
+def _state(scene: Scene) -> list[str]:
+    """Lines of the function that reads all bodies; a half-space, here a box, stays where it is."""
+    still = {body.name: body.pose for body in scene.bodies if isinstance(body.shape, HalfSpace)}
+    return [
+        f"HALF_SPACES = {{{', '.join(f'{name!r}: {literal(pose)}' for name, pose in still.items())}}}",
+        "",
+        "",
+        "def state():",
+        "    found = {}",
+        "    for name, body in bodies.items():",
+        "        (x, y, z), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(body)",
+        "        velocity, spin = p.getBaseVelocity(body)",
+        "        found[name] = HALF_SPACES.get(name, (x, y, z, qw, qx, qy, qz)), (*velocity, *spin)",
+        "    return found",
+    ]
+
+
+def _loads(scene: Scene, masses: list[float]) -> list[str]:
+    """Lines before a step: velocities that are prescribed, and external loads, which last for one step."""
+    lines, loads = [], []
+    for body, mass in zip(scene.bodies, masses, strict=True):
+        force, torque = body.force, body.torque
+        if body.motion == "prescribed":
+            force, torque = tuple(-mass * g for g in scene.gravity), (0.0, 0.0, 0.0)
+            lines.append(f"p.resetBaseVelocity(bodies[{body.name!r}], {_velocity(body)})")
+        if body.motion != "fixed" and any((*force, *torque)):
+            own = f"bodies[{body.name!r}]"
+            loads.append(f"centre, _ = p.getBasePositionAndOrientation({own})")
+            loads.append(f"p.applyExternalForce({own}, -1, {literal(force)}, centre, p.WORLD_FRAME)")
+            loads.append(f"p.applyExternalTorque({own}, -1, {literal(torque)}, p.WORLD_FRAME)")
+    return lines + loads

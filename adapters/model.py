@@ -1,0 +1,121 @@
+"""Models that people have for one engine, read as scenes that every engine can run.
+
+An engine that has a language of models names a reader for it (`adapters.engine.Engine.reads`), which stands in its
+folder and may use the engine's own compiler. Text from outside is handed to it in a process of its own
+(`read`), so that a compiler that aborts, hangs or takes all memory costs one line.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+from adapters import registry
+from adapters.engine import EngineError, Setting
+from adapters.isolation import Child, Lost
+from adapters.plain import one_line, plain
+from adapters.scene import Scene, SceneError, scene_from_dict
+
+#: Seconds that a reader may take, and address space that it may use [bytes]: a model of a thousand geoms takes a
+#: second, and an engine's library alone may map most of a gigabyte.
+PATIENCE, MEMORY = 60.0, 2 * 2**30
+#: Name of the profile that runs a model as its own engine would.
+PROFILE = "model"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model as a scene.
+
+    Parameters
+    ----------
+    scene
+        Rigid bodies and their materials; its duration is the reader's choice.
+    notes
+        What a reader of results must know: what was taken for what.
+    dropped
+        What was left out because a scene has no place for it, one line each, with the element.
+    settings
+        What the model's own engine is told beside the scene: contact softness, solver options.
+    dt
+        The model's own step [s].
+    """
+
+    scene: Scene
+    notes: tuple[str, ...]
+    dropped: tuple[str, ...]
+    settings: tuple[Setting, ...]
+    dt: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data (JSON-ready) that `model_from_dict` reads back."""
+        settings = [asdict(setting) for setting in self.settings]
+        rest = {"notes": list(self.notes), "dropped": list(self.dropped), "settings": settings, "dt": self.dt}
+        return {"scene": self.scene.as_dict(), **rest}
+
+
+#: ``read(text, drop)``; with ``drop`` what has no place in a scene is left out instead of refused.
+Reader = Callable[[str, bool], Model]
+
+
+def model_from_dict(data: Mapping[str, Any]) -> Model:
+    """Inverse of `Model.as_dict`; texts are cleaned."""
+    settings = tuple(Setting(s["name"], _tuples(s["value"]), s["because"], s["source"]) for s in data["settings"])
+    notes, dropped = (tuple(one_line(line) for line in data[name]) for name in ("notes", "dropped"))
+    return Model(scene_from_dict(data["scene"]), notes, dropped, settings, float(data["dt"]))
+
+
+def _tuples(value: Any) -> Any:
+    """A setting's value as it was before JSON made lists of tuples."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def reader_of(suffix: str) -> str | None:
+    """Name of the engine of ours that reads files ending in ``suffix``; None if there is none."""
+    for name in registry.names():
+        adapter = registry.adapter(name)
+        if adapter is not None and suffix.lower() in adapter.reads:
+            return name
+    return None
+
+
+def read(engine: str, suffix: str, text: str, drop: bool) -> Model:
+    """Read a model in a process of its own.
+
+    Raises
+    ------
+    SceneError
+        Naming the element that has no place in a scene, or saying that the text is no model.
+    EngineError
+        If the engine is not installed, or its compiler ended or hung.
+    """
+    registry.load(engine)  # says how to install it
+    child = Child(_serve, MEMORY)
+    try:
+        child.send(json.dumps([engine, suffix, text, drop]).encode())
+        answer = json.loads(child.receive(PATIENCE))
+    except Lost as lost:
+        raise EngineError(f"model: {engine}'s compiler gave no model: {lost}") from None
+    finally:
+        child.stop()
+    if "refused" in answer:
+        raise SceneError(one_line(answer["refused"]))
+    if "failed" in answer:
+        raise EngineError(one_line(answer["failed"]))
+    return model_from_dict(answer["model"])
+
+
+def _serve(connection: Connection) -> None:
+    """Read one model; runs in the child."""
+    engine, suffix, text, drop = json.loads(connection.recv_bytes())
+    try:
+        found = registry.load(engine).reads[suffix.lower()](text, drop).as_dict()
+        answer: dict[str, Any] = {"model": {**found, "settings": [plain(s) for s in found["settings"]]}}
+    except SceneError as error:
+        answer = {"refused": str(error)}
+    except Exception as error:  # a compiler's own complaints are the reader's to catch; this is something else
+        answer = {"failed": f"model: {type(error).__name__}: {error}"}
+    connection.send_bytes(json.dumps(answer).encode())

@@ -1,0 +1,196 @@
+"""The text of an MJCF model: read without harm, and rid of what does not move bodies, before MuJoCo compiles it.
+
+MuJoCo's own parser opens files that a model includes and reserves whatever a model asks for. So the text is parsed here
+first: no document types or entities, no files, no more bodies than a scene may have. What has no place in a scene is
+refused with its element and line, or left out where that is wanted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from adapters.plain import NAME, is_visible, one_line
+from adapters.scene import SceneError
+
+#: Most elements, and most levels of them: a model of a thousand bodies has some ten thousand, ten deep.
+MOST_ELEMENTS, MOST_LEVELS = 50_000, 64
+#: Most bodies and geoms that a model may make of its elements: as many bodies as a scene file may have.
+MOST_MADE = 1000
+#: Elements that stay.
+KEPT = frozenset(
+    ("mujoco", "compiler", "option", "flag", "default", "worldbody", "body", "geom", "inertial", "freejoint", "joint",
+     "frame", "replicate", "contact", "pair", "keyframe", "key", "asset", "statistic")
+)  # fmt: skip
+#: Elements that only draw, measure or reserve: nothing moves otherwise without them.
+SILENT = frozenset(["visual", "custom", "sensor", "size", "texture", "material", "site", "camera", "light", "user"])
+#: Elements that reach outside the text.
+FOREIGN = {
+    "include": "other files are not read",
+    "attach": "other models are not read",
+    "model": "other models are not read",
+    "extension": "plugins are not loaded",
+    "plugin": "plugins are not loaded",
+}
+#: Elements that a scene has no place for, and why.
+NO_PLACE = {
+    "tendon": "a scene has no tendons",
+    "equality": "a scene has no constraints but contact",
+    "actuator": "a scene has no motors",
+    "exclude": "in a scene all bodies touch",
+    "deformable": "bodies of a scene are rigid",
+    "flexcomp": "bodies of a scene are rigid",
+    "composite": "bodies of a scene are rigid and free",
+    "skin": "bodies of a scene are rigid",
+    "mesh": "a scene has no meshes",
+    "hfield": "a scene has no height fields",
+}
+
+
+@dataclass
+class Element:
+    """One element, with the line it begins on."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        name = self.attributes.get("name", "")
+        shown = f" {one_line(name, NAME)!r}" if name and "@" not in name else ""
+        return f"line {self.line}: <{one_line(self.tag, NAME)}>{shown}"
+
+    def walk(self) -> Iterator[Element]:
+        """The element and all below it, in the order of the text."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def without(self, gone: Element) -> bool:
+        """Take ``gone`` out of what is below this element; whether it was there."""
+        kept = [child for child in self.children if child is not gone]
+        if len(kept) < len(self.children):
+            self.children = kept
+            return True
+        return any(child.without(gone) for child in self.children)
+
+
+def parsed(text: str) -> Element:
+    """Root of the model.
+
+    Raises
+    ------
+    SceneError
+        If it is not XML, has entities, or is nested too deep or too long; with the line.
+    """
+    parser, count = expat.ParserCreate(), 0
+    stack: list[Element] = []
+    roots: list[Element] = []
+
+    def refuse(*_: object) -> None:
+        raise SceneError(f"model: line {parser.CurrentLineNumber}: document types and entities are not read")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        element = Element(tag, dict(attributes), parser.CurrentLineNumber)
+        if count > MOST_ELEMENTS or len(stack) >= MOST_LEVELS:
+            raise SceneError(
+                f"model: {element}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_LEVELS}"
+            )
+        (stack[-1].children if stack else roots).append(element)
+        stack.append(element)
+
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    parser.StartElementHandler, parser.EndElementHandler = start, lambda tag: stack.pop()
+    try:
+        parser.Parse(text.encode(), True)
+    except (expat.ExpatError, ValueError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"model: is not XML: {one_line(error)}") from None
+    root = roots[0]
+    if root.tag != "mujoco":
+        raise SceneError(f"model: {root}: a model of MJCF begins with <mujoco>")
+    return root
+
+
+def cleaned(root: Element, drop: bool) -> list[str]:
+    """Rid the model of what does not move bodies; returns what was left out besides.
+
+    Every body and geom gets a name, by its line where it has none, so that it can be spoken of.
+
+    Raises
+    ------
+    SceneError
+        Naming the first element that has no place in a scene, unless ``drop``; or that reaches outside the text, or
+        makes too many bodies, in any case.
+    """
+    dropped: list[str] = []
+    _clean(root, drop, dropped)
+    made = _made(root)
+    if made > MOST_MADE:
+        raise SceneError(f"model: {made:.4g} bodies and geoms are more than the {MOST_MADE} that are read")
+    taken: Counter[str] = Counter()
+    for element in (e for top in root.children if top.tag == "worldbody" for e in top.walk()):
+        if element.tag in ("body", "geom") and "name" not in element.attributes:
+            name = f"{element.tag}@{element.line}"
+            taken[name] += 1
+            element.attributes["name"] = name if taken[name] == 1 else f"{name}-{taken[name]}"
+    return dropped
+
+
+def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
+    kept = []
+    for child in element.children:
+        if child.tag in FOREIGN:
+            raise SceneError(f"model: {child}: {FOREIGN[child.tag]}")
+        if child.tag in SILENT:
+            continue
+        why = NO_PLACE.get(child.tag) if element.tag != "default" else None
+        if "file" in child.attributes:
+            why = "other files are not read"
+        elif child.tag not in KEPT and child.tag not in NO_PLACE and element.tag != "default":
+            why = "there is no place for it in a scene"
+        if why:
+            if not drop:
+                raise SceneError(f"model: {child}: {why}")
+            dropped.append(f"{child}: {why}")
+            continue
+        name = child.attributes.get("name", "")
+        if not is_visible(name) or len(name) > NAME - 4:
+            raise SceneError(f"model: line {child.line}: {one_line(name, 40)!r} cannot be a name")
+        for attribute in ("material", "rgba", "user", "group"):
+            child.attributes.pop(attribute, None)
+        if element.tag == "default" and child.tag not in ("geom", "default", "pair", "joint"):
+            continue
+        _clean(child, drop, dropped)
+        kept.append(child)
+    element.children = kept
+
+
+def _made(element: Element) -> float:
+    """Bodies and geoms that the compiler makes of an element, without making them."""
+    inside = sum(_made(child) for child in element.children)
+    if element.tag == "replicate":
+        try:
+            count = float(element.attributes.get("count", "1"))
+        except ValueError:
+            raise SceneError(f"model: {element}: count is not a number") from None
+        return inside * max(1.0, count)
+    return inside + (element.tag in ("body", "geom"))
+
+
+def text_of(root: Element) -> str:
+    """The model as text again."""
+
+    def built(element: Element) -> ElementTree.Element:
+        made = ElementTree.Element(element.tag, element.attributes)
+        made.extend(built(child) for child in element.children)
+        return made
+
+    return ElementTree.tostring(built(root), encoding="unicode")

@@ -1,0 +1,300 @@
+"""MJCF models of free bodies and fixed geoms of primitive shapes, as scenes.
+
+    text -> markup.py (nothing from outside, nothing that only draws) -> MuJoCo's own compiler -> Scene + settings
+
+MuJoCo's compiler says where everything is and what it weighs: frames, defaults, replication, densities and inertias are
+its business. What it compiled must be what a scene can hold: bodies with one shape about their centre of mass, free or
+fixed, which all touch each other. Contact softness, solver options and step become the settings of the profile that
+runs the model as MuJoCo would; other engines are asked for rigid bodies with the model's sliding friction, and for no
+rebound, since MJCF states none.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.engine import Setting
+from adapters.model import Model
+from adapters.mujoco.combination import Contact, contact_of
+from adapters.mujoco.markup import Element, cleaned, parsed, text_of
+from adapters.mujoco.options import option_settings
+from adapters.mujoco.refusal import Refused
+from adapters.plain import one_line
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene, SceneError, Shape, Sphere
+
+#: Simulated time of a model, which states none [s].
+DURATION = 2.0
+#: Components of directions below this are the round-off of angles that the compiler turned into them.
+ROUNDING = 1e-14
+#: A centre of mass or an axis this far from its shape's, relative to its size, is its shape's.
+ALIGNED = 1e-9
+
+
+def read(text: str, drop: bool) -> Model:
+    """The model in ``text``; see `adapters.model.Reader`.
+
+    Raises
+    ------
+    SceneError
+        Naming the element that has no place in a scene, or with the compiler's complaint.
+    """
+    root = parsed(text)
+    dropped = cleaned(root, drop)
+    lines = {
+        e.attributes["name"]: e
+        for e in root.walk()
+        if e.tag in ("body", "geom", "joint", "pair")
+        if "name" in e.attributes
+    }
+    while True:
+        try:
+            return _Reading(root, drop, dropped, lines).model()
+        except Refused as refused:
+            element = lines.get(refused.name)
+            line = f"{element or _shown(root, refused)}: {refused.why}"
+            if not drop or refused.fatal or element is None or not root.without(element):
+                raise SceneError(f"model: {line}") from None
+            dropped.append(line)
+            for keyframe in [e for e in root.children if e.tag == "keyframe"]:
+                root.without(keyframe)
+                dropped.append(f"{keyframe}: its states are those of all bodies")
+
+
+def _shown(root: Element, refused: Refused) -> str:
+    """What was refused, where it is no body or geom of the text: an option, or what the compiler made."""
+    where = next((str(child) for child in root.children if child.tag == refused.kind.partition("/")[0]), refused.kind)
+    return f"{where}: {one_line(refused.name, 60)}"
+
+
+class _Reading:
+    """One attempt at a model, which either succeeds or says what stands in its way."""
+
+    def __init__(self, root: Element, drop: bool, dropped: list[str], lines: Mapping[str, Element]) -> None:
+        import mujoco
+
+        self.mujoco, self.drop, self.dropped, self.lines = mujoco, drop, dropped, lines
+        self.root = root
+        try:
+            self.compiled = mujoco.MjModel.from_xml_string(text_of(root))
+        except ValueError as error:
+            raise SceneError(f"model: MuJoCo does not compile it: {one_line(' '.join(str(error).split()))}") from None
+        self.notes: list[str] = []
+        self.data = mujoco.MjData(self.compiled)
+        if self.compiled.nkey:
+            mujoco.mj_resetDataKeyframe(self.compiled, self.data, 0)
+            name = self.compiled.key(0).name
+            self.notes.append(f"starts from its first keyframe{f' {one_line(name, 40)!r}' if name else ''}")
+        mujoco.mj_forward(self.compiled, self.data)
+
+    def model(self) -> Model:
+        """The model as a scene.
+
+        Raises
+        ------
+        Refused
+            Naming what has no place in one.
+        """
+        m = self.compiled
+        settings = option_settings(self.mujoco, m)
+        self._joints()
+        shaped = list(self._shaped())
+        bodies = tuple(self._body(g, names) for g, names in zip(shaped, self._names(shaped), strict=True))
+        if not any(body.motion == "free" for body in bodies):
+            raise SceneError("model: has no free body: nothing can move")
+        contacts = self._contacts(shaped, bodies)
+        gravity = tuple(float(g) + 0.0 for g in m.opt.gravity)
+        if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+            gravity = (0.0, 0.0, 0.0)
+        pairs = tuple(_pairs(contacts, bodies))
+        self.notes.append("restitution 0 in all engines but its own: MJCF states none, contacts rebound by solref")
+        name = next((e.attributes["model"] for e in [self.root] if e.attributes.get("model")), "model")
+        scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)
+        settings += self._softness(contacts)
+        return Model(scene, tuple(self.notes), tuple(self.dropped), tuple(settings), float(m.opt.timestep))
+
+    # ---- bodies ----
+
+    def _name(self, kind: str, index: int) -> str:
+        return str(getattr(self.compiled, kind)(index).name)
+
+    def _joints(self) -> None:
+        """All joints are free ones, without springs, dampers or armature."""
+        m, free = self.compiled, int(self.mujoco.mjtJoint.mjJNT_FREE)
+        for j in range(m.njnt):
+            body = self._name("body", int(m.jnt_bodyid[j]))
+            if int(m.jnt_type[j]) != free:
+                kind = self.mujoco.mjtJoint(int(m.jnt_type[j])).name.removeprefix("mjJNT_").lower()
+                raise Refused("body", body, f"a {kind} joint holds it; bodies of a scene are free or fixed")
+            dofs = slice(int(m.jnt_dofadr[j]), int(m.jnt_dofadr[j]) + 6)
+            for what in ("dof_damping", "dof_armature", "dof_frictionloss"):
+                if np.any(getattr(m, what)[dofs]):
+                    raise Refused(
+                        "body", body, f"its joint has {what.removeprefix('dof_')}; a scene's bodies have none"
+                    )
+            if np.any(m.jnt_stiffness[j]):
+                raise Refused("body", body, "its joint has stiffness; a scene's bodies have none")
+
+    def _shaped(self) -> Iterator[int]:
+        """Geoms that touch, in the order of the model; each free body has one."""
+        m = self.compiled
+        paired = {int(g) for k in range(m.npair) for g in (m.pair_geom1[k], m.pair_geom2[k])}
+        owners: Counter[int] = Counter()
+        for g in range(m.ngeom):
+            if not (m.geom_contype[g] or m.geom_conaffinity[g] or g in paired):
+                continue  # it is drawn only
+            weld = int(m.body_weldid[m.geom_bodyid[g]])
+            owners[weld] += weld != 0
+            if owners[weld] > 1:
+                raise Refused("body", self._name("body", weld), "has several geoms that touch; a scene's body has one")
+            yield g
+        for body in range(1, m.nbody):
+            if m.body_weldid[body] == body and not owners[body]:
+                raise Refused("body", self._name("body", body), "has no geom that touches")
+            if m.body_gravcomp[body]:
+                raise Refused(
+                    "body", self._name("body", body), "gravcomp: in a scene gravity pulls at all bodies alike"
+                )
+
+    def _names(self, shaped: list[int]) -> list[str]:
+        """Names of bodies: of the body if it is free, of the geom if it is fixed; of some several, numbered."""
+        m = self.compiled
+        found = []
+        for g in shaped:
+            weld = int(m.body_weldid[m.geom_bodyid[g]])
+            found.append(self._name("body", weld) if weld else self._name("geom", g))
+        seen: Counter[str] = Counter()
+        unique = []
+        for name in (one_line(name, 60) for name in found):
+            seen[name] += 1
+            unique.append(name if seen[name] == 1 and name != "*" else f"{name}~{seen[name]}")
+        return unique
+
+    def _body(self, g: int, name: str) -> Body:
+        m, d = self.compiled, self.data
+        shape = self._shape(g)
+        turn = np.array(d.geom_xmat[g]).reshape(3, 3)
+        place = tuple(float(x) + 0.0 for x in d.geom_xpos[g])
+        weld = int(m.body_weldid[m.geom_bodyid[g]])
+        if isinstance(shape, HalfSpace):
+            if weld:
+                raise Refused("geom", self._name("geom", g), "a plane cannot move")
+            normal = _unit(turn[:, 2])
+            return Body(name, HalfSpace(normal, float(np.dot(normal, d.geom_xpos[g])) + 0.0), motion="fixed")
+        if not weld:
+            return Body(name, shape, pose=(*place, *_quaternion(self.mujoco, turn)), motion="fixed")
+        size = shape.smallest_size
+        centre = np.array(d.xipos[weld])
+        if np.abs(centre - d.geom_xpos[g]).max() > ALIGNED * size:
+            raise Refused(
+                "body",
+                self._name("body", weld),
+                "its centre of mass is not its geom's; a scene's body has both in one place",
+            )
+        principal = np.array(d.ximat[weld]).reshape(3, 3)
+        moments = np.array(m.body_inertia[weld])
+        if isinstance(shape, Sphere):
+            turn = principal  # a ball has no axes but those of its inertia
+        else:
+            own = turn.T @ principal @ np.diag(moments) @ principal.T @ turn
+            if np.abs(own - np.diag(np.diag(own))).max() > ALIGNED * moments.max():
+                raise Refused(
+                    "body",
+                    self._name("body", weld),
+                    "its principal axes are not its geom's; a scene's body has both in one direction",
+                )
+            moments = np.diag(own)
+        velocity = np.zeros(6)
+        self.mujoco.mj_objectVelocity(m, d, int(self.mujoco.mjtObj.mjOBJ_BODY), weld, velocity, 0)
+        return Body(
+            name,
+            shape,
+            float(m.body_mass[weld]),
+            (float(moments[0]), float(moments[1]), float(moments[2])),
+            (*(float(x) + 0.0 for x in centre), *_quaternion(self.mujoco, turn)),
+            tuple(float(x) + 0.0 for x in (*velocity[3:], *velocity[:3])),
+        )
+
+    def _shape(self, g: int) -> Shape:
+        kinds, size = self.mujoco.mjtGeom, self.compiled.geom_size[g]
+        kind = kinds(int(self.compiled.geom_type[g]))
+        if kind == kinds.mjGEOM_PLANE:
+            return HalfSpace((0.0, 0.0, 1.0))
+        if kind == kinds.mjGEOM_SPHERE:
+            return Sphere(float(size[0]))
+        if kind == kinds.mjGEOM_BOX:
+            return Box(tuple(float(s) for s in size))
+        named = kind.name.removeprefix("mjGEOM_").lower()
+        weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
+        why = f"{'an' if named[0] in 'aeiou' else 'a'} {named}; a scene has spheres, boxes and planes"
+        if weld and self.drop:  # a body without its shape is none
+            raise Refused("body", self._name("body", weld), f"its geom is {why}")
+        raise Refused("geom", self._name("geom", g), why)
+
+    # ---- contacts ----
+
+    def _contacts(self, shaped: list[int], bodies: tuple[Body, ...]) -> dict[tuple[int, int], Contact]:
+        """What MuJoCo does where two bodies touch, for all pairs of which one is free."""
+        m = self.compiled
+        stated = {frozenset((int(m.pair_geom1[k]), int(m.pair_geom2[k]))): k for k in range(m.npair)}
+        found = {}
+        for i, a in enumerate(shaped):
+            for j in range(i + 1, len(shaped)):
+                if "free" not in (bodies[i].motion, bodies[j].motion):
+                    continue
+                b = shaped[j]
+                meets = (m.geom_contype[a] & m.geom_conaffinity[b]) or (m.geom_contype[b] & m.geom_conaffinity[a])
+                pair = stated.get(frozenset((a, b)))
+                if pair is None and not meets:
+                    why = f"contype and conaffinity keep it apart from {bodies[i].name}; in a scene all bodies touch"
+                    raise Refused("geom", self._name("geom", b), why, fatal=True)
+                contact = contact_of(m, a, b, pair)
+                if contact.refusal and not self.drop:
+                    raise Refused("geom", self._name("geom", b), f"with {bodies[i].name}: {contact.refusal}")
+                if contact.refusal:
+                    self.dropped.append(f"{bodies[i].name}-{bodies[j].name}: {contact.refusal}")
+                found[i, j] = contact
+        return found
+
+    def _softness(self, contacts: Mapping[tuple[int, int], Contact]) -> list[Setting]:
+        """Settings of the pairs: those of most of them, and the others one by one."""
+        if not contacts:  # one body alone: any softness will do
+            contacts = {(0, 0): contact_of(self.compiled, 0, 0, None)}
+        usual = Counter(contact.softness for contact in contacts.values()).most_common(1)[0][0]
+        smooth = {contact.condim for contact in contacts.values() if contact.friction == 0.0}
+        source = "the model's geoms and pairs"
+        settings = [
+            Setting(name, value, "of the model", source)
+            for name, value in zip(("solref", "solimp", "solreffriction", "margin"), usual, strict=True)
+        ]
+        settings.append(Setting("smooth_condim", max(smooth, default=3), "of the model's frictionless pairs", source))
+        if len(smooth) > 1:
+            raise SceneError("model: some pairs without friction have condim 1, others 3; a model has one kind")
+        apart = tuple((i, j, *c.softness) for (i, j), c in contacts.items() if c.softness != usual)
+        if apart:
+            settings.append(Setting("apart", apart, "pairs of bodies that are softer or harder than the rest", source))
+        return settings
+
+
+def _pairs(contacts: Mapping[tuple[int, int], Contact], bodies: tuple[Body, ...]) -> Iterator[Pair]:
+    """Friction of all pairs: the most common as the default, the others by name."""
+    usual = Counter(contact.friction for contact in contacts.values()).most_common(1)[0][0] if contacts else 0.0
+    yield Pair(friction=usual)
+    for (i, j), contact in contacts.items():
+        if contact.friction != usual:
+            yield Pair(bodies[i].name, bodies[j].name, friction=contact.friction)
+
+
+def _unit(vector: Any) -> tuple[float, ...]:
+    """A direction with its round-off taken off."""
+    clean = np.where(np.abs(vector) < ROUNDING, 0.0, vector)
+    return tuple(float(x) + 0.0 for x in clean / np.linalg.norm(clean))
+
+
+def _quaternion(mujoco: Any, turn: Any) -> tuple[float, ...]:
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, turn.ravel())
+    return _unit(quaternion)

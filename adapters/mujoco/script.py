@@ -1,0 +1,80 @@
+"""A run on MuJoCo as MJCF, and as a stand-alone script around it: the model of `adapters.mujoco.spec` as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from adapters.engine import EngineError
+from adapters.mujoco.profiles import check_settings
+from adapters.mujoco.releases import Mjcf
+from adapters.mujoco.spec import Spec, mean_inertia, start
+from adapters.scene import Scene
+from adapters.script import constants, literal, stepped, text
+
+
+def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
+    """MJCF of a scene, its start as keyframe ``start``; see `adapters.engine.Writer`.
+
+    Raises
+    ------
+    EngineError
+        For an external load: a model has no word for one.
+    """
+    for body in scene.bodies:
+        if body.motion == "free" and any((*body.force, *body.torque)):
+            raise EngineError(f"{body.name}.force: MJCF has no word for an external load; python has")
+    return _model(scene, dt, settings, True)
+
+
+def _model(scene: Scene, dt: float, settings: Mapping[str, Any], key: bool) -> str:
+    import mujoco
+
+    check_settings(settings)
+    written = Mjcf(mujoco)
+    Spec(scene, dt, settings, written)
+    written.stat.meaninertia = mean_inertia(scene)
+    if key:
+        qpos, qvel = start(scene)
+        written.add_key(name="start", qpos=qpos, qvel=qvel)
+    return written.text()
+
+
+def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
+    """Python of a run with mujoco; see `adapters.engine.Writer`."""
+    qpos, qvel = start(scene)
+    lines = ["import json", "", "import mujoco", "import numpy as np", "", *constants(dt, steps), 'MODEL = """']
+    lines += [*_model(scene, dt, settings, False).splitlines(), '"""']
+    lines.append("# Names and poses; of bodies that move the pose is the one at the start.")
+    lines.append("BODIES = {")
+    lines += [f"    {body.name!r}: {literal(body.pose)}," for body in scene.bodies]
+    moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+    lines += ["}", f"MOVING = {moving}", "", "model = mujoco.MjModel.from_xml_string(MODEL)"]
+    lines += ["data = mujoco.MjData(model)", f"data.qpos[:] = {qpos}", f"data.qvel[:] = {qvel}"]
+    for i, body in enumerate(scene.bodies):
+        if body.motion == "free" and any((*body.force, *body.torque)):
+            load = literal((*body.force, *body.torque))
+            lines.append(f'data.xfrc_applied[model.body("body{i}").id] = {load}')
+    return text(lines + _STATE + stepped(["mujoco.mj_step(model, data)"]))
+
+
+#: Lines of the function that reads all bodies: MuJoCo keeps angular velocity in body axes.
+_STATE = [
+    "",
+    "",
+    "def state():",
+    "    pose, twist = np.array(list(BODIES.values())), np.zeros((len(BODIES), 6))",
+    "    if MOVING:",
+    "        pose[MOVING], velocity = data.qpos.reshape(-1, 7), data.qvel.reshape(-1, 6)",
+    "        quaternion = pose[MOVING, 3:]",
+    "        w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T",
+    "        rows = [",
+    "            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],",
+    "            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],",
+    "            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],",
+    "        ]",
+    "        turn = np.moveaxis(np.array(rows), 2, 0)",
+    "        twist[MOVING, :3] = velocity[:, :3]",
+    '        twist[MOVING, 3:] = np.einsum("nij,nj->ni", turn, velocity[:, 3:])',
+    "    return dict(zip(BODIES, zip(pose.tolist(), twist.tolist())))",
+]

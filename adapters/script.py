@@ -1,0 +1,61 @@
+"""Stand-alone Python scripts of a run: what those of all engines have in common.
+
+A script is for whoever maintains the engine: it imports the engine alone and builds the same world by the same calls as
+the adapter, number by number. It prints the state at the start, at every tenth of the run and at the end, as lines of
+JSON in the conventions of `adapters.scene`, so that its last line has the bits of the cell that it was written from.
+
+Each engine's folder writes its own (`adapters.engine.Engine.exports`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+#: How often a script tells the state, beside the start.
+TOLD = 10
+
+
+def literal(value: Any) -> str:
+    """``value`` as Python reads it back, bit by bit: numbers of numpy as plain ones, arrays as tuples."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        inside = ", ".join(literal(item) for item in value)
+        return f"({inside},)" if len(value) == 1 else f"({inside})"
+    return repr(value)
+
+
+def keywords(values: Mapping[str, Any]) -> str:
+    """``name=value, ...`` of a call."""
+    return ", ".join(f"{name}={literal(value)}" for name, value in values.items())
+
+
+def constants(dt: float, steps: int) -> list[str]:
+    """Lines that name the step [s] and the number of steps."""
+    return [f"DT, STEPS = {dt!r}, {steps}"]
+
+
+def stepped(step: Iterable[str]) -> list[str]:
+    """Lines of the loop around the lines of one ``step``; ``state()`` gives pose and twist of every body by name."""
+    return [
+        "",
+        "",
+        "def tell(steps):",
+        '    bodies = {name: {"pose": list(pose), "twist": list(twist)} for name, (pose, twist) in state().items()}',
+        '    print(json.dumps({"t": steps * DT, "bodies": bodies}))',
+        "",
+        "",
+        "tell(0)",
+        "for done in range(1, STEPS + 1):",
+        *(f"    {line}" for line in step),
+        f"    if done % max(1, STEPS // {TOLD}) == 0 or done == STEPS:",
+        "        tell(done)",
+    ]
+
+
+def text(lines: Iterable[str]) -> str:
+    """Lines as the text of a file."""
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,105 @@
+"""``export``: results as Parquet for other tools, and a cell as a text that needs its engine alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from adapters import registry
+from adapters.scene import SceneError
+from reports.command.completion import engine_names, scene_names
+from reports.command.files import FILE, writable
+from reports.command.files import folder as writable_folder
+from reports.command.group import AS_JSON, OUT, main
+from reports.command.reporting import extra
+from reports.command.selection import parameter
+from validation.cells import MOST_ITERATIONS, Slot, parse_dt
+from validation.plan import QUICK_DT
+from validation.posed import is_file, pinned, resolve
+from validation.store import Store
+
+
+@main.command()
+@click.argument("named", metavar="[RUN]...|SCENE", nargs=-1, shell_complete=scene_names)
+@click.option("--parquet", "target", type=Path, metavar="FOLDER", help="Write the RUNs as Parquet files there.")
+@click.option("--all", "every", is_flag=True, help="With --parquet: all runs, not the latest.")
+@click.option("--to", "form", metavar="FORMAT", help="Write a cell of SCENE: python, or what its engine knows (mjcf).")
+@click.option("-o", "--output", type=FILE, help="File to write; stdout by default.")
+@click.option("--engine", metavar="E", shell_complete=engine_names, help="Engine of the cell.")
+@click.option("--profile", metavar="P", help="Profile of the cell; as shipped by default.")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
+@click.option("--dim", type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
+@click.option("--dt", metavar="S", help="Step, such as 1/240.")
+@click.option("--iterations", type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count.")
+@AS_JSON
+@OUT
+def export(named: tuple[str, ...], as_json: bool, out: Path, **options: Any) -> None:
+    """Write results for other tools, or a cell as a script that runs without this project.
+
+    With --parquet: RUNs (the latest by default) as judged rows, raw metrics and kept trajectories. With --to: the
+    cell of SCENE on --engine for a bug report; it ends in the same bits.
+    """
+    if (options["target"] is None) == (options["form"] is None):
+        raise SceneError("export: say --parquet FOLDER for results, or --to FORMAT for a cell")
+    if options["form"] is None:
+        stray = [name for name in ("output", "engine", "profile", "param", "dim", "dt", "iterations") if options[name]]
+        if stray:
+            raise SceneError(f"{stray[0]}: chooses a cell to write, which needs --to")
+        _results(named, options["target"], options["every"], as_json, out)
+        return
+    if options["every"]:
+        raise SceneError("all: chooses runs, which needs --parquet")
+    if len(named) != 1 or not options["engine"]:
+        raise SceneError("export: --to writes one cell: name its scene and its --engine")
+    _cell(named[0], options, as_json)
+
+
+def _results(runs: Sequence[str], target: Path, every: bool, as_json: bool, out: Path) -> None:
+    with extra("export", "parquet"):
+        from reports import parquet
+    writable_folder(target, "parquet")
+    store = Store(out, create=False)
+    try:
+        chosen = store.runs() if every else [store.run(name) for name in dict.fromkeys(runs or ("latest",))]
+        counts = parquet.write(store, chosen, out / "trajectories", target)
+    finally:
+        store.close()
+    said = ", ".join(f"{name}.parquet {count} lines" for name, count in counts.items())
+    click.echo(json.dumps({"folder": str(target), **counts}) if as_json else f"{target}: {said}")
+
+
+def _cell(scene: str, options: dict[str, Any], as_json: bool) -> None:
+    from reports.scripts import imported, written
+
+    path = writable(options["output"], "output") if options["output"] else None
+    slot = _slot(scene, options)
+    text = written(slot, options["form"])
+    if path is not None:
+        if path.stem in imported(text):
+            raise SceneError(
+                f"output: {path.name} would be imported in the place of {path.stem} itself, name it otherwise"
+            )
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    if as_json:
+        click.echo(json.dumps({"slot": slot.as_dict(), "path": str(path) if path else None, "text": text}))
+    else:
+        click.echo(str(path) if path else text, nl=path is not None)
+
+
+def _slot(scene: str, options: dict[str, Any]) -> Slot:
+    """The one cell that is asked for: in a dimension that the engine knows, as shipped, at 1/240 s."""
+    engine = registry.load(options["engine"])
+    name = pinned(scene) if is_file(scene) else scene
+    canonical = resolve(name)
+    own = [d for d in canonical.dimensions if d in engine.facts.dimensions]
+    dimension = options["dim"] or (own or list(canonical.dimensions))[0]
+    profile = options["profile"] or engine.facts.profile("shipped") or next(iter(engine.profiles))
+    params = canonical.minimal(dict(map(parameter, options["param"])))
+    brought = canonical.brought(options["engine"], profile)
+    dt = parse_dt(options["dt"]) if options["dt"] else brought.dt if brought else QUICK_DT
+    return Slot(name, params, dimension, options["engine"], profile, dt, options["iterations"])

@@ -1,0 +1,106 @@
+"""``sweep``: thousands of cells over parameters, resumable, as one table."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from adapters.scene import SceneError
+from reports.command import statuses
+from reports.command.files import FILE, folder, writable
+from reports.command.group import AS_JSON, OUT, main
+from reports.command.reporting import extra
+from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
+from reports.progress import run_plan
+from reports.sweep import counted
+from reports.terminal import terminal
+from validation.rows import rows_of
+from validation.store import Store
+from validation.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
+from validation.workers import TIMEOUT
+
+
+@main.command()
+@selection
+@click.option("--grid", multiple=True, metavar="N=LOW:HIGH:COUNT[:log]", help="Every one of COUNT values.")
+@click.option("--list", "lists", multiple=True, metavar="N=A,B,C", help="Every value named.")
+@click.option("--random", multiple=True, metavar="N=LOW:HIGH[:log]", help="Drawn at random, --samples times.")
+@click.option("--sobol", multiple=True, metavar="N=LOW:HIGH[:log]", help="Drawn from a Sobol sequence.")
+@click.option("--samples", default=256, show_default=True, type=int, help="Points of --random and --sobol.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of both.")
+@click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
+@click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
+@CLUSTER
+@click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--csv", "csv_file", type=FILE, help="Table of the cells; OUT/sweep.csv by default.")
+@click.option("--parquet", type=FILE, help="Also write the table as Parquet to this file.")
+@AS_JSON
+@OUT
+def sweep(out: Path, as_json: bool, **options: Any) -> None:
+    """Run a study: SCENES over parameters, one line of a table per cell.
+
+    Grids and lists are crossed with each other and with --samples points. FAILs are what a study looks for, so they
+    are no alarm: it exits with 1 if cells are INVALID, CRASHED, TIMED OUT or missing, with 4 if not all of it ran.
+    """
+    console = terminal(stderr=True)
+    options["full"] = not options["quick"]
+    files = {"csv": options["csv_file"] or out / "sweep.csv", "parquet": options["parquet"]}
+    if not options["scenes"]:
+        raise SceneError("scenes: name the scenes of a sweep, it has parameters of its own")
+    request, study = request_from(options), _study(options)
+    chosen = study_slots(request, study)
+    if not chosen:
+        raise SceneError("scenes: no cell fits this selection")
+    if options["dry_run"]:
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
+        return
+    folder(out)
+    for name in ("csv", "parquet"):
+        if options[f"{name}_file" if name == "csv" else name]:
+            writable(files[name], name)
+    if options["parquet"]:
+        with extra("sweep", "parquet"):
+            import pyarrow  # noqa: F401
+    store = Store(out)
+    title = f"sweep: {' '.join(request.scenes)}"
+    limits = options["jobs"], options["timeout"]
+    done = run_plan(store, title, chosen, console, *limits, fresh=options["fresh"], cluster=options["cluster"])
+    rows = rows_of(done.id, store.observations(done), chosen)
+    store.close()
+    found = table(rows)
+    found.to_csv(files["csv"], index=False)
+    if options["parquet"]:
+        found.to_parquet(files["parquet"], index=False)
+    if as_json:
+        click.echo(found.to_json(orient="records", double_precision=15))
+    console.print(counted(found))
+    console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
+    absent = missing(options["engine"], request.engines)
+    for line in absent:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    broken = any(row.outcome in ("invalid", "crashed", "timed_out", "missing") for row in rows)
+    sys.exit(statuses.verdict(broken, done.finished and not absent))
+
+
+def _study(options: dict[str, Any]) -> Study:
+    crossed: dict[str, list[float]] = {}
+    for name, values in [*map(grid, options["grid"]), *map(listed, options["lists"])]:
+        if name in crossed:
+            raise SceneError(f"sweep: {name} is varied twice")
+        crossed[name] = values
+    kinds: list[tuple[Kind, str]] = [
+        *(("random", t) for t in options["random"]),
+        *(("sobol", t) for t in options["sobol"]),
+    ]
+    ranges: list[tuple[Kind, Range]] = [(kind, range_from(text, kind, 2)[0]) for kind, text in kinds]
+    names = [each.name for _, each in ranges]
+    for name in names:
+        if names.count(name) > 1 or name in crossed:
+            raise SceneError(f"sweep: {name} is varied twice")
+    with extra("sweep"):
+        return Study(crossed, points(ranges, options["samples"], options["seed"]))

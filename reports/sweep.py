@@ -1,0 +1,23 @@
+"""What the terminal says of a sweep: how many cells pass everything, engine by engine; the rest is in its table."""
+
+from __future__ import annotations
+
+import pandas as pd
+from rich.table import Table
+from rich.text import Text
+
+from reports.tables import grid
+
+
+def counted(found: pd.DataFrame) -> Table:
+    """Cells of every scene, engine and profile, and how many of them pass all that is judged."""
+    shown = grid("engine/profile", "scene", "cells", "pass", "FAIL", "no answer")
+    for (engine, profile, scene, dimension), cells in found.groupby(
+        ["engine", "profile", "scene", "dimension"], sort=False
+    ):
+        answered = cells[cells["outcome"].isin(["ok", "diverged"])]
+        passing = int(answered["passes"].sum())
+        words = (f"{engine}/{profile}", f"{scene} {dimension}-D", str(len(cells)), str(passing),
+                 str(len(answered) - passing), str(len(cells) - len(answered)))  # fmt: skip
+        shown.add_row(*map(Text, words))
+    return shown

@@ -1,0 +1,230 @@
+"""MJCF models as scenes: what is read, what is refused by name, and that nothing reaches outside the text."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters import registry
+from adapters.lift import lift, lowered
+from adapters.model import Model, model_from_dict, read, reader_of
+from adapters.scene import Box, HalfSpace, SceneError, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling
+
+mujoco = pytest.importorskip("mujoco")
+from adapters.mujoco import model as reading  # noqa: E402
+
+MODELS = Path(__file__).parents[1] / "models"
+READ = sorted(path for path in MODELS.glob("*.xml") if not path.name.startswith("refused"))
+#: What each refused model has that no scene has a place for: the line, the element, its name.
+REFUSED = {
+    "refused_capsule": "line 6: <geom>: a capsule",
+    "refused_hinge": "line 4: <body> 'door': a hinge joint",
+    "refused_mesh_file": "line 3: <mesh> 'bunny': other files are not read",
+    "refused_off_centre": "line 4: <body> 'weeble': its centre of mass",
+    "refused_rolling_friction": "line 6: <geom>: with floor: condim 6",
+    "refused_tendon": "line 11: <tendon>: a scene has no tendons",
+    "refused_two_shapes": "line 4: <body> 'dumbbell': has several geoms",
+    "refused_water": "line 2: <option>: density",
+}
+
+
+def model_of(body, head="", after=""):
+    return f"<mujoco>{head}<worldbody>{body}</worldbody>{after}</mujoco>"
+
+
+BALL = '<body name="ball" pos="0 0 1"><freejoint/><geom type="sphere" size=".1"/></body>'
+
+
+def test_there_are_thirty_models_of_which_twenty_are_read():
+    assert len(READ) >= 20 and len(READ) + len(REFUSED) >= 30
+    assert {path.stem for path in MODELS.glob("refused*.xml")} == set(REFUSED)
+
+
+@pytest.mark.parametrize("path", READ, ids=lambda path: path.stem)
+def test_a_model_moves_as_mujoco_moves_its_own_file(path):
+    """Profile `model` against the file itself: places and speeds after 40 steps, contacts made and broken.
+
+    The bound is round-off that contacts of stiffness 1/dt^2 amplify, 1e-9 of the motion, far below any softness.
+    """
+    found = reading.read(path.read_text(), False)
+    m = mujoco.MjModel.from_xml_string(path.read_text())
+    m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    d = mujoco.MjData(m)
+    if m.nkey:
+        mujoco.mj_resetDataKeyframe(m, d, 0)
+    steps = 300
+    mujoco.mj_step(m, d, nstep=steps)
+    mujoco.mj_kinematics(m, d)
+    mujoco.mj_comPos(m, d)
+    expected = {m.body(b).name: (d.xipos[b].copy(), d.qvel[m.body_dofadr[b]:][:3].copy()) for b in range(1, m.nbody)
+                if m.body_dofnum[b]}  # fmt: skip
+    scene = found.scene
+    settings = {setting.name: setting.value for setting in found.settings}
+    from dataclasses import replace
+
+    scene = replace(scene, duration=steps * found.dt)
+    ours = run(registry.load("mujoco"), scene, found.dt, settings, Sampling(steps))
+    moving = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
+    assert len(moving) == len(expected)
+    for i in moving:
+        name = scene.bodies[i].name
+        place, speed = expected[name] if name in expected else list(expected.values())[moving.index(i)]
+        assert np.abs(ours.pose[-1, i, :3] - place).max() < 1e-7, name
+        assert np.abs(ours.twist[-1, i, :3] - speed).max() < 1e-6, name
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_has_no_place_is_refused_with_its_element_or_left_out_and_said(name):
+    text = (MODELS / f"{name}.xml").read_text()
+    with pytest.raises(SceneError) as refused:
+        reading.read(text, False)
+    assert REFUSED[name] in str(refused.value) and "\n" not in str(refused.value)
+    if name == "refused_water":
+        with pytest.raises(SceneError, match="neither wind nor water"):
+            reading.read(text, True)
+        return
+    left = reading.read(text, True)
+    assert len(left.dropped) == 1
+    assert any(body.motion == "free" for body in left.scene.bodies)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ('<!DOCTYPE m [<!ENTITY a "b">]><mujoco>&a;</mujoco>', "line 1: document types and entities are not read"),
+    ('<!DOCTYPE m SYSTEM "file:///etc/passwd"><mujoco/>', "document types and entities are not read"),
+    ("<mujoco>&a;</mujoco>", "is not XML"),
+    ('<mujoco><include file="/etc/passwd"/></mujoco>', "<include>: other files are not read"),
+    ('<mujoco><asset><model name="m" file="other.xml"/></asset></mujoco>', "<model> 'm': other models are not read"),
+    ('<mujoco><extension><plugin plugin="p"/></extension></mujoco>', "<extension>: plugins are not loaded"),
+    ('<mujoco><asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset></mujoco>', "<hfield> 'h'"),
+    (model_of(f'<replicate count="100000000">{BALL}</replicate>'), "are more than the 1000 that are read"),
+    (model_of(f'<replicate count="99"><replicate count="99">{BALL}</replicate></replicate>'), "are more than the 1000"),
+    (model_of(f'<replicate count="inf">{BALL}</replicate>'), "are more than the 1000"),
+    ("<mujoco>" + "<body>" * 200, "nested deeper than 64"),
+    ("<robot/>", "begins with <mujoco>"),
+    ("", "is not XML"),
+    ("<mujoco/>", "has no free body"),
+    (model_of("<geom type='sphere' size='1'/>"), "has no free body"),
+    (model_of(BALL.replace("size=", "sise=")), "MuJoCo does not compile it"),
+    (model_of(BALL.replace('name="ball"', 'name="a&#27;b"')), "is not XML"),
+    (model_of(BALL.replace('name="ball"', 'name="a&#x202e;b"')), "cannot be a name"),
+    (model_of(BALL, after="<made_up/>"), "<made_up>: there is no place for it"),
+    (model_of(BALL, after='<actuator><motor name="m" joint="j"/></actuator>'), "<actuator>: a scene has no motors"),
+    (model_of(BALL.replace("<freejoint/>", '<joint type="free" damping="1"/>')), "has damping"),
+    (model_of(BALL.replace("<freejoint/>", '<joint type="free" armature="1"/>')), "has armature"),
+    (model_of(BALL.replace('pos=', 'gravcomp="1" pos=')), "gravcomp"),
+    (model_of(BALL.replace("/></body>", ' contype="0" conaffinity="0"/></body>')), "has no geom that touches"),
+    (model_of(BALL + '<geom type="plane" size="1 1 1" contype="2" conaffinity="2"/>'), "keep it apart"),
+    (model_of(BALL + '<geom type="plane" size="1 1 1" gap=".1"/>'), "gap: "),
+    (model_of(BALL, head='<option><flag contact="disable"/></option>'), "<option>: contact: without it"),
+    (model_of(BALL, head='<option><flag override="enable"/></option>'), "<option>: override: "),
+])  # fmt: skip
+def test_hostile_and_wrong_models_are_one_line(text, said):
+    with pytest.raises(SceneError) as refused:
+        reading.read(text, False)
+    assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
+
+
+def test_names_that_steer_a_terminal_never_reach_one():
+    text = model_of(BALL.replace('name="ball"', 'name="a&#x9;b"'))
+    with pytest.raises(SceneError, match="cannot be a name"):
+        reading.read(text, False)
+
+
+def test_other_files_beside_the_model_are_not_opened(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other.xml").write_text(model_of(BALL))
+    with pytest.raises(SceneError, match="other files are not read"):
+        reading.read('<mujoco><worldbody><include file="other.xml"/></worldbody></mujoco>', True)
+
+
+def test_masses_places_and_turns_are_the_compiler_s():
+    text = model_of(
+        '<frame pos="1 0 0" euler="0 0 90"><body name="box" pos="0 1 2"><freejoint/>'
+        '<geom type="box" size=".1 .2 .3" density="500"/></body></frame>'
+        '<geom name="wall" type="plane" size="1 1 1" pos="-3 0 0" euler="0 90 0"/>'
+        '<geom name="stone" type="sphere" size=".5" pos="0 0 -4"/>'
+    )
+    bodies = {body.name: body for body in reading.read(text, False).scene.bodies}
+    box, wall, stone = bodies["box"], bodies["wall"], bodies["stone"]
+    assert box.mass == pytest.approx(500 * 0.2 * 0.4 * 0.6) and box.shape == Box((0.1, 0.2, 0.3))
+    assert box.pose[:3] == pytest.approx((0.0, 0.0, 2.0))
+    assert np.abs(box.pose[3:]) == pytest.approx((np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)))
+    m = box.mass / 3.0
+    assert box.inertia == pytest.approx((m * (0.04 + 0.09), m * (0.09 + 0.01), m * (0.01 + 0.04)))
+    assert wall.shape == HalfSpace((1.0, 0.0, 0.0), -3.0) and wall.motion == "fixed"
+    assert stone.shape == Sphere(0.5) and stone.pose[:3] == (0.0, 0.0, -4.0) and stone.motion == "fixed"
+
+
+def test_a_keyframe_s_speed_is_that_of_the_centre_of_mass():
+    """MuJoCo's free joint moves the body's origin, here .5 m below the centre of a ball that turns about x."""
+    text = model_of(
+        '<body name="ball"><freejoint/><geom type="sphere" size=".1" pos="0 0 .5"/></body>',
+        after='<keyframe><key qpos="0 0 0 1 0 0 0" qvel="1 0 0 2 0 0"/></keyframe>',
+    )
+    body = reading.read(text, False).scene.bodies[0]
+    assert body.pose[:3] == pytest.approx((0.0, 0.0, 0.5))
+    assert body.twist == pytest.approx((1.0, -1.0, 0.0, 2.0, 0.0, 0.0))
+
+
+GEOMS = [
+    ("", ""),
+    ('friction=".2" condim="1"', 'friction=".7" condim="3"'),
+    ('priority="1" friction=".2" condim="1" solref=".05 .5"', 'friction=".7" solref=".01 1"'),
+    ('solref=".05 .5" solmix="3"', 'solref=".01 1" solimp=".5 .9 .01 .4 3"'),
+    ('solmix="0" solref=".05 1"', 'solref=".01 1"'),
+    ('solref="-100 -1"', 'solref="-300 -.5"'),
+    ('solref="-100 -1"', 'solref=".02 1"'),
+    ('margin=".01"', 'margin=".02"'),
+]
+
+
+@pytest.mark.parametrize(("first", "second"), GEOMS)
+def test_contacts_combine_as_mujoco_combines_them(first, second):
+    """Against the contact that MuJoCo itself makes of two spheres in overlap."""
+    from adapters.mujoco.combination import contact_of
+
+    spheres = "".join(
+        f'<body pos="0 0 {z}"><freejoint/><geom type="sphere" size=".1" {more}/></body>'
+        for z, more in ((0.0, first), (0.15, second))
+    )
+    m = mujoco.MjModel.from_xml_string(model_of(spheres))
+    d = mujoco.MjData(m)
+    mujoco.mj_forward(m, d)
+    made, found = d.contact[0], contact_of(m, 0, 1, None)
+    assert d.ncon == 1 and found.refusal == ""
+    assert found.condim == made.dim
+    assert found.friction == (pytest.approx(made.friction[0]) if made.dim > 1 else 0.0)
+    assert found.softness[0] == pytest.approx(tuple(made.solref))
+    assert found.softness[1] == pytest.approx(tuple(made.solimp))
+    assert found.softness[3] == pytest.approx(made.includemargin)
+
+
+def test_a_model_that_lies_in_the_plane_is_a_planar_scene_and_lifts_back():
+    found = {path.stem: lowered(reading.read(path.read_text(), False).scene) for path in READ}
+    assert found["box_tilted"] is not None and found["ball_in_tray"] is None and found["box_spinning"] is None
+    for path in READ:
+        flat, scene = found[path.stem], reading.read(path.read_text(), False).scene
+        if flat is not None:
+            for body, back in zip(scene.bodies, lift(flat).bodies, strict=True):
+                assert back.pose == pytest.approx(body.pose, abs=1e-15)
+                assert back.twist == pytest.approx(body.twist, abs=1e-15)
+                if body.motion == "free":
+                    assert back.mass == body.mass and back.inertia[1] == body.inertia[1]
+
+
+@pytest.mark.parametrize("out", ["pos='0 .1 1'", "pos='0 0 1' euler='10 0 0'", "pos='0 0 1' euler='0 0 10'"])
+def test_what_leaves_the_plane_is_not_planar(out):
+    box = f"<body {out}><freejoint/><geom type='box' size='.1 .1 .1'/></body>"
+    assert lowered(reading.read(model_of(box), False).scene) is None
+
+
+def test_it_is_read_in_another_process_and_comes_back_whole():
+    text = (MODELS / "soft_and_hard.xml").read_text()
+    assert reader_of(".XML") == "mujoco" and reader_of(".toml") is None
+    found = read("mujoco", ".xml", text, False)
+    assert found == reading.read(text, False) == model_from_dict(found.as_dict())
+    assert isinstance(found, Model)
+    with pytest.raises(SceneError, match="<include>"):
+        read("mujoco", ".xml", '<mujoco><include file="x"/></mujoco>', True)

@@ -1,0 +1,158 @@
+"""`crosscheck run model.xml`: a model people have, on every engine, as a user calls it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from adapters.engine import Contacts
+from adapters.scene import Body, Disc, HalfSpace, Scene
+from adapters.trajectory import ContactRecord, Trajectory
+from reports.command import main
+from reports.spread import spread_lines
+from validation import posed
+from validation.cells import Observation, Outcome, Slot
+from validation.model_files import canonical_from_text, momentum_drift
+from validation.spread import spreads
+from validation.store import Store
+from validation.tracks import Recording
+
+pytest.importorskip("mujoco")
+MODELS = Path(__file__).parents[1] / "models"
+
+
+def call(*words, status=(0, 1)):
+    done = CliRunner().invoke(main, list(map(str, words)))
+    assert done.exit_code in status, done.output + repr(done.exception)
+    return done
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """One run of a model of a ball on the floor, on MuJoCo and Chipmunk."""
+    pytest.importorskip("pymunk")
+    out = tmp_path_factory.mktemp("out")
+    path = tmp_path_factory.mktemp("models") / "ball.xml"
+    path.write_text((MODELS / "ball_on_floor.xml").read_text())
+    done = call("run", path, "--param", "duration=0.5", "--engine", "mujoco", "--engine", "chipmunk", "--jobs", 1,
+                "--out", out, "--json")  # fmt: skip
+    path.unlink()  # what was run is kept with the results
+    return out, json.loads(done.stdout), done.stderr
+
+
+def test_it_runs_as_made_on_its_own_engine_and_rigid_elsewhere(ran):
+    _, rows, said = ran
+    kinds = {(row["engine"], row["profile"], row["dimension"], row["dt"]) for row in rows}
+    assert {("mujoco", "model", 3, 0.002), ("mujoco", "model", 2, 0.002), ("mujoco", "default", 3, 1 / 240),
+            ("chipmunk", "tuned", 2, 1 / 240)} <= kinds  # fmt: skip
+    assert "mujoco/model runs it with its own contacts" in said and "restitution 0" in said
+    assert {row["metric"] for row in rows} >= {"energy_growth", "penetration", "momentum_drift", "final[ball.vx]"}
+    planar = [row for row in rows if (row["engine"], row["metric"]) == ("chipmunk", "energy_growth")]
+    assert {row["physics"] for row in planar if row["dimension"] == 2} == {"pass"}
+
+
+def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypatch):
+    out, rows, _ = ran
+    posed._texts.clear()
+    posed.resolve.cache_clear()
+    monkeypatch.setattr("adapters.model.read", lambda *_: pytest.fail("a reader of results compiles nothing"))
+    assert rows[0]["scene"] in call("show", "--out", out).output
+    store = Store(out, create=False)
+    assert "ball.xml@" in store.run().title
+    store.close()
+
+
+def test_the_same_command_says_how_many_cells_and_a_profile_can_be_chosen(tmp_path):
+    words = ("run", MODELS / "ball_on_floor.xml", "--engine", "mujoco", "--dry-run", "--out", tmp_path)
+    assert call(*words).stdout == "6 cells\n"
+    assert call(*words, "--profile", "model").stdout == "2 cells\n"
+    assert call(*words, "--profile", "model", "--dt", "1/240", "--dt", "1/480").stdout == "4 cells\n"
+    assert "no chosen engine has a profile 'mine'" in call(*words, "--profile", "mine", status=(2,)).output
+
+
+def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
+    words = ("run", MODELS / "refused_hinge.xml", "--engine", "mujoco", "--profile", "model", "--out", tmp_path)
+    refused = call(*words, status=(2,))
+    assert "line 4: <body> 'door': a hinge joint" in refused.output and len(refused.output.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+    left = call(*words, "--drop", "--jobs", 1, "--param", "duration=0.1")
+    assert "line 4: <body> 'door': a hinge joint holds it; bodies of a scene are free or fixed: left out" in left.stderr
+
+
+def test_a_model_that_is_exported_comes_back_as_the_scene_it_was(tmp_path):
+    pytest.importorskip("pymunk")
+    path = tmp_path / "column.xml"
+    call("export", "stack", "--param", "n=3", "--engine", "mujoco", "--to", "mjcf", "-o", path)
+    name = posed.pinned(str(path))
+    back, scene = posed.resolve(name).scene(3), posed.resolve("stack").scene(3, {"n": 3})
+    moved = [body for body in scene.bodies if body.motion == "free"]
+    found = [body for body in back.bodies if body.motion == "free"]
+    assert np.array([b.pose for b in found]) == pytest.approx(np.array([b.pose for b in moved]))
+    assert [(b.mass, b.inertia, b.shape) for b in found] == [(b.mass, b.inertia, b.shape) for b in moved]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"engine": "mujoco"}', "[" * 5000, '{"engine": 1, "scene": 2}'])
+def test_a_kept_model_that_is_none_is_one_line(text):
+    from adapters.scene import SceneError
+
+    with pytest.raises(SceneError) as refused:
+        canonical_from_text(text, Path("a.xml"))
+    assert "\n" not in str(refused.value)
+
+
+def falling(kick=0.0, impulse=None, n=21, dt=0.05):
+    """A disc of 2 kg that falls for a second; ``kick`` [m/s] comes from nowhere at the end."""
+    floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+    ball = Body("ball", Disc(0.1), 2.0, 0.01, (0.0, 9.0, 0.0))
+    bodies = (ball,) if impulse is None else (floor, ball)
+    scene = Scene("fall", 1, 2, bodies, (), (0.0, -10.0), 1.0)
+    t = np.arange(n) * dt
+    twist = np.zeros((n, len(bodies), 3))
+    twist[:, -1, 1] = -10.0 * t
+    twist[-1, -1, 1] += kick
+    rows = Contacts.from_rows([(0, 1, (0, 0), (0, 1), impulse, 0.0)] if impulse else [], 2)
+    record = ContactRecord(np.array([n - 1]), np.array([0, len(rows.a)]), rows) if impulse else None
+    pose = np.zeros((n, len(bodies), 3))
+    return scene, Trajectory(t, pose, twist, record, dt, "completed")
+
+
+def test_momentum_that_nobody_gave_is_seen():
+    assert momentum_drift(*falling())[0] == pytest.approx(0.0, abs=1e-12)
+    assert momentum_drift(*falling(kick=0.01))[0] == pytest.approx(0.02)
+
+
+def test_momentum_of_a_fixed_body_is_its_reported_impulse():
+    assert momentum_drift(*falling(kick=0.5, impulse=(0.0, 1.0)))[0] == pytest.approx(0.0, abs=1e-12)
+    assert momentum_drift(*falling(kick=0.5, impulse=(0.0, 0.9)))[0] == pytest.approx(0.1)
+    assert momentum_drift(*falling(kick=0.5, impulse=(0.0, float("nan"))))[0] is None
+    scene, lost = falling(impulse=(0.0, 1.0))
+    assert momentum_drift(scene, Trajectory(lost.t, lost.pose, lost.twist, None, lost.dt, "completed"))[0] is None
+
+
+def track(x):
+    t = np.linspace(0.0, 1.0, 61)
+    pose = np.zeros((61, 2, 3))
+    pose[:, 1, 0] = x * t
+    empty = np.zeros(0, np.int64)
+    return Recording(t, pose, empty, np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros((0, 2)), None, "completed")
+
+
+def test_spread_is_read_at_the_horizon_of_the_certified_run():
+    def cell(engine, profile, certificate):
+        slot = Slot("impact", (), 2, engine, profile, 1 / 240)
+        return Observation(slot, "", 1, "1", Outcome.OK, certificate=certificate)
+
+    ours = cell("reference", "reference", {"certified": True, "full": {"horizon": 0.5}})
+    other = cell("toy", "default", {})
+    kept = [(ours.slot, track(1.0)), (other.slot, track(1.2))]
+    (found,) = spreads([ours, other], kept)
+    assert found.time == 0.5 and found.distance == pytest.approx(0.1) and found.certified and found.engine == "toy"
+    lines = list(spread_lines([found]))
+    assert lines[1] == "How far from our own solution: impact 2-D, after 0.5 s" and "toy/default" in lines[2]
+    endless = cell("reference", "reference", {"certified": False, "full": {"horizon": None}})
+    (whole,) = spreads([endless, other], kept)
+    assert whole.time == 1.0 and whole.distance == pytest.approx(0.2)
+    assert "not certified" in list(spread_lines([whole]))[1]
+    assert spreads([other], kept[1:]) == []

@@ -1,0 +1,200 @@
+"""`export --to`: a cell as a text for its engine alone ends in the bits of the cell."""
+
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from adapters import registry
+from adapters.lift import lower_pose, lower_twist
+from adapters.stepping import posed_for, run
+from adapters.trajectory import Sampling
+from reports.command import main
+from reports.scripts import written
+from validation.cells import Slot, prepare, settings_of
+
+DT = 1.0 / 240.0
+OURS = ("contact_crosscheck", "adapters", "validation", "reports")
+#: What each script must get right beside what the scene file below has: tuned starts, tables of materials.
+CELLS = [("impact", {"e": 0.5}, "default"), ("pinch", {}, "tuned")]
+LOADED = """
+name = "loaded"
+dimension = {d}
+gravity = {gravity}
+duration = 0.25
+[[bodies]]
+name = 'floor "0"'
+shape = {{ type = "half_space", angle = 0.0 }}
+motion = "fixed"
+[[bodies]]
+name = "box"
+shape = {{ type = "box", half_extents = {half} }}
+pose = {pose}
+force = {force}
+torque = {torque}
+[[bodies]]
+name = "belt"
+shape = {{ type = "box", half_extents = {half} }}
+motion = "prescribed"
+pose = {away}
+twist = {twist}
+[[pairs]]
+restitution = 0.25
+friction = 0.5
+"""
+PLANAR = {"d": 2, "gravity": [0.0, -9.81], "half": [0.5, 0.5], "pose": [0.0, 0.7, 0.1], "force": [1.0, 0.5],
+          "torque": [0.3], "away": [1.3, 0.6, 0.0], "twist": [-0.5, 0.0, 0.2]}  # fmt: skip
+SPATIAL = {"d": 3, "gravity": [0.0, 0.0, -9.81], "half": [0.5, 0.4, 0.3],
+           "pose": [0.0, 0.0, 0.7, 0.9887710779360422, 0.0, 0.14943813247359922, 0.0], "force": [1.0, 0.2, 0.5],
+           "torque": [0.3, 0.1, 0.2], "away": [1.3, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0],
+           "twist": [-0.5, 0.0, 0.0, 0.0, 0.0, 0.2]}  # fmt: skip
+
+
+def slot_of(engine, scene, params, profile, dimension):
+    return Slot(scene, tuple(sorted(params.items())), dimension, engine, profile, DT)
+
+
+def ended(slot):
+    """Final pose and twist of a cell."""
+    engine, prepared = registry.load(slot.engine), prepare(slot)
+    settings = {setting.name: setting.value for setting in settings_of(engine, slot, prepared.scene)}
+    found = run(engine, prepared.scene, slot.dt, settings, Sampling(10**6))
+    return found.pose[-1], found.twist[-1]
+
+
+def printed(slot, tmp_path, allowed=()):
+    """Final pose and twist that the script prints, run in a folder of its own without our packages."""
+    path = tmp_path / "cell.py"
+    blocked = [name for name in (*OURS, "reference_solver") if name not in allowed]
+    guard = f"\nimport sys\nassert not set(sys.modules) & set({blocked!r}), 'it imports us'\n"
+    path.write_text(written(slot, "python") + guard)
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    last = json.loads(done.stdout.splitlines()[-1])
+    prepared = prepare(slot)
+    bodies = [last["bodies"][body.name] for body in prepared.scene.bodies]
+    pose, twist = (np.array([body[key] for body in bodies]) for key in ("pose", "twist"))
+    if pose.shape[1] == 7 and slot.dimension == 2:
+        pose, twist = lower_pose(pose)[0], lower_twist(twist)[0]
+    return pose, twist
+
+
+def assert_same_bits(slot, tmp_path, allowed=()):
+    for found, expected in zip(printed(slot, tmp_path, allowed), ended(slot), strict=True):
+        assert np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize(("scene", "params", "profile"), CELLS)
+@pytest.mark.parametrize(("engine", "package", "dimension"), [
+    ("chipmunk", "pymunk", 2), ("bullet", "pybullet", 2), ("bullet", "pybullet", 3),
+    ("mujoco", "mujoco", 2), ("mujoco", "mujoco", 3),
+])  # fmt: skip
+def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene, params, profile, tmp_path):
+    pytest.importorskip(package)
+    assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
+
+
+@pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco", "reference"])
+@pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
+def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
+    found = registry.find(engine).engine
+    if found is None or (values["d"] == 3 and found.facts.dimensions == {2}):
+        pytest.skip(f"{engine} is not installed, or planar")
+    path = tmp_path / "loaded.toml"
+    path.write_text(LOADED.format(**values))
+    from validation.posed import pinned
+
+    profile = found.facts.profile("textbook") or "tuned"
+    slot = slot_of(engine, pinned(str(path)), {}, profile, values["d"])
+    assert_same_bits(slot, tmp_path, allowed=("reference_solver",) if engine == registry.solver() else ())
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("profile", ["default", "tuned"])
+def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimension, profile):
+    mujoco = pytest.importorskip("mujoco")
+    slot = slot_of("mujoco", "masse", {}, profile, dimension) if dimension == 3 else slot_of(
+        "mujoco", "off_centre", {}, profile, 2
+    )  # fmt: skip
+    model = mujoco.MjModel.from_xml_string(written(slot, "mjcf"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    scene = prepare(slot).scene
+    for _ in range(int(np.ceil(scene.duration / slot.dt - 1e-9))):
+        mujoco.mj_step(model, data)
+    pose = data.qpos.reshape(-1, 7)
+    if dimension == 2:
+        pose = lower_pose(pose)[0]
+    moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+    assert np.array_equal(pose, ended(slot)[0][moving])
+
+
+def test_mjcf_says_what_it_has_no_word_for(tmp_path):
+    pytest.importorskip("mujoco")
+    path = tmp_path / "loaded.toml"
+    path.write_text(LOADED.format(**SPATIAL))
+    done = CliRunner().invoke(main, ["export", str(path), "--engine", "mujoco", "--to", "mjcf"])
+    assert done.exit_code == 2 and "box.force: MJCF has no word" in done.output
+
+
+def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
+    pytest.importorskip("pymunk")
+    call = ["export", "bounce", "--engine", "chipmunk", "--to", "python", "--param", "e=0.5", "--dt", "1/120"]
+    done = CliRunner().invoke(main, call)
+    assert done.exit_code == 0
+    for said in ("h_n = e^(2n) h0", "apex[1] = 0.25 m", "step 1/120 s", "crosscheck run bounce --param e=0.5 --dim 2"):
+        assert said in done.stdout
+    assert f"DT, STEPS = {1 / 120!r}" in done.stdout
+
+
+def test_hostile_names_end_neither_comment_nor_string(tmp_path):
+    """A body's name is data in a script and in a model, whatever it holds."""
+    pytest.importorskip("pymunk")
+    path = tmp_path / "hostile.toml"
+    text = LOADED.format(**PLANAR).replace('name = "box"', "name = '''a'\"\"\" --> <b/> ]}} ''' ")
+    path.write_text(text.replace('name = "loaded"', "name = '''-->'\"\"\"'''"))
+    from validation.posed import pinned
+
+    assert_same_bits(slot_of("chipmunk", pinned(str(path)), {}, "default", 2), tmp_path)
+    if registry.find("mujoco").engine:
+        path.write_text(path.read_text().replace("force = ", "#").replace("torque = ", "#"))
+        slot = slot_of("mujoco", pinned(str(path)), {}, "default", 2)
+        ElementTree.fromstring(written(slot, "mjcf"))
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["bounce", "--engine", "chipmunk"], "say --parquet FOLDER for results, or --to FORMAT for a cell"),
+    (["bounce", "--engine", "chipmunk", "--to", "mjcf"], "to: chipmunk writes python, not mjcf"),
+    (["bounce", "--to", "python"], "name its scene and its --engine"),
+    (["bounce", "stack", "--engine", "chipmunk", "--to", "python"], "name its scene and its --engine"),
+    (["bounce", "--engine", "chipmunk", "--to", "python", "--all"], "all: chooses runs"),
+    (["--parquet", "p", "--engine", "chipmunk"], "engine: chooses a cell"),
+    (["bounce", "--dim", "3", "--engine", "chipmunk", "--to", "python"], "chipmunk is planar"),
+    (["bounce", "--engine", "chipmunk", "--to", "python", "-o", "pymunk.py"], "name it otherwise"),
+    (["bounce", "--engine", "chipmunk", "--profile", "best", "--to", "python"], "has no profile 'best'"),
+])  # fmt: skip
+def test_a_wrong_call_is_one_line(words, said, tmp_path, monkeypatch):
+    pytest.importorskip("pymunk")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["export", *words])
+    assert done.exit_code == 2 and said in done.output and len(done.output.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_format_of_ours_is_tried_here():
+    ours = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
+    forms = {(name, form) for name in ours for form in registry.adapter(name).exports}
+    assert {("chipmunk", "python"), ("bullet", "python"), ("mujoco", "python"), ("mujoco", "mjcf"),
+            ("reference", "python")} <= forms  # fmt: skip
+
+
+def test_what_is_posed_for_an_engine_is_what_is_written():
+    pytest.importorskip("pybullet")
+    slot = slot_of("bullet", "impact", {}, "default", 2)
+    engine, prepared = registry.load("bullet"), prepare(slot)
+    assert posed_for(engine, prepared.scene).dimension == 3
+    assert "posed in the plane y = 0" in written(slot, "python")

@@ -1,0 +1,152 @@
+"""`crosscheck sweep`: which cells, the same ones again, resumed, and one line of a table for each."""
+
+import json
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main
+from validation.plan import Request
+from validation.store import Store
+from validation.sweeping import MOST_CELLS, Range, Study, grid, listed, points, study_slots
+
+pytest.importorskip("pymunk")
+CELL = ("sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2")
+
+
+def call(*words, status=0):
+    done = CliRunner().invoke(main, list(map(str, words)))
+    assert done.exit_code == status, done.output + repr(done.exception)
+    return done
+
+
+def test_grids_and_lists_are_crossed_and_points_are_drawn_together():
+    study = Study(dict([grid("e=0:1:3"), listed("v=1,2")]), [{"mass": 1.0}, {"mass": 2.0}])
+    cells = list(study)
+    assert len(cells) == len(study) == 12
+    assert {cell["e"] for cell in cells} == {0.0, 0.5, 1.0}
+    assert {(cell["e"], cell["v"], cell["mass"]) for cell in cells} == {
+        (e, v, m) for e in (0.0, 0.5, 1.0) for v in (1.0, 2.0) for m in (1.0, 2.0)
+    }
+
+
+def test_ends_are_exact_and_a_logarithm_spreads_evenly():
+    assert grid("v=0.1:20:5:log")[1][0] == 0.1 and grid("v=0.1:20:5:log")[1][-1] == 20.0
+    values = np.array(grid("v=0.001:1000:7:log")[1])
+    assert values[1:] / values[:-1] == pytest.approx(np.full(6, 10.0))
+    assert Range("x", 1.0, 100.0).at(0.25) == pytest.approx(25.75)
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol"])
+def test_points_lie_within_their_range_and_a_seed_gives_them_again(kind):
+    pytest.importorskip("scipy")
+    ranges = [(kind, Range("a", -1.0, 1.0)), (kind, Range("b", 1.0, 100.0, True))]
+    first, again, other = (points(ranges, 100, seed) for seed in (3, 3, 4))
+    assert first == again != other and len(first) == 100
+    assert all(-1.0 <= p["a"] <= 1.0 and 1.0 <= p["b"] <= 100.0 for p in first)
+    assert len({p["a"] for p in first}) == 100
+    below = sum(p["b"] < 10.0 for p in first)  # half of them, evenly in the logarithm; 5 sd of chance are 25
+    assert abs(below - 50) <= (25 if kind == "random" else 5)
+
+
+def test_random_and_sobol_parameters_are_drawn_apart():
+    pytest.importorskip("scipy")
+    drawn = points([("random", Range("a", 0.0, 1.0)), ("sobol", Range("b", 0.0, 1.0))], 64, 0)
+    counts = np.histogram([p["b"] for p in drawn], bins=8, range=(0.0, 1.0))[0]
+    assert set(counts) == {8}  # what a Sobol sequence promises and chance does not
+    assert abs(np.corrcoef([p["a"] for p in drawn], [p["b"] for p in drawn])[0, 1]) < 0.6
+
+
+def test_whole_numbers_are_rounded():
+    cells = study_slots(Request(["stack"], ["chipmunk"], ["tuned"], [2]), Study(dict([grid("n=1:3:5")]), [{}]))
+    assert {dict(slot.params).get("n") for slot in cells} <= {None, 1.0, 2.0, 3.0}
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (("--grid", "e=0:1"), "grid: 'e=0:1' is not of the form NAME=LOW:HIGH:COUNT[:log]"),
+    (("--grid", "e=0:1:many"), "is not of the form"),
+    (("--grid", "e=0:1:3:4"), "is not of the form"),
+    (("--grid", "e=1:0:3"), "e: 1 must be less than 0"),
+    (("--grid", "e=0:inf:3"), "both finite"),
+    (("--grid", "e=0:1:1"), "must be a whole number in [2,"),
+    (("--grid", "e=0:1:3:log"), "0 has no logarithm"),
+    (("--list", "e=a,b"), "list: 'e=a,b' is not of the form NAME=A,B,C"),
+    (("--list", "e=2"), "impact.e: 2 must lie in [0, 1]"),
+    (("--list", "speed=2"), "there is no such parameter"),
+    (("--random", "e=0:1", "--samples", "0"), "samples: 0 must be"),
+    (("--random", "e=0:1", "--list", "e=1"), "e is varied twice"),
+    (("--random", "e=0:1", "--sobol", "e=0:1"), "e is varied twice"),
+    (("--list", "e=1", "--param", "e=0.5"), "e is fixed and varied"),
+    (("--grid", "e=0:1:1000", "--grid", "v=1:2:1000"), f"are more than the {MOST_CELLS} of one sweep"),
+])  # fmt: skip
+def test_a_wrong_call_is_one_line_and_runs_nothing(words, said, tmp_path):
+    done = call(*CELL, *words, "--out", tmp_path / "out", status=2)
+    assert said in done.output and len(done.output.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_a_scene_there_is_nothing_to_vary(tmp_path):
+    assert "name the scenes" in call("sweep", "--list", "e=1", "--out", tmp_path, status=2).output
+
+
+def test_a_sweep_has_a_line_per_cell_and_the_same_command_makes_it_again(tmp_path):
+    words = (*CELL, "--grid", "e=0:1:3", "--list", "v=1,2", "--jobs", 1, "--out", tmp_path)
+    assert call(*words, "--dry-run").stdout == "6 cells\n"
+    told = json.loads(call(*words, "--json").stdout)
+    found = pd.read_csv(tmp_path / "sweep.csv")
+    assert len(found) == len(told) == 6 and found.passes.all() and set(found.outcome) == {"ok"}
+    assert found.rebound_ratio.to_numpy() == pytest.approx(found.e.to_numpy(), abs=1e-9)
+    assert sorted(zip(found.e, found.v, strict=True)) == [(e, v) for e in (0.0, 0.5, 1.0) for v in (1.0, 2.0)]
+    call(*words, "--fresh")
+    again = pd.read_csv(tmp_path / "sweep.csv")
+    assert list(again.state_hash) == list(found.state_hash)
+
+
+def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
+    words = (*CELL, "--grid", "e=0:1:4", "--jobs", 1, "--out", tmp_path)
+    from validation import store
+
+    kept, add = [], store.Store.add
+
+    def interrupted(self, run, observation):
+        add(self, run, observation)
+        kept.append(observation)
+        if len(kept) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(store.Store, "add", interrupted)
+    call(*words, status=130)
+    done = call(*words)
+    assert "2 of 4 cells are done" in done.stderr and len(kept) == 4
+    results = Store(tmp_path, create=False)
+    assert len(results.runs()) == 1 and results.run().finished
+    results.close()
+
+
+def test_a_fail_is_what_a_study_looks_for_and_a_crash_is_an_alarm(tmp_path, plugins):
+    pytest.importorskip("pybullet")
+    words = ("sweep", "impact", "--list", "v=3", "--dim", "2", "--jobs", 1)
+    call(*words, "--engine", "bullet", "--profile", "default", "--out", tmp_path / "a")
+    assert not pd.read_csv(tmp_path / "a" / "sweep.csv").passes.all()
+    done = call(*words, "--engine", "evil", "--profile", "raise", "--out", tmp_path / "b", status=1)
+    assert "no answer" in done.stderr
+    assert list(pd.read_csv(tmp_path / "b" / "sweep.csv").passes) == [False]
+
+
+def test_parquet_has_the_same_table(tmp_path):
+    pytest.importorskip("pyarrow")
+    call(*CELL, "--list", "e=0.5", "--jobs", 1, "--out", tmp_path, "--parquet", tmp_path / "t.parquet")
+    found = pd.read_parquet(tmp_path / "t.parquet")
+    assert (
+        found.rebound_ratio.iloc[0]
+        == pd.read_csv(tmp_path / "sweep.csv", float_precision="round_trip").rebound_ratio[0]
+    )
+
+
+def test_sobol_without_scipy_says_how_to_get_it(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "scipy.stats", None)
+    done = call(*CELL, "--sobol", "e=0:1", "--out", tmp_path, status=2)
+    assert "pip install 'contact-crosscheck[report]'" in done.output

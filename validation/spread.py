@@ -1,0 +1,86 @@
+"""How far engines are apart on a scene that has no closed form, at the last moment at which that means anything.
+
+    horizon    of predictability: until then a disturbance in the last place has not grown to matter, as the certified
+               run of our own solver says; the end of the run where it says nothing against
+    spread     largest distance of a free body's centre from where that run has it, at the horizon [m]
+
+Beyond the horizon two correct engines differ; before it they must not. Distances are read from the recordings, whose
+places are rounded to 1/32767 of half their range: what is less is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from adapters.registry import profile_of, solver
+from validation.cells import Observation, Outcome, Slot
+from validation.posed import resolve
+from validation.tracks import Recording
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One engine and profile beside the certified run; ``distance`` [m] of ``body`` at ``time`` [s]."""
+
+    scene: str
+    dimension: int
+    engine: str
+    profile: str
+    time: float
+    body: str
+    distance: float
+    certified: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def spreads(observations: Sequence[Observation], recordings: Sequence[tuple[Slot, Recording]]) -> list[Spread]:
+    """Distances of every recorded run from that of our solver on the same scene; none where that did not run."""
+    kept, found = dict(recordings), {observation.slot: observation for observation in observations}
+    ours = (solver(), profile_of(solver(), "solution"))
+    told = []
+    for slot, recording in kept.items():
+        partner = next((s for s in kept if (s.engine, s.profile) == ours and _posed(s) == _posed(slot)), None)
+        if partner is None or partner == slot or slot not in found or found[slot].outcome is not Outcome.OK:
+            continue
+        time = _horizon(found[partner], kept[partner])
+        body, distance = _apart(slot, recording, kept[partner], time)
+        certified = bool(found[partner].certificate.get("certified"))
+        told.append(Spread(slot.scene, slot.dimension, slot.engine, slot.profile, time, body, distance, certified))
+    return told
+
+
+def _posed(slot: Slot) -> tuple[Any, ...]:
+    return slot.scene, slot.params, slot.dimension
+
+
+def _horizon(observation: Observation, recording: Recording) -> float:
+    """Until when the run can be predicted [s]."""
+    said = observation.certificate.get("full", {}).get("horizon")
+    end = float(recording.t[-1])
+    return min(end, float(said)) if isinstance(said, int | float) else end
+
+
+def _apart(slot: Slot, recording: Recording, partner: Recording, time: float) -> tuple[str, float]:
+    """The free body that is farthest from its place in ``partner`` at ``time``, and how far [m]."""
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
+    places = [_at(each, time, scene.dimension)[free] for each in (recording, partner)]
+    distances = np.linalg.norm(places[0] - places[1], axis=1)
+    worst = int(distances.argmax())
+    return scene.bodies[free[worst]].name, float(distances[worst])
+
+
+def _at(recording: Recording, time: float, dimension: int) -> np.ndarray:
+    """Centres at ``time``, between two frames in proportion, (n, d) [m]."""
+    k = int(np.clip(np.searchsorted(recording.t, time), 1, len(recording.t) - 1))
+    before, after = recording.t[k - 1], recording.t[k]
+    share = float(np.clip((time - before) / (after - before), 0.0, 1.0))
+    places: np.ndarray = recording.pose[:, :, :dimension]
+    return np.asarray((1.0 - share) * places[k - 1] + share * places[k])
