@@ -55,7 +55,7 @@ def frontier(
     for name in names:
         if name not in known:
             raise click.BadParameter(f"{name} cannot be driven; {', '.join(known)} can", param_hint="SCENES")
-    engines = list(engine) or registry.names()
+    engines = list(engine) or registry.usual()
     for name in engines:
         registry.find(name)
     found = brackets(names, engines, profile, dim, quick)
