@@ -21,7 +21,7 @@ from adapters.registry import find
 from adapters.scene import Scene, SceneError
 from validation.canonical import CanonicalScene, Measured
 from validation.identity import adapter_hash, scene_code
-from validation.posed import resolve
+from validation.posed import is_known, resolve
 
 #: Most iterations and units in the last place that can be asked for: C integers hold the first, and the second are
 #: made one by one.
@@ -289,7 +289,8 @@ def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
     EngineError
         For an unknown profile, or an iteration count that the profile does not have.
     """
-    brought = resolve(slot.scene).brought(slot.engine, slot.profile)
+    # The bench has scenes of its own, which no catalogue knows; they bring nothing.
+    brought = resolve(slot.scene).brought(slot.engine, slot.profile) if is_known(slot.scene) else None
     if brought is not None:
         own = list(brought.settings)
     else:

@@ -33,6 +33,11 @@ def is_file(argument: str) -> bool:
     return argument not in CATALOGUE and _FILE.fullmatch(argument) is not None
 
 
+def is_known(argument: str) -> bool:
+    """Whether the argument names a scene of the catalogue, or a file."""
+    return argument in CATALOGUE or is_file(argument)
+
+
 def pinned(argument: str, drop: bool = False) -> str:
     """Name of a scene that stays what it is: a file's name gets the hash of its text.
 

@@ -141,8 +141,11 @@ def test_every_check_states_unit_reason_and_source():
     for canonical in CATALOGUE.values():
         for dimension in canonical.dimensions:
             for check in canonical.checks(canonical.scene(dimension), 1 / 240):
-                assert check.unit and check.because and check.source and check.bound > 0.0
-                assert math.isfinite(check.bound)
+                assert check.unit and check.because and check.source
+                if check.truth is None and check.bound is None:
+                    assert check.because.startswith("shown: ")  # judged by nobody
+                    continue
+                assert check.bound > 0.0 and math.isfinite(check.bound)
 
 
 def test_the_worked_example_is_a_scene():

@@ -74,7 +74,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         thrown.check("thrown", "m/s", truth["thrown"], source),
         placed.check("centre_moved", "m", truth["centre_moved"], source),
         placed.check("grown", "m", truth["grown"], "bodies that overlap are not pulled together"),
-        Check("left", "1", None, None, "shown: no law of rigid bodies says how fast an overlap has to go", ""),
+        Check(
+            "left",
+            "1",
+            None,
+            None,
+            "shown: no law of rigid bodies says how fast an overlap has to go",
+            "depth at the end over that at the start",
+        ),
     ]
 
 

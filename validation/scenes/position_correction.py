@@ -57,7 +57,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         late.check("launched", "m", truth["launched"], source),
         late.check("sunk", "m", truth["sunk"], "a contact carries the weight, however deep it is"),
         bounds.slips(1, g, dt).check("drift", "m", truth["drift"], "symmetry"),
-        Check("left", "1", None, None, "shown: no law of rigid bodies says how fast an overlap has to go", ""),
+        Check(
+            "left",
+            "1",
+            None,
+            None,
+            "shown: no law of rigid bodies says how fast an overlap has to go",
+            "depth at the end over that at the start",
+        ),
     ]
 
 
