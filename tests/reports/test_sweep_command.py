@@ -120,7 +120,7 @@ def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
     monkeypatch.setattr(store.Store, "add", interrupted)
     call(*words, status=130)
     done = call(*words)
-    assert "2 of 4 cells are done" in done.stderr and len(kept) == 4
+    assert "2 of 4 cells done" in done.stderr and len(kept) == 4
     results = Store(tmp_path, create=False)
     assert len(results.runs()) == 1 and results.run().finished
     results.close()
