@@ -39,6 +39,15 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
         ("pivot", "edge_moved", {}),
         ("rocking_block", "slid", {"aspect": 0.25, "height": 10.0}),
         ("rocker", "amplitude", {}),
+        *(("seam", metric, {}) for metric in ("stopping_distance", "braking", "hop", "turned")),
+        ("pyramid", "penetration", {}),
+        *(("position_correction", "launched", params) for params in ({}, {"depth": 0.01})),
+        ("tilt_table", "moved", {}),
+        ("tilt_table", "moved", {"aspect": 1.0}),
+        ("tilt_table", "passing_time", {"ratio": 1.1}),
+        ("tilt_table", "edge_moved", {"ratio": 1.1}),
+        ("tilt_table", "turned", {"aspect": 1.0, "ratio": 1.1}),
+        *(("closing_wall", f"time[{k}]", {"closing": 0.1}) for k in (1, 2, 3)),
     )
 )
 
@@ -116,5 +125,36 @@ EXPERIMENTS += (
         )
         for profile in ("default", "tuned")
         for metric, params in (("rest_time", {"e": 0.95}), ("apex[5]", {"e": 1.0}))
+    ),
+)
+
+EXPERIMENTS += (
+    Experiment(
+        "pyramid-skin",
+        "without a skin the row passes; ten times the sweeps, over velocities or positions, do not help",
+        "default",
+        "pyramid",
+        "penetration",
+        _BARE,
+        {"rows": 5.0},
+        idle=({"iterations": 80}, {"position_iterations": 30}),
+    ),
+    *(
+        Experiment(
+            "overlap-positions-in-singles",
+            "in a unit of 100 m the overlap is within the slop, no place is put right, and the centre stays to the "
+            "last bit; sweeps over velocities and sweeping do nothing",
+            profile,
+            "overlap",
+            "centre_moved",
+            {"units_per_metre": 0.01},
+            params,
+            idle=({"iterations": 1000}, {"continuous": False}),
+        )
+        for profile, params in (
+            ("default", dict[str, float]()),
+            ("tuned", dict[str, float]()),
+            ("tuned", {"depth": 0.01, "ratio": 100.0}),
+        )
     ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from adapters.box2d.motions import Chosen, corner_law, standstill_law
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
@@ -21,6 +22,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
     "galperin": ("small_speed", "large_speed", "energy_defect"),
     "oblique": ("rebound_ratio", "forward_speed", "spin_speed"),
+    "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),
     "pair_matrix": tuple(f"{name}[{k}]" for name in ("restitution", "friction") for k in range(1, 5)),
 }
 
@@ -74,4 +76,44 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for profile in PROFILES
     for scene, metrics in BLOWS.items()
     for metric in metrics
+)
+
+
+def _chosen(profile: str) -> Chosen:
+    """Unit and skin of a profile."""
+
+    def of(scene: Scene, dt: float) -> tuple[float, float]:
+        chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+        return chosen["units_per_metre"], chosen["skin"]
+
+    return of
+
+
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d",
+        (profile,),
+        "far_origin",
+        "stopping_distance",
+        standstill_law("stopping_distance", _chosen(profile)),
+        "places are singles: a step's way below half their spacing (12 cm at 1e6 m) is lost",
+        "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/box2d/motions.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d",
+        (profile,),
+        "edge_drop",
+        metric,
+        corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
+        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to one unit a second",
+        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/box2d/motions.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for metric in ("rise", "spin", "impulse")
 )

@@ -1,0 +1,127 @@
+"""Two motions in the plane that single numbers change, as laws: a place that is too far away, a box on its corner."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from adapters.engine import Array, Contacts
+from adapters.law import Law, Measure, Prediction
+from adapters.scene import Body, Box, HalfSpace, Scene
+from adapters.single_precision import ROUNDINGS, UNIT
+from adapters.stepping import step_count
+from adapters.trajectory import ContactRecord, Trajectory
+
+#: ``(units_per_metre, skin [length])`` that a profile chooses for a scene and a step.
+Chosen = Callable[[Scene, float], tuple[float, float]]
+
+
+def standstill_law(metric: str, chosen: Chosen) -> Law:
+    """A sliding box whose way in a step is below half the spacing of single numbers there: it stays where it is.
+
+    Nothing is said where a step's way is kept, or where the box could become faster than it starts.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        if len(scene.bodies) != 2 or scene.dimension != 2:
+            return None
+        plate, box = scene.bodies
+        (x, _, _), (vx, vy, spin) = box.pose, box.twist
+        level = scene.gravity[0] == 0.0 and plate.motion == "fixed" and not any((*box.force, *box.torque, vy, spin))
+        units, _ = chosen(scene, dt)
+        place = np.float32(x * units)
+        spacing = abs(float(np.nextafter(place, np.float32(math.copysign(math.inf, vx))) - place)) / units
+        if not level or not abs(vx) * dt < 0.5 * spacing:
+            return None
+        start = np.array([body.pose for body in scene.bodies])
+        times = np.array([0.0, step_count(scene.duration, dt) * dt])
+        still = Trajectory(times, np.array([start, start]), np.zeros((2, 2, 3)), None, dt, "completed")
+        value = measure(scene, still)[metric][0]
+        # What is lost is lost to the last bit.
+        return None if value is None else (value, 0.0)
+
+    return law
+
+
+def corner_law(metric: str, chosen: Chosen, threshold: float) -> Law:
+    """A tilted box that comes down on one corner without friction, turn or load; numbers are rounded to singles.
+
+    With the corner ``l`` beside the centre it is ``J = m (1 + e) v/(1 + m l^2/I)``. Where the box rebounds and has a
+    skin nothing is said: what is swept stops within its skin, and is turned a little before it is hit.
+
+    Parameters
+    ----------
+    metric, chosen
+        What is predicted, and the settings.
+    threshold
+        Approach up to which nothing rebounds [length/s].
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        units, skin = chosen(scene, dt)
+        if not _falls_on_a_corner(scene):
+            return None
+        floor, box = scene.bodies
+        assert isinstance(box.inertia, float | int) and isinstance(floor.shape, HalfSpace)
+        e, speed = scene.material(floor.name, box.name).restitution, -box.twist[1]
+        if speed * units <= threshold:
+            e = 0.0
+        if e > 0.0 and skin > 0.0:
+            return None
+        lever, below = _lowest(box)
+        landing = (box.pose[1] - below) / speed
+        blow = (1.0 + e) * speed / (1.0 / box.mass + lever**2 / box.inertia)
+        if not 0.0 < landing < scene.duration - dt:
+            return None
+        value = measure(scene, _landed(scene, dt, landing, blow, lever))[metric][0]
+        if value is None:
+            return None
+        share = ROUNDINGS * UNIT
+        other = measure(scene, _landed(scene, dt, landing, blow * (1.0 + share), lever))[metric][0]
+        # The arm of the blow is told by sine and cosine of a single angle: off by its roundings too.
+        third = measure(scene, _landed(scene, dt, landing, blow, lever * (1.0 + share)))[metric][0]
+        assert other is not None and third is not None
+        return value, abs(other - value) + abs(third - value) + share * abs(value)
+
+    return law
+
+
+def _falls_on_a_corner(scene: Scene) -> bool:
+    if len(scene.bodies) != 2 or scene.dimension != 2 or any(scene.gravity):
+        return False
+    floor, box = scene.bodies
+    if not isinstance(box.shape, Box) or box.motion != "free" or any((*box.force, *box.torque)):
+        return False
+    on_the_floor = floor.shape == HalfSpace((0.0, 1.0), 0.0) and floor.motion == "fixed"
+    vx, vy, spin = box.twist
+    tilted = abs(math.remainder(box.pose[2], 0.5 * math.pi)) > 1e-3
+    plain = scene.material(floor.name, box.name).friction == 0.0
+    return on_the_floor and plain and tilted and vx == 0.0 and spin == 0.0 and vy < 0.0
+
+
+def _lowest(box: Body) -> tuple[float, float]:
+    """The lowest corner against the centre: along +x, and below it [m]."""
+    assert isinstance(box.shape, Box)
+    a, b = box.shape.half_extents
+    c, s = math.cos(box.pose[2]), math.sin(box.pose[2])
+    corners = [(c * p - s * q, -(s * p + c * q)) for p in (-a, a) for q in (-b, b)]
+    return max(corners, key=lambda corner: corner[1])
+
+
+def _landed(scene: Scene, dt: float, landing: float, blow: float, lever: float) -> Trajectory:
+    """The motion at every step: down, the blow, and away."""
+    box = scene.bodies[1]
+    assert isinstance(box.inertia, float | int)
+    t = np.arange(step_count(scene.duration, dt) + 1, dtype=np.float64) * dt
+    hit: Array = (t > landing).astype(float)
+    pose = np.broadcast_to(np.array([body.pose for body in scene.bodies]), (len(t), 2, 3)).copy()
+    twist = np.broadcast_to(np.array([body.twist for body in scene.bodies]), (len(t), 2, 3)).copy()
+    twist[:, 1, 1] += hit * blow / box.mass
+    twist[:, 1, 2] += hit * lever * blow / box.inertia
+    pose[:, 1, 1] += box.twist[1] * t + hit * (t - landing) * blow / box.mass
+    pose[:, 1, 2] += hit * (t - landing) * lever * blow / box.inertia
+    rows = Contacts.from_rows([(0, 1, np.zeros(2), (0.0, 1.0), (0.0, blow), 0.0)], 2)
+    record = ContactRecord(np.array([int(np.argmax(hit))]), np.array([0, 1], np.int64), rows)
+    return Trajectory(t, pose, twist, record, dt, "completed")
