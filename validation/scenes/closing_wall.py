@@ -129,6 +129,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="closing_wall",
+    family="many impacts",
     version=1,
     title="Ball between a wall and a plate that closes in",
     figure=__doc__ or "",

@@ -128,6 +128,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="edge_drop",
+    family="hard",
     version=1,
     title="Tilted box that lands on an edge",
     figure=__doc__ or "",

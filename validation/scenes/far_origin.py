@@ -47,6 +47,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 SCENE = CanonicalScene(
     name="far_origin",
+    family="hard",
     version=1,
     title="Box that slides to a stop far away from the origin",
     figure=__doc__ or "",

@@ -84,6 +84,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="long_rest",
+    family="stacks and statics",
     version=1,
     title="Short column that rests for a long time",
     figure=__doc__ or "",

@@ -93,6 +93,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="overlap",
+    family="hard",
     version=1,
     title="Two balls that start inside each other",
     figure=__doc__ or "",

@@ -76,6 +76,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="position_correction",
+    family="hard",
     version=1,
     title="Box that starts sunk into the floor",
     figure=__doc__ or "",

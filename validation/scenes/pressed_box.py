@@ -119,6 +119,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="pressed_box",
+    family="grip and force",
     version=1,
     title="Box pressed onto the floor and pushed along it",
     figure=__doc__ or "",

@@ -67,6 +67,7 @@ def track(scene: Scene) -> Track:
 
 SCENE = CanonicalScene(
     name="pyramid",
+    family="stacks and statics",
     version=1,
     title="Wall of boxes, each over a gap, in equilibrium",
     figure=__doc__ or "",

@@ -47,6 +47,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 SCENE = CanonicalScene(
     name="seam",
+    family="hard",
     version=1,
     title="Box that slides over the seams of flush plates",
     figure=__doc__ or "",

@@ -151,6 +151,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
 
 SCENE = CanonicalScene(
     name="tilt_table",
+    family="stacks and statics",
     version=1,
     title="Block on a tilted table: stays, slides or topples",
     figure=__doc__ or "",
