@@ -18,6 +18,7 @@ from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_f
 from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import terminal
+from reports.wording import plural
 from validation.rows import rows_of
 from validation.store import Store
 from validation.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
@@ -57,7 +58,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     if not chosen:
         raise SceneError("scenes: no cell fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(chosen)}) if as_json else f"{len(chosen)} cells")
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "cell"))
         return
     folder(out)
     for name in ("csv", "parquet"):
@@ -65,7 +66,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
             writable(files[name], name)
     if options["parquet"]:
         with extra("sweep", "parquet"):
-            import pyarrow  # noqa: F401
+            import pyarrow  # noqa: F401  (asked for before anything runs, not after)
     store = Store(out)
     title = f"sweep: {' '.join(request.scenes)}"
     limits = options["jobs"], options["timeout"]

@@ -13,7 +13,7 @@ from adapters.stepping import run
 from adapters.trajectory import Sampling
 
 mujoco = pytest.importorskip("mujoco")
-from adapters.mujoco import model as reading  # noqa: E402
+from adapters.mujoco import model as reading  # noqa: E402  (it imports the engine, which may not be there)
 
 MODELS = Path(__file__).parents[1] / "models"
 READ = sorted(path for path in MODELS.glob("*.xml") if not path.name.startswith("refused"))

@@ -82,9 +82,14 @@ def test_the_formula_s_times_are_those_of_an_integration_with_events():
     canonical, scene = made("closing_wall")
     p, truth = scene.params, canonical.exact(scene)
     t, x, v, kept = 0.0, 0.5 * p["length"], p["v"], []
+
+    def plate(t, y):
+        return y[0] - (p["length"] - p["closing"] * t)
+
+    def wall(t, y):
+        return y[0]
+
     for n in (1, 2, 3):
-        plate = lambda t, y: y[0] - (p["length"] - p["closing"] * t)  # noqa: E731
-        wall = lambda t, y: y[0]  # noqa: E731
         for event, moved in ((plate, p["closing"]), (wall, 0.0)):
             event.terminal, event.direction = True, math.copysign(1.0, v)
             found = solve_ivp(lambda t, y, v=v: [v], (t, 99.0), [x], "DOP853", events=event, rtol=1e-13, atol=1e-13)

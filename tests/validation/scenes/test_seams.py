@@ -34,7 +34,10 @@ def sliding(scene, dt=DT, mu=None, offset=0.0):
     """v' = -mu g until v = 0, by DOP853; ``offset`` in steps shifts what is sampled, as step orders do."""
     p, box = scene.params, len(scene.bodies) - 1
     mu = p["mu"] if mu is None else mu
-    stop = lambda t, y: y[1]  # noqa: E731
+
+    def stop(t, y):
+        return y[1]
+
     stop.terminal = True
     times = np.arange(round(scene.duration / dt) + 1) * dt
     found = solve_ivp(lambda t, y: [y[1], -mu * p["g"]], (0.0, 1e3), [0.0, p["v"]], "DOP853", dense_output=True,
