@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
@@ -266,49 +264,6 @@ def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
         return False
     pull = load_speed(bodies, rows, c, 1.0)
     return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
-
-
-@inner_kernel
-def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tuple[float, float]:
-    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow, and hops of noise.
-
-    ``bodies.twist`` are the velocities after ``length`` of it. One contact was hit, the other leaves and returns: with
-    e = 0 speeds of impacts, and times between them, go on by the same ratio (G. Housner, *Bull. Seismol. Soc. Am.*
-    53, 1963; E22). Returns the time until the last has ended, and the shortest until one that rocks returns; 0 and
-    infinite if there are none.
-    """
-    left, longest, shortest = sub.clock[LEFT], 0.0, math.inf
-    for c in range(rows.counts[CONTACTS]):
-        leaves = normal_velocity(sub.start, rows, c)
-        if leaves > NOISE * rows.real[c, SPEED] and not flies(bodies, rows, c, leaves, left):
-            longest = max(longest, 2.0 * leaves / load_speed(bodies, rows, c, 1.0))
-            rows.integer[c, ENDING] = SERIES_ENDS
-    for m in range(rows.counts[MANIFOLDS]):
-        first = rows.manifold[m]
-        for k in range(2 if rows.manifold[m + 1] - first == 2 else 0):
-            hit, other = first + k, first + 1 - k
-            struck = rows.integer[hit, IMPACT] == 1 and rows.integer[other, IMPACT] == 0
-            if (
-                not struck
-                or rows.real[hit, RESTITUTION] > 0.0
-                or rows.real[other, GAP] > gap_noise(bodies, rows, other)
-            ):
-                continue
-            ratio = -normal_velocity(sub.start, rows, other) / normal_velocity(sub.before, rows, hit)
-            leaves = normal_velocity(sub.start, rows, other)
-            pull = (leaves - normal_velocity(bodies.twist, rows, other)) / length
-            if not (leaves > NOISE * rows.real[other, SPEED] and ratio < 1.0 and pull > 0.0):
-                continue
-            returns = 2.0 * leaves / pull
-            shortest = min(shortest, returns)
-            if returns <= left * (1.0 - ratio):
-                longest = max(longest, returns / (1.0 - ratio))
-            elif returns * BOUNCES < left:
-                longest = left
-            else:
-                continue
-            rows.integer[other, ENDING] = SERIES_ENDS
-    return longest, shortest
 
 
 @inner_kernel

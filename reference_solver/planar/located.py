@@ -26,7 +26,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
 from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
 from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import collide_now, end_rocking, end_series, keep_loaded, keep_touching, release
+from reference_solver.planar.impact import collide_now, end_series, keep_loaded, keep_touching, release
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.jam import weigh_clusters
 from reference_solver.planar.kinematics import copy_vectors
@@ -34,7 +34,8 @@ from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
 from reference_solver.planar.midpoint import close_gaps, keep_change, levers_of_start, misses_end, take_back
 from reference_solver.planar.position import correct_positions
-from reference_solver.planar.press import cut_work, go_back, keep, press
+from reference_solver.planar.press import cut_work, go_back, keep
+from reference_solver.planar.rocking import rest
 from reference_solver.planar.rows import warm_start
 from reference_solver.planar.slide import press_until_stick
 from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
@@ -261,25 +262,6 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
         length = rest(bodies, rows, problem, sub, options, tally, length)
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
-    return length
-
-
-@spliced_kernel
-def rest(
-    bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array, length: float
-) -> float:
-    """Hold contacts of bodies that rock to rest (E22), until they do; length of the sub-step."""
-    left = sub.clock[LEFT]
-    longest, shortest = end_rocking(bodies, rows, sub, length)
-    if shortest < left:
-        weigh_event(sub.clock, REBOUND)
-    if longest == 0.0:
-        return length
-    go_back(tally, sub.tally[1])
-    sub.clock[HELD] = sub.clock[ROCKS]  # if rows turn the impulse-level scheme does it
-    sub.clock[ROCKS], sub.clock[ROCKING] = 0.0, 1.0
-    length = min(max(longest, SHORT * options.dt), left)
-    press(bodies, rows, problem, sub, options, tally, length)
     return length
 
 

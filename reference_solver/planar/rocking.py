@@ -1,0 +1,98 @@
+"""Bodies that rock to rest on each other: a series of impacts at two points, and hops that are mere noise (E22)."""
+
+from __future__ import annotations
+
+import math
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
+from reference_solver.direct.problem import Problem
+from reference_solver.model import Array
+from reference_solver.planar.columns import ENDING, GAP, IMPACT, RESTITUTION, SPEED
+from reference_solver.planar.impact import flies, gap_noise
+from reference_solver.planar.kinematics import load_speed, normal_velocity
+from reference_solver.planar.lasting import evaluate, free_accelerations, hold
+from reference_solver.planar.press import go_back, press
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, weigh_event
+from reference_solver.stepping.equalities import row_value
+from reference_solver.stepping.impacts import BOUNCES, SERIES_ENDS
+from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.noise import NOISE, SHORT
+from reference_solver.stepping.options import Options
+
+
+@inner_kernel
+def is_pulled_back(bodies: Bodies, rows: Rows, lasting: Lasting, c: int) -> bool:
+    """Whether a contact that parts is accelerated back together: by loads, less what going round each other takes.
+
+    A disc that has just left the top of another parts from it by less than round-off for a while, and never returns.
+    """
+    hold(bodies, rows, lasting, c, 0)
+    lasting.size[LASTING] = 1
+    evaluate(bodies, lasting)
+    free_accelerations(bodies, lasting)
+    return bool(row_value(lasting, 0, 0, lasting.free) + lasting.gamma[0, 0] < 0.0)
+
+
+@inner_kernel
+def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tuple[float, float]:
+    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow, and hops of noise.
+
+    ``bodies.twist`` are the velocities after ``length`` of it. One contact was hit, the other leaves and returns: with
+    e = 0 speeds of impacts, and times between them, go on by the same ratio (G. Housner, *Bull. Seismol. Soc. Am.*
+    53, 1963; E22). Returns the time until the last has ended, and the shortest until one that rocks returns; 0 and
+    infinite if there are none.
+    """
+    left, longest, shortest = sub.clock[LEFT], 0.0, math.inf
+    for c in range(rows.counts[CONTACTS]):
+        leaves = normal_velocity(sub.start, rows, c)
+        hops = leaves > NOISE * rows.real[c, SPEED] and not flies(bodies, rows, c, leaves, left)
+        if hops and is_pulled_back(bodies, rows, sub.lasting, c):
+            longest = max(longest, 2.0 * leaves / load_speed(bodies, rows, c, 1.0))
+            rows.integer[c, ENDING] = SERIES_ENDS
+    for m in range(rows.counts[MANIFOLDS]):
+        first = rows.manifold[m]
+        for k in range(2 if rows.manifold[m + 1] - first == 2 else 0):
+            hit, other = first + k, first + 1 - k
+            struck = rows.integer[hit, IMPACT] == 1 and rows.integer[other, IMPACT] == 0
+            if (
+                not struck
+                or rows.real[hit, RESTITUTION] > 0.0
+                or rows.real[other, GAP] > gap_noise(bodies, rows, other)
+            ):
+                continue
+            ratio = -normal_velocity(sub.start, rows, other) / normal_velocity(sub.before, rows, hit)
+            leaves = normal_velocity(sub.start, rows, other)
+            pull = (leaves - normal_velocity(bodies.twist, rows, other)) / length
+            if not (leaves > NOISE * rows.real[other, SPEED] and ratio < 1.0 and pull > 0.0):
+                continue
+            returns = 2.0 * leaves / pull
+            shortest = min(shortest, returns)
+            if returns <= left * (1.0 - ratio):
+                longest = max(longest, returns / (1.0 - ratio))
+            elif returns * BOUNCES < left:
+                longest = left
+            else:
+                continue
+            rows.integer[other, ENDING] = SERIES_ENDS
+    return longest, shortest
+
+
+@spliced_kernel
+def rest(
+    bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array, length: float
+) -> float:
+    """Hold contacts of bodies that rock to rest (E22), until they do; length of the sub-step."""
+    left = sub.clock[LEFT]
+    longest, shortest = end_rocking(bodies, rows, sub, length)
+    if shortest < left:
+        weigh_event(sub.clock, REBOUND)
+    if longest == 0.0:
+        return length
+    go_back(tally, sub.tally[1])
+    sub.clock[HELD] = sub.clock[ROCKS]  # if rows turn the impulse-level scheme does it
+    sub.clock[ROCKS], sub.clock[ROCKING] = 0.0, 1.0
+    length = min(max(longest, SHORT * options.dt), left)
+    press(bodies, rows, problem, sub, options, tally, length)
+    return length
