@@ -37,13 +37,13 @@ def open_piece(journal: Journal, begin: float, length: float, kind: int, scheme:
 
 
 @inner_kernel
-def enter_body(journal: Journal, i: int, pose: Array, twist: Array) -> None:
-    """Enter body i, from what `keep_state` kept to ``pose[i]`` and ``twist[i]``."""
+def enter_body(journal: Journal, i: int, number: int, pose: Array, twist: Array) -> None:
+    """Enter body i, of that number in the world, from what `keep_state` kept to ``pose[i]`` and ``twist[i]``."""
     k = journal.used[BODIES]
     journal.used[BODIES] += 1
     if k < len(journal.body):
         p = journal.pose.shape[1]
-        journal.body[k] = i
+        journal.body[k] = number
         for d in range(p):
             journal.before[k, d], journal.after[k, d] = journal.pose[i, d], pose[i, d]
         for d in range(journal.twist.shape[1]):
@@ -51,10 +51,10 @@ def enter_body(journal: Journal, i: int, pose: Array, twist: Array) -> None:
 
 
 @inner_kernel
-def enter_bodies(journal: Journal, pose: Array, twist: Array) -> None:
-    """Enter all bodies."""
+def enter_bodies(journal: Journal, numbers: Array, pose: Array, twist: Array) -> None:
+    """Enter all bodies by their ``numbers`` in the world."""
     for i in range(len(journal.pose)):
-        enter_body(journal, i, pose, twist)
+        enter_body(journal, i, numbers[i], pose, twist)
 
 
 @inner_kernel
@@ -72,3 +72,20 @@ def next_contact(journal: Journal, a: int, b: int, feature: int) -> int:
 def close_step(journal: Journal) -> None:
     """Count a step made."""
     journal.used[STEPS] += 1
+
+
+@inner_kernel
+def journal_part(journal: Journal, count: int) -> Journal:
+    """The journal, with room for the states of the first ``count`` bodies."""
+    return Journal(
+        journal.used,
+        journal.time,
+        journal.label,
+        journal.body,
+        journal.before,
+        journal.after,
+        journal.name,
+        journal.wrench,
+        journal.pose[:count],
+        journal.twist[:count],
+    )

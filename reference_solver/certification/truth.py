@@ -4,8 +4,8 @@
 ``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
-has grown ``GROWTH`` times over what it would be in free flight, the error apart, a run can be truth to all but the last few digits;
-afterwards no run at this precision can, and only its laws are certified.
+has grown ``GROWTH`` times over what it would be in free flight, the error apart, a run can be truth to all but the last
+few digits; afterwards no run at this precision can, and only its laws are certified.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 
 Indices = NDArray[np.int64]
@@ -117,4 +118,22 @@ def allocate_problem(dimension: int, bodies: int, contacts: int, used: bool) -> 
         upper=np.zeros(triangle),
         diagonal=np.zeros(unknowns),
         right=np.zeros(unknowns),
+    )
+
+
+@inner_kernel
+def problem_part(problem: Problem, count: int) -> Problem:
+    """Room of the direct solver for the first bodies."""
+    held = min(count, len(problem.body))
+    return Problem(
+        problem.size,
+        problem.contact,
+        problem.body[:held],
+        problem.neighbour,
+        problem.first,
+        problem.start,
+        problem.lower,
+        problem.upper,
+        problem.diagonal,
+        problem.right,
     )

@@ -29,10 +29,11 @@ from reference_solver.planar.flight import place, put_back
 from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
-from reference_solver.planar.press import FAR, go_back, keep
+from reference_solver.planar.press import FAR
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Pairs, Rows, SubStep
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping import phase
+from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import LEFT, OUTCOME, ROCKING
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import OPEN, Lasting

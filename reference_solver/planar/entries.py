@@ -6,7 +6,6 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.model import Array
 from reference_solver.pieces import (
-    BODIES,
     CONTACTS,
     FIFTH_ORDER,
     FIXED,
@@ -48,15 +47,6 @@ def enter_contact_rows(journal: Journal, bodies: Bodies, pose: Array, rows: Rows
 
 
 @inner_kernel
-def enter_numbered(journal: Journal, bodies: Bodies, pose: Array, twist: Array) -> None:
-    """Enter all bodies by their numbers in the world."""
-    first = journal.used[BODIES]
-    enter_bodies(journal, pose, twist)
-    for k in range(first, min(journal.used[BODIES], len(journal.body))):
-        journal.body[k] = bodies.kind[journal.body[k], NUMBER]
-
-
-@inner_kernel
 def enter_moments(journal: Journal, lasting: Lasting, first: int) -> None:
     """Impulses and moments of lasting contacts, whose frames turned within the piece."""
     for j in range(lasting.size[HELD_CONTACTS]):
@@ -77,7 +67,7 @@ def enter_settled(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) ->
     """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
     if is_kept(sub.journal):
         open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, impulse_scheme(sub))
-        enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
+        enter_bodies(sub.journal, bodies.kind[:, NUMBER], bodies.pose, bodies.twist)
         enter_contact_rows(sub.journal, bodies, sub.journal.pose, rows, IMPACT_N, IMPACT_T)
 
 
@@ -101,7 +91,7 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
     keep_state(journal, sub.pose, sub.before)
     if differ(sub.before, sub.start):
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
-        enter_numbered(journal, bodies, sub.pose, sub.start)
+        enter_bodies(journal, bodies.kind[:, NUMBER], sub.pose, sub.start)
         if sub.clock[HELD] > 0.0:
             exchange_levers(rows)  # those of the start
         enter_contact_rows(journal, bodies, sub.pose, rows, IMPACT_N, IMPACT_T)
@@ -112,7 +102,7 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
     if sub.clock[HELD] > 0.0 or sub.clock[COMES_TO_REST] > 0.0:
         scheme = impulse_scheme(sub)
     open_piece(journal, begin, length, FORCES, scheme)
-    enter_numbered(journal, bodies, bodies.pose, bodies.twist)
+    enter_bodies(journal, bodies.kind[:, NUMBER], bodies.pose, bodies.twist)
     first = journal.used[CONTACTS]
     enter_contact_rows(journal, bodies, sub.pose, rows, PN, PT)
     if curved:
@@ -125,7 +115,7 @@ def enter_release(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, le
     """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
     if is_kept(sub.journal):
         open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
-        enter_numbered(sub.journal, bodies, bodies.pose, bodies.twist)
+        enter_bodies(sub.journal, bodies.kind[:, NUMBER], bodies.pose, bodies.twist)
         enter_contact_rows(sub.journal, bodies, bodies.pose, rows, PN, PT)
 
 
@@ -134,5 +124,5 @@ def enter_fixed_step(journal: Journal, bodies: Bodies, rows: Rows, options: Opti
     """Enter a step at fixed dt, from what was kept before it."""
     if is_kept(journal):
         open_piece(journal, 0.0, options.dt, FORCES, FIXED)
-        enter_bodies(journal, bodies.pose, bodies.twist)
+        enter_bodies(journal, bodies.kind[:, NUMBER], bodies.pose, bodies.twist)
         enter_contact_rows(journal, bodies, journal.pose, rows, PN, PT)

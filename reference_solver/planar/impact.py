@@ -215,8 +215,8 @@ def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
     for c in range(rows.counts[CONTACTS]):
         missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
         if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * rows.real[c, SPEED]:
-            tally[CONTRADICTED_A] = 1.0 + rows.integer[c, A]
-            tally[CONTRADICTED_B] = 1.0 + rows.integer[c, B]
+            tally[CONTRADICTED_A] = 1.0 + bodies.kind[rows.integer[c, A], NUMBER]
+            tally[CONTRADICTED_B] = 1.0 + bodies.kind[rows.integer[c, B], NUMBER]
 
 
 @inner_kernel

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel, spliced_kernel
-from reference_solver.direct.problem import Problem
+from reference_solver.direct.problem import Problem, problem_part
+from reference_solver.journal import journal_part
 from reference_solver.model import Array
-from reference_solver.pieces import Journal
 from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.certificate import is_finite
 from reference_solver.planar.columns import (
@@ -23,7 +23,6 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.located import located_step
 from reference_solver.planar.manifolds import keep_remembered, pass_on
 from reference_solver.planar.meeting import Meeting
-from reference_solver.planar.press import keep
 from reference_solver.planar.state import (
     CANDIDATES,
     FIXED,
@@ -37,23 +36,23 @@ from reference_solver.planar.state import (
     SubStep,
     World,
 )
+from reference_solver.stepping.accounting import keep
 from reference_solver.stepping.clock import CONFINED, ESCAPED, LEFT, UNSETTLED
 from reference_solver.stepping.islands import (
-    NODES,
+    LEFT_BOUNDS,
+    MADE,
+    NO_ROOM,
     ROOM,
     Islands,
-    join,
+    gather_all,
+    join_candidates,
     list_members,
-    list_unmoved,
     root,
 )
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import Paths
 from reference_solver.tally import OPENED
-
-#: What became of an attempt: all islands made their step; one left its bounds; an array was too small.
-MADE, LEFT_BOUNDS, NO_ROOM = 0, 1, 2
 
 
 @spliced_kernel
@@ -88,23 +87,6 @@ def step_world(
 
 
 @inner_kernel
-def gather_all(bodies: Bodies, islands: Islands) -> None:
-    """Let all bodies be one island."""
-    first, last = -1, -1
-    islands.size[NODES] = 0
-    for i in range(len(bodies.kind)):
-        islands.first[i], islands.mark[i], islands.next_free[i] = -1, -1, -1
-        if bodies.kind[i, MOTION] == FREE:
-            if last >= 0:
-                islands.next_free[last] = i
-            first, last = i if first < 0 else first, i
-            islands.label[i] = first
-    for i in range(len(bodies.kind)):
-        if first >= 0 and bodies.kind[i, MOTION] != FREE:
-            list_unmoved(islands, first, i)
-
-
-@inner_kernel
 def bound_step(bodies: Bodies, pairs: Pairs, options: Options, islands: Islands, room: float) -> None:
     """Where bodies may be within the step: as far as speeds and loads take them, times ``room``."""
     for i in range(len(bodies.kind)):
@@ -127,26 +109,7 @@ def find_islands(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options, isl
     bound_step(bodies, pairs, options, islands, room)
     if not pair_bodies(bodies, pairs, rows, options):
         return False
-    n = len(bodies.kind)
-    for i in range(n):
-        islands.label[i], islands.first[i], islands.mark[i], islands.next_free[i] = i, -1, -1, -1
-    for k in range(rows.counts[CANDIDATES]):
-        a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
-        if bodies.kind[a, MOTION] == FREE and bodies.kind[b, MOTION] == FREE:
-            join(islands, a, b)
-    islands.size[NODES] = 0
-    for i in range(n):
-        if bodies.kind[i, MOTION] == FREE:
-            label = root(islands, i)
-            if label != i:
-                islands.next_free[islands.last[label]] = i
-            islands.last[label] = i
-    for k in range(rows.counts[CANDIDATES]):
-        a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
-        if bodies.kind[a, MOTION] != FREE:
-            list_unmoved(islands, root(islands, b), a)
-        elif bodies.kind[b, MOTION] != FREE:
-            list_unmoved(islands, root(islands, a), b)
+    join_candidates(bodies, islands, pairs.candidate, rows.counts[CANDIDATES])
     return True
 
 
@@ -242,24 +205,6 @@ def pairs_part(pairs: Pairs, world: World, count: int) -> Pairs:
 
 
 @inner_kernel
-def problem_part(problem: Problem, count: int) -> Problem:
-    """Room of the direct solver for the first bodies."""
-    held = min(count, len(problem.body))
-    return Problem(
-        problem.size,
-        problem.contact,
-        problem.body[:held],
-        problem.neighbour,
-        problem.first,
-        problem.start,
-        problem.lower,
-        problem.upper,
-        problem.diagonal,
-        problem.right,
-    )
-
-
-@inner_kernel
 def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
     """The sub-step of the first bodies."""
     paths, meeting = sub.meeting.paths, sub.meeting
@@ -292,23 +237,6 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         pair,
         world.limit[:count],
         journal_part(sub.journal, count),
-    )
-
-
-@inner_kernel
-def journal_part(journal: Journal, count: int) -> Journal:
-    """The journal, with room for the states of the first bodies."""
-    return Journal(
-        journal.used,
-        journal.time,
-        journal.label,
-        journal.body,
-        journal.before,
-        journal.after,
-        journal.name,
-        journal.wrench,
-        journal.pose[:count],
-        journal.twist[:count],
     )
 
 

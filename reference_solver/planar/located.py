@@ -34,13 +34,14 @@ from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
 from reference_solver.planar.midpoint import close_gaps, keep_change, levers_of_start, misses_end, take_back
 from reference_solver.planar.position import correct_positions
-from reference_solver.planar.press import cut_work, go_back, keep
+from reference_solver.planar.press import cut_work
 from reference_solver.planar.rocking import rest
 from reference_solver.planar.rows import warm_start
 from reference_solver.planar.slide import press_until_stick
 from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
 from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
+from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import (
     CONFINED,
     CRAWL,

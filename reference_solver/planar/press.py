@@ -30,7 +30,7 @@ from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
-from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK, SWEEPS
+from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
 #: it carries no impulse.
@@ -100,19 +100,3 @@ def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float,
         rows.real[c, PN], rows.real[c, PT] = share * rows.real[c, PN], share * rows.real[c, PT]
         done, moved, _ = row_work(bodies, rows, c)
         tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
-
-
-@inner_kernel
-def keep(tally: Array, kept: Array) -> None:
-    """Remember a tally."""
-    for k in range(len(tally)):
-        kept[k] = tally[k]
-
-
-@inner_kernel
-def go_back(tally: Array, kept: Array) -> None:
-    """Forget what solves that are made again entered since `keep`, but for the sweeps they cost."""
-    sweeps = tally[SWEEPS]
-    for k in range(len(tally)):
-        tally[k] = kept[k]
-    tally[SWEEPS] = sweeps

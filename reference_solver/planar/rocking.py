@@ -11,8 +11,9 @@ from reference_solver.planar.columns import ENDING, GAP, IMPACT, RESTITUTION, SP
 from reference_solver.planar.impact import flies, gap_noise
 from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.lasting import evaluate, free_accelerations, hold
-from reference_solver.planar.press import go_back, press
+from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
+from reference_solver.stepping.accounting import go_back
 from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, weigh_event
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.impacts import BOUNCES, SERIES_ENDS

@@ -12,8 +12,9 @@ from reference_solver.planar.curve import turns
 from reference_solver.planar.flight import begin_flight
 from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import tangent_velocity
-from reference_solver.planar.press import go_back, keep, press
+from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, Bodies, Rows, SubStep
+from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options

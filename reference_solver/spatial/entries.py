@@ -25,12 +25,12 @@ from reference_solver.stepping.options import Options
 
 
 @inner_kernel
-def enter_points(journal: Journal, manifolds: Manifolds, hit: bool) -> None:
+def enter_points(journal: Journal, bodies: Bodies, manifolds: Manifolds, hit: bool) -> None:
     """Enter all points with the impulses of impacts, or else of the force phase; poses as the piece began."""
     for m in range(len(manifolds)):
         a, b = manifolds.body_a[m], manifolds.body_b[m]
         for p in range(manifolds.points[m]):
-            k = next_contact(journal, a, b, manifolds.feature[m, p])
+            k = next_contact(journal, bodies.number[a], bodies.number[b], manifolds.feature[m, p])
             if k < 0:
                 continue
             local = row(manifolds.hit[m], p, 0) if hit else row(manifolds.impulse[m], p, 0)
@@ -77,10 +77,10 @@ def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: 
     begin = options.dt - sub.clock[LEFT]
     if struck(bodies):
         open_piece(journal, begin, 0.0, IMPACT, FROZEN)
-        enter_bodies(journal, journal.pose, bodies.first)
+        enter_bodies(journal, bodies.number, journal.pose, bodies.first)
         if sub.clock[HELD] > 0.0:
             exchange_levers(manifolds, sub)  # those of the start
-        enter_points(journal, manifolds, True)
+        enter_points(journal, bodies, manifolds, True)
         if sub.clock[HELD] > 0.0:
             exchange_levers(manifolds, sub)
     curved = False
@@ -89,9 +89,9 @@ def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: 
     keep_state(journal, journal.pose, bodies.first)
     scheme = IMPULSE_LEVEL if sub.clock[HELD] > 0.0 else FIFTH_ORDER if curved else FROZEN
     open_piece(journal, begin, length, FORCES, scheme)
-    enter_bodies(journal, bodies.pose, bodies.twist)
+    enter_bodies(journal, bodies.number, bodies.pose, bodies.twist)
     first = journal.used[CONTACTS]
-    enter_points(journal, manifolds, False)
+    enter_points(journal, bodies, manifolds, False)
     if curved:
         enter_moments(journal, manifolds, sub.lasting, first)
     keep_state(journal, bodies.pose, bodies.twist)
@@ -102,8 +102,8 @@ def enter_settled(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: O
     """Enter what was changed of poses and impulses of the impulse-level scheme at the end of its sub-step (E28)."""
     if is_kept(sub.journal):
         open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
-        enter_bodies(sub.journal, bodies.pose, bodies.twist)
-        enter_points(sub.journal, manifolds, True)
+        enter_bodies(sub.journal, bodies.number, bodies.pose, bodies.twist)
+        enter_points(sub.journal, bodies, manifolds, True)
 
 
 @inner_kernel
@@ -111,8 +111,8 @@ def enter_release(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: O
     """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
     if is_kept(sub.journal):
         open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
-        enter_bodies(sub.journal, bodies.pose, bodies.twist)
-        enter_points(sub.journal, manifolds, False)
+        enter_bodies(sub.journal, bodies.number, bodies.pose, bodies.twist)
+        enter_points(sub.journal, bodies, manifolds, False)
 
 
 @inner_kernel
@@ -120,5 +120,5 @@ def enter_fixed_step(journal: Journal, bodies: Bodies, manifolds: Manifolds, opt
     """Enter a step at fixed dt, from what was kept before it."""
     if is_kept(journal):
         open_piece(journal, 0.0, options.dt, FORCES, FIXED)
-        enter_bodies(journal, bodies.pose, bodies.twist)
-        enter_points(journal, manifolds, False)
+        enter_bodies(journal, bodies.number, bodies.pose, bodies.twist)
+        enter_points(journal, bodies, manifolds, False)

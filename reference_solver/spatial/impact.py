@@ -12,7 +12,7 @@ from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import collect_momentum
 from reference_solver.spatial.prepare import measure_speed, set_response
-from reference_solver.spatial.state import Bodies, Detection, Manifolds, SubStep
+from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, length, row
 from reference_solver.stepping.clock import LEFT, is_patient
@@ -30,9 +30,9 @@ from reference_solver.stepping.impacts import (
     TURNED,
     drifts_aside,
 )
-from reference_solver.stepping.noise import NOISE, SPEED_SHARE
+from reference_solver.stepping.noise import NOISE, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
-from reference_solver.tally import RELEASED_SPEED
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 
 @inner_kernel
@@ -85,7 +85,7 @@ def soft_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) 
 
 
 @inner_kernel
-def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: Options) -> int:
+def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -> int:
     """Targets -e u- of points that meet (E21), 0 of all others; returns what there is to solve.
 
     A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
@@ -93,7 +93,7 @@ def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifold
     """
     found = NO_IMPACT
     for m in range(len(manifolds)):
-        restitution = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
+        restitution = manifolds.restitution[m]
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             clear_point(manifolds, m, p)
@@ -121,21 +121,15 @@ def set_impact_targets(bodies: Bodies, detection: Detection, manifolds: Manifold
 
 
 @spliced_kernel
-def collide_now(
-    bodies: Bodies,
-    detection: Detection,
-    manifolds: Manifolds,
-    problem: Problem,
-    options: Options,
-    tally: Array,
-) -> int:
+def collide_now(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> int:
     """Impacts of all touching points together, from ``before`` to ``first`` (E21); what they were."""
     copy_twists(bodies.before, bodies.twist)
-    found = set_impact_targets(bodies, detection, manifolds, options)
+    found = set_impact_targets(bodies, manifolds, options)
     if found != NO_IMPACT:
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, manifolds, problem, options, tally)
         certify(bodies, manifolds, options, tally)
+        doubt(bodies, manifolds, options, tally)
         for m in range(len(manifolds)):
             for p in range(manifolds.points[m]):
                 for k in range(3):
@@ -145,9 +139,24 @@ def collide_now(
 
 
 @inner_kernel
-def end_series(
-    bodies: Bodies, detection: Detection, manifolds: Manifolds, sub: SubStep, options: Options, time: float
-) -> bool:
+def doubt(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
+    """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
+
+    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    """
+    for m in range(len(manifolds)):
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            missing = manifolds.target[m, p] - velocity_at(v, w, manifolds, m, p)[2]
+            if manifolds.open[m, p]:
+                continue
+            if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * manifolds.speed[m, p]:
+                tally[CONTRADICTED_A] = 1.0 + bodies.number[manifolds.body_a[m]]
+                tally[CONTRADICTED_B] = 1.0 + bodies.number[manifolds.body_b[m]]
+
+
+@inner_kernel
+def end_series(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, time: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
     ``bodies.twist`` are the velocities after ``time`` of it.
@@ -155,7 +164,7 @@ def end_series(
     left = sub.clock[LEFT]
     new = False
     for m in range(len(manifolds)):
-        e = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
+        e = manifolds.restitution[m]
         v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
         v_last, w_last = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):

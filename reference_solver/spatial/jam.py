@@ -7,7 +7,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.state import FREE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import length, row
-from reference_solver.stepping.clock import JAMMED, MOST_SOFT, PATIENCE, hold_rest, hurry, jams
+from reference_solver.stepping.clock import JAMMED, hold_rest, hurry, jams
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.options import MIDPOINT, Options
@@ -46,17 +46,14 @@ def weigh_clusters(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, opti
     for m in range(len(manifolds)):
         a = manifolds.body_a[m] if bodies.motion[manifolds.body_a[m]] == FREE else manifolds.body_b[m]
         bodies.rate[first_of(label, a), ROWS] += near_rows(bodies, manifolds, m, options)
-    turns, largest = False, 0
+    turns = False
     if options.scheme == MIDPOINT:
         sub_step.clock[JAMMED] = 1.0
     for i in range(len(bodies)):
         cluster = first_of(label, i)
         members = int(bodies.rate[cluster, MEMBERS])
-        largest = max(largest, members)
         if bodies.motion[i] == FREE and jams(int(bodies.rate[cluster, ROWS]), FREEDOMS * members, members):
             hurry(sub_step.clock)
             turns = turns or length(row(bodies.twist, i, 3)) * options.dt > FROZEN
-    if sub_step.clock[JAMMED] == 0.0:  # an event costs the whole world: no more of them than one cluster is worth
-        sub_step.clock[PATIENCE] = MOST_SOFT + largest
     if turns:
         hold_rest(sub_step.clock, tally)

@@ -7,18 +7,21 @@ What is left of the step after a cut is the next sub-step. A step without events
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
+import math
+
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
-from reference_solver.journal import close_step, keep_state
+from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.entries import enter_release, enter_settled, enter_sub_step
-from reference_solver.spatial.flight import begin_flight, move_along, undo
+from reference_solver.spatial.flight import begin_flight, curvature, move_along, path_bound, undo
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.jam import weigh_clusters
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts, enter_impulses
+from reference_solver.spatial.manifolds import pair_key
 from reference_solver.spatial.midpoint import (
     close_gaps,
     exchange_levers,
@@ -34,23 +37,25 @@ from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.slide import certify_press, press_until_stick
 from reference_solver.spatial.state import (
+    FREE,
     POINTS,
     REMEMBERED,
     Bodies,
-    Buffer,
     Detection,
     Ledger,
     Manifolds,
     Memory,
     SubStep,
 )
-from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.time_of_impact import next_impact
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
+from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import (
+    CONFINED,
     CRAWL,
+    ESCAPED,
     EVENTS,
     HASTE,
     HELD,
@@ -72,10 +77,10 @@ from reference_solver.stepping.options import Options
 from reference_solver.stepping.phase import SHORTENED
 from reference_solver.tally import (
     CONTACT_WORK,
+    CONTRADICTED_A,
+    EXHAUSTED,
     LOAD_WORK,
     SURFACE_WORK,
-    SWEEPS,
-    WORST_SWEEPS,
 )
 
 #: Contacts of a phase that cost little: with more of them phases that creep try the patience of the step the sooner.
@@ -94,17 +99,46 @@ def located_step(
     options: Options,
     tally: Array,
 ) -> bool:
-    """One step; False if an array is too small: called again, it goes on with the sub-step that stopped."""
-    if sub.clock[LEFT] == 0.0 and sub.clock[UNSETTLED] == 0.0:
-        open_step(sub.clock, len(bodies), options.dt)
-        ledger.filled[0] = 0
+    """One step of an island; False if an array is too small, with the step unfinished."""
+    open_step(sub.clock, len(bodies), options.dt)
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, detection, room, memory, problem, sub, ledger, options, tally):
                 return False
         elif not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
             return False
+        if sub.clock[ESCAPED] > 0.0:
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
+            return True
+        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
+            end_run(bodies)
+            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
     return True
+
+
+@inner_kernel
+def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
+    """Whether any free body's way until ``end`` may leave the bounds given for the step; its flight has begun."""
+    for i in range(len(bodies)):
+        if bodies.motion[i] != FREE:
+            continue
+        for k in range(3):
+            if bodies.curved[i]:
+                way = end * path_bound(bodies, i, 0, 1, end)
+            else:
+                way = end * (abs(bodies.twist[i, k]) + 0.5 * end * abs(curvature(bodies, i, 0)[k]))
+            if not (sub.limit[i, k] <= bodies.pose[i, k] - way and bodies.pose[i, k] + way <= sub.limit[i, 3 + k]):
+                return True
+    return False
+
+
+@inner_kernel
+def end_run(bodies: Bodies) -> None:
+    """Leave no state that could be taken for an answer."""
+    for i in range(len(bodies)):
+        if bodies.motion[i] == FREE:
+            for k in range(6):
+                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
 
 
 @spliced_kernel
@@ -121,7 +155,7 @@ def sub_step(
 ) -> bool:
     """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
     left = sub.clock[LEFT]
-    found = detect_touching(bodies, detection, room, memory, options, sub.clock)
+    found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
     if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
         return False
     manifolds = room[:found]
@@ -129,8 +163,7 @@ def sub_step(
         weigh_clusters(bodies, manifolds, sub, options, tally)
         if sub.clock[HELD] > 0.0:
             return True  # points that may close are looked for as well
-    for k in range(len(tally)):
-        sub.opened[k] = tally[k]
+    keep(tally, sub.opened)
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
     smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
     if smooth == NO_PHASE:
@@ -153,6 +186,9 @@ def sub_step(
         if end < 0.0:
             undo(bodies)
             return False
+    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
+        sub.clock[ESCAPED] = 1.0
+        return True
     if smooth > 0.0 and end < length:
         cut_phase(bodies, manifolds, sub, end)
         length = end
@@ -161,11 +197,11 @@ def sub_step(
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
     if held:
         exchange_levers(manifolds, sub)
-        enter_impulses(manifolds, manifolds.hit, ledger)
+        enter_impulses(bodies, manifolds, manifolds.hit, ledger)
         exchange_levers(manifolds, sub)
-        enter_impulses(manifolds, manifolds.impulse, ledger)
+        enter_impulses(bodies, manifolds, manifolds.impulse, ledger)
     else:
-        enter_contacts(manifolds, ledger)
+        enter_contacts(bodies, manifolds, ledger)
     keep_state(sub.journal, bodies.pose, bodies.before)
     move_along(bodies, end, end == length and smooth == 0.0)
     if smooth > 0.0:
@@ -175,7 +211,7 @@ def sub_step(
     sub.clock[UNSETTLED] = end if held and found > 0 else 0.0
     enter_sub_step(bodies, manifolds, sub, options, end)
     if options.restitution and release(bodies, manifolds, problem, options, tally):
-        enter_contacts(manifolds, ledger)
+        enter_contacts(bodies, manifolds, ledger)
         enter_release(bodies, manifolds, sub, options, end)
     haste, shortened = end < SHORT * options.dt, smooth == end and sub.clock[OUTCOME] == SHORTENED
     if end < left and (haste or not shortened):
@@ -183,14 +219,6 @@ def sub_step(
         count_event(sub.clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
-
-
-@inner_kernel
-def go_back(tally: Array, kept: Array) -> None:
-    """Forget what solves that are made again entered since the tally was kept, but for the sweeps they cost."""
-    for k in range(len(tally)):
-        if k != SWEEPS and k != WORST_SWEEPS:
-            tally[k] = kept[k]
 
 
 @inner_kernel
@@ -212,7 +240,7 @@ def settle(
     sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
     anew.
     """
-    found = detect_touching(bodies, detection, room, memory, options, sub.clock)
+    found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
     if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
         return False
     if found == 0:
@@ -221,7 +249,7 @@ def settle(
     keep_state(sub.journal, bodies.pose, bodies.twist)
     moved = close_gaps(bodies, room[:found], options)
     if moved:
-        found = detect_touching(bodies, detection, room, memory, options, sub.clock)
+        found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
         if found < 0:
             return False
     manifolds, time = room[:found], sub.clock[UNSETTLED]
@@ -234,7 +262,7 @@ def settle(
         solve_velocities(bodies, manifolds, problem, options, tally)
         certify(bodies, manifolds, options, tally)
         keep_change(bodies, manifolds, time)
-        enter_impulses(manifolds, manifolds.hit, ledger)
+        enter_impulses(bodies, manifolds, manifolds.hit, ledger)
     if moved or misses:
         enter_settled(bodies, manifolds, sub, options)
     end_settling(sub.clock)
@@ -263,20 +291,18 @@ def solve_sub_step(
             go_back(tally, sub.opened)
             if sub.clock[HELD] > 0.0:
                 levers_of_start(bodies, manifolds, sub, options)
-        found = collide_now(bodies, detection, manifolds, problem, options, tally)
-        for j in range(len(tally)):
-            sub.struck[j] = tally[j]
+        found = collide_now(bodies, manifolds, problem, options, tally)
+        keep(tally, sub.struck)
         struck = found >= LANDED
         if sub.clock[HELD] > 0.0 and len(manifolds) > 0:
             press_at_mid_drift(bodies, manifolds, problem, sub, options, tally, sub.clock[LEFT])
         else:
             length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
-        if not (struck and options.restitution and end_series(bodies, detection, manifolds, sub, options, length)):
+        if not (struck and options.restitution and end_series(bodies, manifolds, sub, options, length)):
             break
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
-    for k in range(len(tally)):
-        sub.saved[k] = tally[k]
+    keep(tally, sub.saved)
     copy_twists(bodies.twist, bodies.last)
     return length
 
@@ -314,9 +340,8 @@ def remember_forces(
     In a very short sub-step the impulses stem from round-off and turning normals rather than from forces; what was
     known before is the better guess.
     """
-    n = len(bodies)
     for m in range(len(manifolds)):
-        memory.pair[m] = manifolds.body_a[m] * n + manifolds.body_b[m]
+        memory.pair[m] = pair_key(bodies, manifolds.body_a[m], manifolds.body_b[m])
         memory.points[m] = manifolds.points[m]
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]
@@ -328,53 +353,3 @@ def remember_forces(
             for d in range(3):
                 memory.impulse[m, p, d] = 0.0 if ends else force[d] / divisor
     detection.found[REMEMBERED] = len(manifolds)
-
-
-@kernel
-def run_located(
-    bodies: Bodies,
-    detection: Detection,
-    room: Manifolds,
-    memory: Memory,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Like `run_steps` in step.py, for located steps."""
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(ledger.real) > len(buffer.real):
-            return k
-        if not located_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
-            return k
-        close_step(sub.journal)
-        if sampled:
-            sample_located(bodies, ledger, buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample_located(bodies: Bodies, ledger: Ledger, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    sample_state(bodies, buffer, s)
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + copy_ledger(ledger, buffer, start)
-
-
-@kernel
-def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> int:
-    """Write the contacts of the last step from index ``start`` on; return how many."""
-    for c in range(ledger.filled[0]):
-        for d in range(3):
-            buffer.names[start + c, d] = ledger.names[c, d]
-        for d in range(10):
-            buffer.real[start + c, d] = ledger.real[c, d]
-    return ledger.filled[0]

@@ -8,7 +8,10 @@ from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import (
     CANDIDATES,
+    KEPT,
     MANIFOLDS,
+    MOST_BODIES,
+    PAST,
     REMEMBERED,
     Bodies,
     Detection,
@@ -42,7 +45,7 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
             return -1
         a, b = detection.candidate[k] // n, detection.candidate[k] % n
         # What flies towards a rebound must not be slowed down before it gets there (E8).
-        bounces = options.restitution and detection.restitution[a, b] > 0.0
+        bounces = options.restitution and restitution_of(bodies, detection, a, b) > 0.0
         # The textbook asks for gaps alone; it keeps its bits.
         ahead = options.dt if options.solver == BLOCK else 0.0
         found = collide(
@@ -55,6 +58,24 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
             m += 1
     detection.found[MANIFOLDS] = m
     return m
+
+
+@inner_kernel
+def pair_key(bodies: Bodies, a: int, b: int) -> int:
+    """Numbers of bodies a and b in the world as one integer that sorts like the pair."""
+    return bodies.number[a] * MOST_BODIES + bodies.number[b]
+
+
+@inner_kernel
+def restitution_of(bodies: Bodies, detection: Detection, a: int, b: int) -> float:
+    """E of bodies a and b."""
+    return detection.restitution[bodies.number[a], bodies.number[b]]
+
+
+@inner_kernel
+def friction_of(bodies: Bodies, detection: Detection, a: int, b: int) -> float:
+    """Mu of bodies a and b."""
+    return detection.friction[bodies.number[a], bodies.number[b]]
 
 
 @inner_kernel
@@ -121,13 +142,12 @@ def set_world_points(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
 @inner_kernel
 def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options) -> None:
     """Give each point the impulse of the same feature one step before: a merge of two sorted lists of detection."""
-    n = len(bodies)
     old = 0
     for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
             for k in range(3):
                 manifolds.impulse[m, p, k] = 0.0
-        pair = manifolds.body_a[m] * n + manifolds.body_b[m]
+        pair = pair_key(bodies, manifolds.body_a[m], manifolds.body_b[m])
         while old < detection.found[REMEMBERED] and memory.pair[old] < pair:
             old += 1
         if options.warm_starting and old < detection.found[REMEMBERED] and memory.pair[old] == pair:
@@ -148,9 +168,8 @@ def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> Non
 @inner_kernel
 def remember(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
-    n = len(bodies)
     for m in range(len(manifolds)):
-        memory.pair[m] = manifolds.body_a[m] * n + manifolds.body_b[m]
+        memory.pair[m] = pair_key(bodies, manifolds.body_a[m], manifolds.body_b[m])
         memory.points[m] = manifolds.points[m]
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]
@@ -168,3 +187,23 @@ def world_component(manifolds: Manifolds, m: int, p: int, d: int) -> float:
         + manifolds.impulse[m, p, 1] * manifolds.frame[m, 1, d]
         + manifolds.impulse[m, p, 2] * manifolds.frame[m, 2, d]
     )
+
+
+@inner_kernel
+def keep_remembered(detection: Detection, memory: Memory, kept: Memory) -> None:
+    """Add what is remembered of one island to what is kept for the next step, in ascending order."""
+    for old in range(max(detection.found[REMEMBERED], 0)):
+        k = detection.found[KEPT]
+        while k > 0 and kept.pair[k - 1] > memory.pair[old]:
+            kept[k] = kept[k - 1]
+            k -= 1
+        kept[k] = memory[old]
+        detection.found[KEPT] += 1
+
+
+@inner_kernel
+def pass_on(detection: Detection, kept: Memory, past: Memory) -> None:
+    """What was kept is the past of the next step."""
+    for k in range(detection.found[KEPT]):
+        past[k] = kept[k]
+    detection.found[PAST], detection.found[KEPT] = detection.found[KEPT], 0

@@ -17,7 +17,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.features import follow, name_features
 from reference_solver.spatial.flight import place_at, reach_of
-from reference_solver.spatial.impact import clear_point, copy_twists, set_reference_speed
+from reference_solver.spatial.impact import clear_point, copy_twists, doubt, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, velocity_at
 from reference_solver.spatial.manifolds import set_frame
@@ -89,6 +89,7 @@ def press_at_mid_drift(
     warm_start(bodies, manifolds, options)
     solve_velocities(bodies, manifolds, problem, options, tally)
     certify(bodies, manifolds, options, tally)
+    doubt(bodies, manifolds, options, tally)
     tally[CONTACT_WORK], tally[SURFACE_WORK], tally[LOAD_WORK] = contact, surface, load  # of the half: see `cut_work`
     reach_end(bodies, manifolds, sub_step)
 

@@ -19,13 +19,14 @@ from reference_solver.spatial.operations import Spatial, displace
 from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub, times_transposed
+from reference_solver.stepping import accounting
 from reference_solver.stepping.clock import HELD, JAMMED, OUTCOME
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.phase import FAILED, begin_phase, find_phase, go_back, step_phase, write_path
-from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK, SWEEPS, WORST_SWEEPS
+from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Gap of a contact that is held, as a share of the smaller half width: more is for the frozen solve to close (E20).
 CLOSED = 1e-9
@@ -188,9 +189,7 @@ def enter_phase(
     if outcome == FAILED:
         copy_twists(bodies.last, bodies.twist)
         return NO_PHASE
-    for k in range(len(tally)):
-        if k != SWEEPS and k != WORST_SWEEPS:
-            tally[k] = sub_step.struck[k]
+    accounting.go_back(tally, sub_step.struck)
     keep_end(bodies, sub_step)
     for i in range(len(bodies)):
         if sub_step.held[i] and bodies.motion[i] != FIXED:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_velocity, relative_twist, velocity_at
+from reference_solver.spatial.manifolds import friction_of, restitution_of
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
@@ -20,12 +21,12 @@ def prepare(bodies: Bodies, detection: Detection, manifolds: Manifolds, options:
     """Fill all manifolds from the poses and velocities at the start of the step, before forces act."""
     for m in range(len(manifolds)):
         a, b = manifolds.body_a[m], manifolds.body_b[m]
-        manifolds.friction[m] = detection.friction[a, b] if options.friction else 0.0
+        manifolds.friction[m] = friction_of(bodies, detection, a, b) if options.friction else 0.0
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             set_response(bodies, manifolds, m, p, options)
             u = velocity_at(v, w, manifolds, m, p)
-            set_target(bodies, manifolds, m, p, u[2], detection.restitution[a, b], options)
+            set_target(bodies, manifolds, m, p, u[2], restitution_of(bodies, detection, a, b), options)
             set_speed(bodies, manifolds, m, p, u, options.dt)
 
 

@@ -8,7 +8,7 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.impact import clear_point, copy_twists, set_reference_speed
+from reference_solver.spatial.impact import clear_point, copy_twists, doubt, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
@@ -97,6 +97,7 @@ def certify_press(bodies: Bodies, manifolds: Manifolds, options: Options, tally:
     copy_twists(bodies.last, bodies.twist)
     if len(manifolds) > 0:
         certify(bodies, manifolds, options, tally)
+        doubt(bodies, manifolds, options, tally)
 
 
 @inner_kernel

@@ -29,6 +29,7 @@ from reference_solver.model import (
 from reference_solver.needs import Needs
 from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.stepping.clock import CLOCK_SIZE
+from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
 from reference_solver.tally import SIZE as TALLY_SIZE
 
@@ -41,8 +42,13 @@ FIXED, FREE, PRESCRIBED = 0, 1, 2
 #: Points per manifold: a plane support needs no more than four to carry any load.
 POINTS = 4
 
-#: Entries of `Detection.found`.
-CANDIDATES, REMEMBERED, MANIFOLDS = 0, 1, 2
+#: Most bodies of a world: the numbers of two of them are packed into one key.
+MOST_BODIES = 1 << 31
+
+#: Entries of `Detection.found`: candidates; manifolds remembered of the sub-step before, -1 where it is the step before
+#: that counts; manifolds; those remembered of the whole step before, and those kept for the next one.
+CANDIDATES, REMEMBERED, MANIFOLDS, PAST, KEPT = 0, 1, 2, 3, 4
+FOUND = 5
 
 
 BODY = np.dtype(
@@ -72,6 +78,7 @@ BODY = np.dtype(
         ("gyroscopic", "i8"),  # 1 for free bodies with unequal moments
         ("turning", "i8"),  # 1 where the quaternion can change
         ("kind", "i8"),  # shape code
+        ("number", "i8"),  # in the world; an island holds some of its bodies
         # half-space (normal, offset), box (half extents), sphere (radius), capsule (half length, radius) [m]
         ("geometry", "f8", 4),
         ("extent", "f8"),  # smallest half width [m]
@@ -131,7 +138,7 @@ MANIFOLD = np.dtype(
 #: What is remembered of a manifold until the next step.
 MEMORY = np.dtype(
     [
-        ("pair", "i8"),  # a * n + b, ascending
+        ("pair", "i8"),  # `manifolds.pair_key`, ascending
         ("points", "i8"),
         ("feature", "i8", POINTS),
         ("impulse", "f8", (POINTS, 3)),  # world axes, so that a turning contact frame does not turn the impulse
@@ -159,7 +166,7 @@ class Buffer(NamedTuple):
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
-    found: Indices  # (3,): see CANDIDATES .. MANIFOLDS
+    found: Indices  # (FOUND,): see CANDIDATES .. KEPT
     restitution: Array  # (n, n), strided: one number where all pairs have the same
     friction: Array  # (n, n), likewise
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
@@ -187,6 +194,7 @@ def allocate_bodies(model: Model, needs: Needs) -> Bodies:
     bodies.moments = moments
     bodies.gyroscopic = free & (moments != moments[:, :1]).any(axis=1)
     bodies.turning = (free & needs.rotation) | bodies.twist[:, 3:].any(axis=1)
+    bodies.number = np.arange(n)
     bodies.kind = [_SHAPE_CODE[type(body.shape)] for body in model.bodies]
     bodies.geometry = [_geometry(body) for body in model.bodies]
     bodies.extent = [smallest_extent(body.shape) for body in model.bodies]
@@ -213,7 +221,7 @@ def _geometry(body: Body) -> tuple[float, ...]:
 def allocate_detection(model: Model, capacity: int) -> Detection:
     """Return the pair tables, and room for ``capacity`` candidates."""
     return Detection(
-        found=np.zeros(3, np.int64),
+        found=np.zeros(FOUND, np.int64),
         restitution=pair_table(model.restitution),
         friction=pair_table(model.friction),
         # sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves
@@ -242,7 +250,21 @@ class SubStep(NamedTuple):
     kept: Manifolds  # as many as there is room for: frames and levers of the start, or of mid-drift
     probe: Manifolds  # (1,): a manifold at another time
     meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
+    limit: Array  # (n, 6): lower and upper bounds of the centres, where they are confined [m]
+    past: Memory  # of the whole step before
     journal: Journal
+
+
+class World(NamedTuple):
+    """Islands of the whole world, and room for the bodies of one of them."""
+
+    islands: Islands
+    bodies: Bodies  # (n,)
+    end: Bodies  # (n,): all bodies where the step ends
+    limit: Array  # (n, 6): see `SubStep`
+    order: Indices  # (n,): see `Detection`
+    kept: Memory  # for the next step
+    tally: Array  # (SIZE,): to go back to where a step is made again
 
 
 class Ledger(NamedTuple):
@@ -271,7 +293,23 @@ def allocate_sub_step(bodies: int, manifolds: int, meeting: Any) -> SubStep:
         kept=allocate_manifolds(manifolds),
         probe=allocate_manifolds(1),
         meeting=meeting,
+        limit=np.zeros((bodies, 6)),
+        past=allocate_memory(manifolds),
         journal=allocate_journal(3, 0, 0),
+    )
+
+
+def allocate_world(bodies: Bodies, manifolds: int, candidates: int) -> World:
+    """Return room for the islands of ``bodies``."""
+    n = len(bodies)
+    return World(
+        islands=allocate_islands(3, n, candidates),
+        bodies=np.zeros(n, BODY).view(np.recarray),
+        end=np.zeros(n, BODY).view(np.recarray),
+        limit=np.zeros((n, 6)),
+        order=np.zeros(n, np.int64),
+        kept=allocate_memory(manifolds),
+        tally=np.zeros(TALLY_SIZE),
     )
 
 

@@ -8,10 +8,17 @@ from reference_solver.spatial.box_box import EDGE_ADVANTAGE, EXACT_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
 from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
-from reference_solver.spatial.manifolds import set_frame, set_world_points, sort_points
+from reference_solver.spatial.manifolds import (
+    friction_of,
+    pair_key,
+    restitution_of,
+    set_frame,
+    set_world_points,
+    sort_points,
+)
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.prepare import set_response
-from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, REMEMBERED, Bodies, Detection, Manifolds, Memory
+from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
 from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, ROUND_OFF
@@ -20,25 +27,36 @@ from reference_solver.stepping.options import Options
 
 @inner_kernel
 def detect_touching(
-    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options, clock: Array
+    bodies: Bodies,
+    detection: Detection,
+    manifolds: Manifolds,
+    own: Memory,
+    past: Memory,
+    options: Options,
+    clock: Array,
 ) -> int:
     """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room.
 
     Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed; at the end of such a
-    sub-step those that carried load in it are wanted, and overlaps (E28). ``clock``: of the sub-step.
+    sub-step those that carried load in it are wanted, and overlaps (E28). ``own``: memory of the sub-step before;
+    ``past``: of the step before; ``clock``: of the sub-step.
     """
     if not find_candidates(bodies, detection, options):
         return -1
     n = len(bodies)
     m, old = 0, 0
+    memory = own[: max(detection.found[REMEMBERED], 0)]
+    if detection.found[REMEMBERED] < 0:  # the first sub-step: the step before counts
+        memory = past[: detection.found[PAST]]
     advantage = EDGE_ADVANTAGE if clock[HELD] > 0.0 else EXACT_ADVANTAGE
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
         key = detection.candidate[k]
-        while old < detection.found[REMEMBERED] and memory.pair[old] < key:
+        pair = pair_key(bodies, key // n, key % n)
+        while old < len(memory) and memory.pair[old] < pair:
             old += 1
-        known = old if old < detection.found[REMEMBERED] and memory.pair[old] == key else -1
+        known = old if old < len(memory) and memory.pair[old] == pair else -1
         if collide(bodies, detection, key // n, key % n, options.margin, options.dt, advantage, manifolds, m) == 0:
             continue
         sort_points(manifolds, m)
@@ -46,7 +64,7 @@ def detect_touching(
         if clock[UNSETTLED] > 0.0:
             keep_loaded(bodies, manifolds, m, memory, known)
         else:
-            may_close = clock[HELD] > 0.0 and detection.restitution[key // n, key % n] == 0.0
+            may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, key // n, key % n) == 0.0
             late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
             keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
         if manifolds.points[m] > 0:
@@ -134,9 +152,9 @@ def recall_force(manifolds: Manifolds, m: int, p: int, memory: Memory, known: in
 def describe(bodies: Bodies, detection: Detection, manifolds: Manifolds, m: int, options: Options) -> None:
     """Frame, responses and laws of manifold m, forces turned into its frame."""
     set_frame(bodies, manifolds, m)
-    friction = detection.friction[manifolds.body_a[m], manifolds.body_b[m]]
-    manifolds.friction[m] = friction if options.friction else 0.0
-    manifolds.restitution[m] = detection.restitution[manifolds.body_a[m], manifolds.body_b[m]]
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    manifolds.friction[m] = friction_of(bodies, detection, a, b) if options.friction else 0.0
+    manifolds.restitution[m] = restitution_of(bodies, detection, a, b)
     for p in range(manifolds.points[m]):
         set_response(bodies, manifolds, m, p, options)
         force = times(manifolds.frame, m, row(manifolds.force[m], p, 0))

@@ -13,14 +13,16 @@ from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
-from reference_solver.spatial.located import copy_ledger, run_located
 from reference_solver.spatial.meeting import allocate_meeting
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.problem import assemble, pose_problem
+from reference_solver.spatial.run import copy_ledger, run_located
 from reference_solver.spatial.state import (
     CANDIDATES,
     MANIFOLDS,
+    PAST,
     POINTS,
+    REMEMBERED,
     Buffer,
     allocate_bodies,
     allocate_detection,
@@ -28,6 +30,7 @@ from reference_solver.spatial.state import (
     allocate_manifolds,
     allocate_memory,
     allocate_sub_step,
+    allocate_world,
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
@@ -47,6 +50,7 @@ class World:
         self._memory = allocate_memory(4 * n + 16)
         self._sub_step = allocate_sub_step(n, 4 * n + 16, allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
+        self._world = allocate_world(self._bodies, len(self._memory), len(self._detection.candidate))
         self._options = options(settings, needs)
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
@@ -84,7 +88,8 @@ class World:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
         if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
-            return int(run_located(*state, sub, self._ledger, self._options, self.tally, buffer, done, steps, stride))
+            own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
+            return int(run_located(*state, sub, *own))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def contacts(self) -> Contacts:
@@ -105,6 +110,9 @@ class World:
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step; the world stays what it is."""
         trial, found = self.copy(), -1
+        if self._options.scheme != FIXED_STEP:
+            trial._memory = trial._sub_step.past
+            trial._detection.found[REMEMBERED] = trial._detection.found[PAST]
         while found < 0:
             found = pose_problem(trial._bodies, trial._detection, trial._manifolds, trial._memory, trial._options)
             if found < 0:
@@ -134,10 +142,11 @@ class World:
         return bigger
 
     def _grow(self) -> None:
-        """Double whatever was found too small; the step that stopped goes on from where it was."""
+        """Double whatever was found too small; the step that stopped is made anew."""
         if self._detection.found[CANDIDATES] >= len(self._detection.candidate):
             room = np.zeros(2 * len(self._detection.candidate), np.int64)
             self._detection = self._detection._replace(candidate=room)
+            self._world = allocate_world(self._bodies, len(self._memory), len(room))
             return
         if self._ledger.filled[0] + POINTS * self._detection.found[MANIFOLDS] > len(self._ledger.real):
             ledger = allocate_ledger(2 * len(self._ledger.real))
@@ -148,8 +157,11 @@ class World:
         memory = allocate_memory(2 * len(self._memory))
         memory[: len(self._memory)] = self._memory
         self._memory = memory
+        past = allocate_memory(len(memory))
+        past[: len(self._sub_step.past)] = self._sub_step.past
         self._manifolds = allocate_manifolds(2 * len(self._manifolds))
-        self._sub_step = self._sub_step._replace(kept=allocate_manifolds(len(self._manifolds)))
+        self._sub_step = self._sub_step._replace(kept=allocate_manifolds(len(self._manifolds)), past=past)
+        self._world = allocate_world(self._bodies, len(memory), len(self._detection.candidate))
         self._problem = allocate_problem(3, len(self._bodies), self._most_points, bool(self._options.direct))
 
 

@@ -1,10 +1,10 @@
-"""Shares that the certificate of a solve keeps (E60 to E63); for both dimensions."""
+"""Shares that the certificate of a solve keeps (E60 to E63), and tallies to go back to; for both dimensions."""
 
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.tally import CREATED, KANE, PUMPED
+from reference_solver.tally import CREATED, KANE, PUMPED, SWEEPS, WORST_SWEEPS
 
 #: Created energy up to this share of a solve's work is round-off of its impulses: 1e4 units in the last place, what
 #: cancels where thousands of contacts each do their work.
@@ -28,3 +28,18 @@ def enter_creation(work: float, effort: float, restored: bool, tally: Array) -> 
     enter_share(tally, CREATED if restored else PUMPED, work, effort)
     if restored:
         tally[KANE] += 1.0
+
+
+@inner_kernel
+def keep(tally: Array, kept: Array) -> None:
+    """Remember a tally."""
+    for k in range(len(tally)):
+        kept[k] = tally[k]
+
+
+@inner_kernel
+def go_back(tally: Array, kept: Array) -> None:
+    """Forget what solves that are made again entered since `keep`, but for the sweeps they cost."""
+    for k in range(len(tally)):
+        if k != SWEEPS and k != WORST_SWEEPS:
+            tally[k] = kept[k]

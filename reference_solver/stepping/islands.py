@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.stepping.operations import Bodies, is_free
 
 Indices = NDArray[np.int64]
 
@@ -23,6 +24,9 @@ SIZES = 2
 #: By how much farther than loads and speeds alone take it a body may get, one attempt after the other. An elastic
 #: impact with a heavy body doubles its speed and adds twice that of the other; the last attempt has no bounds.
 ROOM = (1.0, 8.0)
+
+#: What became of an attempt: all islands made their step; one left its bounds; an array was too small.
+MADE, LEFT_BOUNDS, NO_ROOM = 0, 1, 2
 
 
 class Islands(NamedTuple):
@@ -120,3 +124,50 @@ def list_members(islands: Islands, island: int) -> int:
         islands.local[islands.member[k]] = k
     islands.size[MEMBERS] = count
     return count
+
+
+@inner_kernel
+def open_islands(islands: Islands) -> None:
+    """Let every body be by itself, and in no island's list."""
+    islands.size[NODES] = 0
+    for i in range(len(islands.label)):
+        islands.label[i], islands.first[i], islands.mark[i], islands.next_free[i] = i, -1, -1, -1
+
+
+@inner_kernel
+def gather_all(bodies: Bodies, islands: Islands) -> None:
+    """Let all bodies be one island."""
+    open_islands(islands)
+    first, last = -1, -1
+    for i in range(len(islands.label)):
+        if is_free(bodies, i):
+            if last >= 0:
+                islands.next_free[last] = i
+            first, last = i if first < 0 else first, i
+            islands.label[i] = first
+    for i in range(len(islands.label)):
+        if first >= 0 and not is_free(bodies, i):
+            list_unmoved(islands, first, i)
+
+
+@inner_kernel
+def join_candidates(bodies: Bodies, islands: Islands, candidate: Indices, count: int) -> None:
+    """Join the free bodies of the first ``count`` candidates, a n + b; list what forces do not move."""
+    n = len(islands.label)
+    open_islands(islands)
+    for k in range(count):
+        a, b = candidate[k] // n, candidate[k] % n
+        if is_free(bodies, a) and is_free(bodies, b):
+            join(islands, a, b)
+    for i in range(n):
+        if is_free(bodies, i):
+            label = root(islands, i)
+            if label != i:
+                islands.next_free[islands.last[label]] = i
+            islands.last[label] = i
+    for k in range(count):
+        a, b = candidate[k] // n, candidate[k] % n
+        if not is_free(bodies, a):
+            list_unmoved(islands, root(islands, b), a)
+        elif not is_free(bodies, b):
+            list_unmoved(islands, root(islands, a), b)
