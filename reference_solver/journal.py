@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.pieces import BODIES, CONTACTS, PIECES, STEPS, Journal
+from reference_solver.pieces import BODIES, CONTACTS, PIECES, STEPS, Indices, Journal
 
 
 @inner_kernel
@@ -51,7 +51,7 @@ def enter_body(journal: Journal, i: int, number: int, pose: Array, twist: Array)
 
 
 @inner_kernel
-def enter_bodies(journal: Journal, numbers: Array, pose: Array, twist: Array) -> None:
+def enter_bodies(journal: Journal, numbers: Indices, pose: Array, twist: Array) -> None:
     """Enter all bodies by their ``numbers`` in the world."""
     for i in range(len(journal.pose)):
         enter_body(journal, i, numbers[i], pose, twist)

@@ -11,7 +11,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.closing_axis import lasting_axis
 from reference_solver.planar.columns import COS, EXTENT, SIN, SIZE
 from reference_solver.planar.points import share_of_gap, write_point
-from reference_solver.planar.separating_axis import AXIS_ADVANTAGE
+from reference_solver.planar.separating_axis import AXIS_ADVANTAGE, EXACT_ADVANTAGE
 from reference_solver.planar.state import Bodies, Rows
 
 
@@ -33,7 +33,8 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Ro
     """Up to two points of boxes a < b; ``ahead`` as in `collide`."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
-    advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
+    share = EXACT_ADVANTAGE if ahead > 0.0 else AXIS_ADVANTAGE
+    advantage = share * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
     best, reference, axis, side = -math.inf, a, 0, 1.0
     for candidate in range(4):
         k = candidate % 2

@@ -15,11 +15,11 @@ from reference_solver.planar.separating_axis import AXIS_ADVANTAGE, CORNERS, cor
 from reference_solver.planar.state import Bodies
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF
 
-#: Axes whose times differ by less than this share of the time looked ahead separate equally long.
+#: Axes whose times differ by less than this share of them separate equally long.
 SAME_TIME = 1e-6
 #: Cosine of the angle between two axes of one contact. Faces that lie on each other have all but the same normal: which
 #: of the two is taken the order says (E50), not the time, which round-off would decide. Sides of a seam stand apart.
-SAME_AXIS = 0.9
+SAME_AXIS = 1.0 - 5e-7
 
 
 @inner_kernel
@@ -51,9 +51,12 @@ def separation_along(bodies: Bodies, a: int, b: int, nx: float, ny: float, dx: f
 
 @inner_kernel
 def closing_time(bodies: Bodies, a: int, b: int, nx: float, ny: float, gap: float, noise: float, ahead: float) -> float:
-    """Time after which n, from a to b, no longer separates, at the present velocities; at most ``ahead`` [s]."""
+    """Time after which n, from a to b, no longer separates, at the present velocities; at most ``ahead`` [s].
+
+    Of axes whose gaps are round-off the one closes last along which bodies approach least.
+    """
     rate = corner_speed(bodies, b, nx, ny, noise) + corner_speed(bodies, a, -nx, -ny, noise)
-    return min(ahead, (gap + noise) / -rate) if rate < 0.0 else ahead
+    return min(ahead, max(gap, noise) / -rate) if rate < 0.0 else ahead
 
 
 @inner_kernel
@@ -102,6 +105,6 @@ def lasting_axis(
             if gap - grown < -noise or x * nx + y * ny > SAME_AXIS:
                 continue
             time = closing_time(bodies, a, b, x, y, gap - grown, noise, ahead)
-            if time > longest + SAME_TIME * ahead:
+            if time > longest * (1.0 + SAME_TIME):
                 best, reference, k, l, longest = gap, r, edge, 0, time
     return best, reference, k, l

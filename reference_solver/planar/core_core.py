@@ -10,7 +10,15 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.planar.closing_axis import lasting_axis
 from reference_solver.planar.columns import COS, ROUNDING, SIN, SIZE, VERTICES
 from reference_solver.planar.points import share_of_gap, write_point
-from reference_solver.planar.separating_axis import CORNERS, corner, corner_line, edge_normal, separating_axis
+from reference_solver.planar.separating_axis import (
+    AXIS_ADVANTAGE,
+    CORNERS,
+    EXACT_ADVANTAGE,
+    corner,
+    corner_line,
+    edge_normal,
+    separating_axis,
+)
 from reference_solver.planar.state import Bodies, Rows
 from reference_solver.shapes import MOST_VERTICES
 
@@ -62,7 +70,8 @@ def core_core(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: 
     """Up to two points of bodies a < b, neither of them a half-space."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
-    separation, reference, k, l = separating_axis(bodies, a, b, dx, dy)
+    share = EXACT_ADVANTAGE if ahead > 0.0 else AXIS_ADVANTAGE
+    separation, reference, k, l = separating_axis(bodies, a, b, dx, dy, share)
     grown = bodies.real[a, ROUNDING] + bodies.real[b, ROUNDING]
     if separation - grown > reach:
         return 0

@@ -26,7 +26,7 @@ from reference_solver.planar.columns import (
     B,
 )
 from reference_solver.planar.flight import place, put_back
-from reference_solver.planar.impact import gap_noise
+from reference_solver.planar.impact import flies, gap_noise
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
 from reference_solver.planar.press import FAR
@@ -50,12 +50,16 @@ AHEAD = 1.5
 
 
 @inner_kernel
-def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting) -> bool:
-    """Note all rows that touch and do not part as lasting contacts; False if there are none, or too many."""
+def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float) -> bool:
+    """Note all rows that touch and do not part as lasting contacts; False if there are none, or too many.
+
+    The same part as in the frozen solve of ``length``.
+    """
     count = 0
     for c in range(rows.counts[CONTACTS]):
         speed = rows.real[c, SPEED]
-        if rows.real[c, GAP] > gap_noise(bodies, rows, c) or normal_velocity(bodies.twist, rows, c) > NOISE * speed:
+        u = normal_velocity(bodies.twist, rows, c)
+        if rows.real[c, GAP] > gap_noise(bodies, rows, c) or (u > NOISE * speed and flies(bodies, rows, c, u, length)):
             continue
         if count == len(lasting.row):
             return False
@@ -73,7 +77,7 @@ def turns(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
     lasting = sub.lasting
     copy_vectors(sub.start, bodies.twist)
     found = False
-    if note_contacts(bodies, rows, lasting):
+    if note_contacts(bodies, rows, lasting, length):
         evaluate(bodies, lasting)
         keep_rows(lasting)
         for part in range(2 if sub.clock[ROCKING] > 0.0 else 1, 3):  # what rocks to rest ends as it began

@@ -20,24 +20,30 @@ from reference_solver.planar.columns import (
     IMPACT_T,
     MEETS,
     NUMBER,
+    NX,
+    NY,
     PN,
     POINT,
     PT,
     RELEASE,
     RESTITUTION,
+    ROUNDING,
     ROW_INTEGERS,
     ROW_REALS,
+    SHAPE,
     SPEED,
     TARGET,
+    VERTICES,
     A,
     B,
 )
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
+from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses
-from reference_solver.planar.state import CONTACTS, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, is_patient
+from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.clock import HELD, LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
     CREEP,
@@ -50,8 +56,9 @@ from reference_solver.stepping.impacts import (
     SERIES_ENDS,
     STRUCK,
     drifts_aside,
+    turns_aside,
 )
-from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, NOISE, ROUND_OFF, UNSOLVED
+from reference_solver.stepping.noise import COORDINATE_NOISE, FROZEN, LATE, NEARLY, NOISE, ROUND_OFF, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
@@ -220,10 +227,33 @@ def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
 
 
 @inner_kernel
-def end_series(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
+def row_turn(bodies: Bodies, rows: Rows, sub: SubStep, c: int, share: float) -> float:
+    """Rate at which row c turns [rad/s]: spins of bodies with edges, and of round ones how fast they pass each other.
+
+    ``share``: of the change of velocities in the sub-step that is added.
+    """
+    a, b = rows.integer[c, A], rows.integer[c, B]
+    rate, passing, radius, round_ones = 0.0, abs(tangent_velocity(sub.start, rows, c)), 0.0, True
+    for side in range(2):
+        i = a if side == 0 else b
+        spin = abs(sub.start[i, 2]) + share * abs(bodies.twist[i, 2] - sub.start[i, 2])
+        if bodies.kind[i, SHAPE] == HALF_SPACE or bodies.kind[i, VERTICES] > 1:
+            rate += spin
+        radius += bodies.real[i, ROUNDING]
+        passing += bodies.real[i, ROUNDING] * spin
+        along = edge_along(bodies, i, rows.real[c, NX] * (1.0 - 2.0 * side), rows.real[c, NY] * (1.0 - 2.0 * side))
+        round_ones = round_ones and bodies.kind[i, SHAPE] != HALF_SPACE and along < 0
+    if round_ones and radius > 0.0:
+        rate += passing / radius
+    return rate
+
+
+@inner_kernel
+def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``length`` of it.
+    ``bodies.twist`` are the velocities after ``length`` of it. Where rows turn, contacts are held no longer than their
+    series lasts (`SERIES`).
     """
     left = sub.clock[LEFT]
     new = False
@@ -241,10 +271,15 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
             gain = (tangent_velocity(bodies.twist, rows, c) - slip) / length
             slip = slip if abs(slip) > NOISE * rows.real[c, SPEED] else 0.0
             aside = drifts_aside(slip, gain, rows.real[c, FRICTION], pull, returns, e)
+            lasts = returns / (1.0 - e)
+            rate = row_turn(bodies, rows, sub, c, min(lasts / length, 1.0))
+            aside += turns_aside(leaves, lasts, rate, options.dt)
             extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
             if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
                 continue
             rows.integer[c, ENDING] = SERIES_ENDS
+            if rate * lasts > FROZEN:
+                sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             new = True
         elif returns * BOUNCES < left:
             rows.integer[c, ENDING] = RELEASED

@@ -54,6 +54,7 @@ from reference_solver.stepping.clock import (
     REBOUND,
     ROCKING,
     ROCKS,
+    SERIES,
     UNSETTLED,
     UNTIL_REST,
     count_event,
@@ -148,7 +149,7 @@ def sub_step(
         return True
     begin_flight(bodies, rows, sub, length)
     curved = 0.0
-    if sub.clock[HELD] == 0.0 and turns(bodies, rows, sub, length):
+    if sub.clock[HELD] == 0.0 and sub.clock[SERIES] == 0.0 and turns(bodies, rows, sub, length):
         if sub.clock[ROCKING] > 0.0:
             sub.clock[ROCKS] = UNTIL_REST
         elif sub.clock[JAMMED] == 0.0:
@@ -248,7 +249,7 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
     length, found = left, NO_IMPACT
-    sub.clock[ROCKING] = 0.0
+    sub.clock[ROCKING] = sub.clock[SERIES] = 0.0
     keep(tally, sub.tally[0])
     for k in range(SERIES_PASSES):
         if k > 0:
@@ -256,8 +257,9 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
             if sub.clock[HELD] > 0.0:
                 levers_of_start(bodies, rows, options)
         found = collide_now(bodies, rows, problem, sub, options, tally)
-        length = press_until_stick(bodies, rows, problem, sub, options, tally, left)
-        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, length)):
+        most = min(left, sub.clock[SERIES]) if sub.clock[SERIES] > 0.0 else left
+        length = press_until_stick(bodies, rows, problem, sub, options, tally, most)
+        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, options, length)):
             break
     if sub.clock[HELD] == 0.0:
         length = rest(bodies, rows, problem, sub, options, tally, length)

@@ -7,16 +7,16 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
-from reference_solver.planar.columns import ENDING, GAP, IMPACT, RESTITUTION, SPEED
+from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
 from reference_solver.planar.impact import flies, gap_noise
 from reference_solver.planar.kinematics import load_speed, normal_velocity
 from reference_solver.planar.lasting import evaluate, free_accelerations, hold
 from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back
-from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, weigh_event
+from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, is_patient, weigh_event
 from reference_solver.stepping.equalities import row_value
-from reference_solver.stepping.impacts import BOUNCES, SERIES_ENDS
+from reference_solver.stepping.impacts import BOUNCES, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
 from reference_solver.stepping.lasting import CONTACTS as LASTING
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import NOISE, SHORT
@@ -48,7 +48,8 @@ def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tupl
     left, longest, shortest = sub.clock[LEFT], 0.0, math.inf
     for c in range(rows.counts[CONTACTS]):
         leaves = normal_velocity(sub.start, rows, c)
-        hops = leaves > NOISE * rows.real[c, SPEED] and not flies(bodies, rows, c, leaves, left)
+        hops = leaves > NOISE * rows.real[c, SPEED] and rows.integer[c, ENDING] == OPEN_ENDED
+        hops = hops and not flies(bodies, rows, c, leaves, left)
         if hops and is_pulled_back(bodies, rows, sub.lasting, c):
             longest = max(longest, 2.0 * leaves / load_speed(bodies, rows, c, 1.0))
             rows.integer[c, ENDING] = SERIES_ENDS
@@ -70,6 +71,9 @@ def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tupl
                 continue
             returns = 2.0 * leaves / pull
             shortest = min(shortest, returns)
+            extent = min(bodies.real[rows.integer[other, A], EXTENT], bodies.real[rows.integer[other, B], EXTENT])
+            if leaves * returns / (1.0 - ratio) > SERIES_DRIFT * extent and is_patient(sub.clock):
+                continue  # what is held goes elsewhere than what rocks by a share of this
             if returns <= left * (1.0 - ratio):
                 longest = max(longest, returns / (1.0 - ratio))
             elif returns * BOUNCES < left:

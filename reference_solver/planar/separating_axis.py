@@ -17,6 +17,8 @@ from reference_solver.planar.state import Bodies
 #: Another axis must be better by this fraction of the smaller half width, so that ties of aligned boxes are
 #: always decided the same way and round-off cannot swap the reference face (and with it the warm start).
 AXIS_ADVANTAGE = 1e-6
+#: The same where bodies are located: what is less is no tilt but round-off, and a normal is exact to it.
+EXACT_ADVANTAGE = 1e-9
 #: In place of a reference body: the axis is the line through two corners.
 CORNERS = -1
 
@@ -95,13 +97,13 @@ def corner_line(bodies: Bodies, a: int, b: int, k: int, l: int, dx: float, dy: f
 
 
 @inner_kernel
-def separating_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float) -> tuple[float, int, int, int]:
+def separating_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, share: float) -> tuple[float, int, int, int]:
     """Largest separation of the cores of a and b, and its axis; (dx, dy) leads from a to b.
 
     Returns the separation [m], the body whose edge is the axis and its number, 0; or `CORNERS` and a corner of a and
-    of b.
+    of b. ``share``: of the smaller half width, by which a later axis has to be better.
     """
-    return best_axis(bodies, a, b, dx, dy, AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
+    return best_axis(bodies, a, b, dx, dy, share * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
 
 
 @inner_kernel
@@ -126,5 +128,5 @@ def distance(bodies: Bodies, a: int, b: int) -> float:
     """
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
-    separation, _, _, _ = separating_axis(bodies, a, b, dx, dy)
+    separation, _, _, _ = separating_axis(bodies, a, b, dx, dy, AXIS_ADVANTAGE)
     return separation - bodies.real[a, ROUNDING] - bodies.real[b, ROUNDING]

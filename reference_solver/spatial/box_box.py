@@ -25,6 +25,8 @@ FACE_ADVANTAGE = 1e-6
 EDGE_ADVANTAGE = 1e-3
 #: The same where bodies touch to round-off when they do: what is larger is a tilt, and their normal that of the edges.
 EXACT_ADVANTAGE = 1e-7
+#: Share of it by which a face of s must separate better there: faces that are not flush by more have a tilt.
+EXACT_SHARE = 1e-2
 #: Edges closer to parallel than this [rad] offer no axis of their own: a face normal covers them.
 PARALLEL = 1e-6
 #: Cosines above -TIE, and distances above -TIE half extents, count as positive. Where a direction is exactly tied (two
@@ -57,7 +59,7 @@ def box_box(
     edges, gap_e, normal_e = best_edges(bodies, f, s, between)
     if gap_e > reach:
         return 0, (0.0, 0.0, 1.0)
-    by_s = gap_s > gap_f + FACE_ADVANTAGE * extent
+    by_s = gap_s > gap_f + min(FACE_ADVANTAGE, EXACT_SHARE * advantage) * extent
     if ahead > 0.0:
         gap, n = (gap_s, axis(bodies.axes, s, face_s)) if by_s else (gap_f, axis(bodies.axes, f, face_f))
         n = n if dot(n, between) >= 0.0 else scale(-1.0, n)

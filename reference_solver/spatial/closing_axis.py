@@ -14,11 +14,11 @@ from reference_solver.spatial.state import Bodies
 from reference_solver.spatial.vector import Vector, axis, cross, dot, row, scale, times
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF
 
-#: Axes whose times differ by less than this share of the time looked ahead separate equally long.
+#: Axes whose times differ by less than this share of them separate equally long.
 SAME_TIME = 1e-6
 #: Cosine of the angle between two axes of one contact: which of two faces that lie on each other is taken the order
 #: says, not the time, which round-off would decide. Sides of a seam stand apart.
-SAME_AXIS = 0.9
+SAME_AXIS = 1.0 - 5e-7
 #: No face but the chosen one.
 NO_FACE = -1
 
@@ -49,9 +49,12 @@ def corner_speed(bodies: Bodies, i: int, n: Vector, noise: float) -> float:
 
 @inner_kernel
 def closing_time(bodies: Bodies, f: int, s: int, n: Vector, gap: float, noise: float, ahead: float) -> float:
-    """Time after which n, from f to s, no longer separates, at the present velocities; at most ``ahead`` [s]."""
+    """Time after which n, from f to s, no longer separates, at the present velocities; at most ``ahead`` [s].
+
+    Of axes whose gaps are round-off the one closes last along which bodies approach least.
+    """
     rate = corner_speed(bodies, s, n, noise) + corner_speed(bodies, f, scale(-1.0, n), noise)
-    return min(ahead, (gap + noise) / -rate) if rate < 0.0 else ahead
+    return min(ahead, max(gap, noise) / -rate) if rate < 0.0 else ahead
 
 
 @inner_kernel
@@ -80,6 +83,6 @@ def lasting_face(
         if apart < -noise or dot(u, n) > SAME_AXIS:
             continue
         time = closing_time(bodies, f, s, u, apart, noise, ahead)
-        if time > longest + SAME_TIME * ahead:
+        if time > longest * (1.0 + SAME_TIME):
             found, longest = k, time
     return found

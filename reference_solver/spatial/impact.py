@@ -12,10 +12,11 @@ from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import collect_momentum
 from reference_solver.spatial.prepare import measure_speed, set_response
-from reference_solver.spatial.state import Bodies, Manifolds, SubStep
+from reference_solver.spatial.separation import radius_of
+from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
-from reference_solver.spatial.vector import Vector, length, row
-from reference_solver.stepping.clock import LEFT, is_patient
+from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
+from reference_solver.stepping.clock import LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
     CREEP,
@@ -29,10 +30,14 @@ from reference_solver.stepping.impacts import (
     STRUCK,
     TURNED,
     drifts_aside,
+    turns_aside,
 )
-from reference_solver.stepping.noise import NOISE, SPEED_SHARE, UNSOLVED
+from reference_solver.stepping.noise import FROZEN, NOISE, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
+
+#: A normal whose cosine with a box's axis is short of one by this is that of the face: 1e-6 rad.
+FLUSH = 5e-13
 
 
 @inner_kernel
@@ -156,12 +161,39 @@ def doubt(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) 
 
 
 @inner_kernel
-def end_series(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, time: float) -> bool:
+def row_turn(bodies: Bodies, manifolds: Manifolds, m: int, slip: float, share: float) -> float:
+    """Rate at which the rows of manifold m turn [rad/s]: spins of bodies with edges, and of round ones their passing.
+
+    ``share``: of the change of velocities in the sub-step that is added.
+    """
+    rate, passing, radius, round_ones = 0.0, slip, 0.0, True
+    n = row(manifolds.frame[m], 2, 0)
+    for side in range(2):
+        i = manifolds.body_a[m] if side == 0 else manifolds.body_b[m]
+        spin = length(row(bodies.first, i, 3))
+        spin += share * length(sub(row(bodies.twist, i, 3), row(bodies.first, i, 3)))
+        if bodies.kind[i] != SPHERE:
+            rate += spin
+        round_ones = round_ones and bodies.kind[i] != HALF_SPACE
+        if bodies.kind[i] == BOX:
+            for k in range(3):
+                round_ones = round_ones and abs(dot(axis(bodies.axes, i, k), n)) < 1.0 - FLUSH
+        else:
+            radius += radius_of(bodies, i)
+        passing += radius_of(bodies, i) * spin
+    if round_ones and radius > 0.0:
+        rate += passing / radius
+    return rate
+
+
+@inner_kernel
+def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``time`` of it.
+    ``bodies.twist`` are the velocities after ``time`` of it. Where rows turn, contacts are held no longer than their
+    series lasts (`SERIES`).
     """
-    left = sub.clock[LEFT]
+    left = sub_step.clock[LEFT]
     new = False
     for m in range(len(manifolds)):
         e = manifolds.restitution[m]
@@ -179,10 +211,15 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Opti
                 slip, gain = math.hypot(u[0], u[1]), math.hypot(u_last[0] - u[0], u_last[1] - u[1]) / time
                 slip = slip if slip > NOISE * manifolds.speed[m, p] else 0.0
                 aside = drifts_aside(slip, gain, manifolds.friction[m], pull, 2.0 * leaves / pull, e)
+                lasts = 2.0 * leaves / (pull * (1.0 - e))
+                rate = row_turn(bodies, manifolds, m, math.hypot(u[0], u[1]), min(lasts / time, 1.0))
+                aside += turns_aside(leaves, lasts, rate, options.dt)
                 extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-                if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
+                if aside > SERIES_DRIFT * extent and is_patient(sub_step.clock):
                     continue
                 manifolds.ending[m, p] = SERIES_ENDS
+                if rate * lasts > FROZEN:
+                    sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 new = True
             elif 2.0 * leaves * BOUNCES < pull * left:
                 manifolds.ending[m, p] = RELEASED

@@ -63,6 +63,7 @@ from reference_solver.stepping.clock import (
     LEFT,
     OUTCOME,
     REBOUND,
+    SERIES,
     UNSETTLED,
     count_event,
     end_settling,
@@ -286,6 +287,7 @@ def solve_sub_step(
     copy_twists(bodies.twist, bodies.before)
     prepare_wrenches(bodies, manifolds, options)
     length, found = sub.clock[LEFT], NO_IMPACT
+    sub.clock[SERIES] = 0.0
     for k in range(SERIES_PASSES):
         if k > 0:
             go_back(tally, sub.opened)

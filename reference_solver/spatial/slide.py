@@ -17,7 +17,7 @@ from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
-from reference_solver.stepping.clock import LEFT
+from reference_solver.stepping.clock import LEFT, SERIES
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
@@ -167,6 +167,8 @@ def press_until_stick(
     the start alone there is none, but for rebounds whose series may end.
     """
     left = sub_step.clock[LEFT]
+    if sub_step.clock[SERIES] > 0.0:
+        left = min(left, sub_step.clock[SERIES])
     if len(manifolds) == 0:
         copy_twists(bodies.first, bodies.twist)
         accelerate(bodies, left)
@@ -187,7 +189,7 @@ def press_until_stick(
             break
         if k == 0:
             copy_twists(bodies.twist, bodies.last)
-            if not is_exact(bodies, manifolds, sub_step, length):
+            if sub_step.clock[SERIES] == 0.0 and not is_exact(bodies, manifolds, sub_step, length):
                 break
         if end < length and length - slipped <= CLOSE * length:
             break

@@ -89,7 +89,7 @@ class World:
         if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
             own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
-            return int(run_located(*state, sub, *own))
+            return int(run_located(*(*state, sub, *own)))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def contacts(self) -> Contacts:

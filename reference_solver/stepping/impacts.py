@@ -15,11 +15,24 @@ BOUNCES = 32
 #: A series of rebounds is held from where friction, which acts at its impacts only, moves bodies by no more than this
 #: share of the smaller half width other than it would in a contact; as long as half of a step's patience is left.
 SERIES_DRIFT = 1e-11
+#: Steps for which what a series that ends is off in its velocities counts as way.
+DRIFT_STEPS = 100.0
 #: An impact is soft that closes no more than this share of the smaller half width in a step. Without loads all others
 #: are hard, and of bodies caught between others they have no end, each slower than the one before.
 CREEP = 1e-6
 #: Passes that mark ending series of rebounds; each marks at least one row more.
 SERIES_PASSES = 4
+
+
+@kernel
+def turns_aside(leaves: float, lasts: float, rate: float, dt: float) -> float:
+    """How far bodies go elsewhere for rows that turn at ``rate`` while a series of rebounds that is held ends [m].
+
+    Held contacts push from the start, those that rebound at their impacts: the impulse is the same, its mean instant
+    is not, by up to ``lasts``, in which levers and normals turn by ``rate * lasts``. What velocities miss,
+    ``leaves * rate * lasts``, counts over `DRIFT_STEPS` steps, or until bodies have turned.
+    """
+    return leaves * lasts * min(DRIFT_STEPS * dt * rate, 1.0)
 
 
 @kernel
