@@ -130,7 +130,8 @@ def warm_start(bodies: Bodies, rows: Rows, options: Options) -> None:
     """Apply the remembered impulses, the tangential ones inside the cone of the row's friction (E9)."""
     for c in range(rows.counts[CONTACTS]):
         apply_normal(bodies, bodies.twist, rows, c, rows.real[c, PN])
+        # Where nothing rubs, what a turning normal left of an impulse along the old one is none.
+        bound = rows.real[c, FRICTION] * rows.real[c, PN] if options.friction else 0.0
+        rows.real[c, PT] = min(max(rows.real[c, PT], -bound), bound)
         if options.friction:
-            bound = rows.real[c, FRICTION] * rows.real[c, PN]
-            rows.real[c, PT] = min(max(rows.real[c, PT], -bound), bound)
             apply_tangent(bodies, bodies.twist, rows, c, rows.real[c, PT])
