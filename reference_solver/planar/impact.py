@@ -9,6 +9,7 @@ from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import (
     APPROACH,
     ARM_A,
+    ARM_B,
     ENDING,
     EXTENT,
     FORCE_N,
@@ -38,7 +39,7 @@ from reference_solver.planar.columns import (
     B,
 )
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, speed_at, tangent_velocity
 from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses
@@ -58,7 +59,16 @@ from reference_solver.stepping.impacts import (
     drifts_aside,
     turns_aside,
 )
-from reference_solver.stepping.noise import COORDINATE_NOISE, FROZEN, LATE, NEARLY, NOISE, ROUND_OFF, UNSOLVED
+from reference_solver.stepping.noise import (
+    COORDINATE_NOISE,
+    FROZEN,
+    LATE,
+    NEARLY,
+    NOISE,
+    ROUND_OFF,
+    SPEED_SHARE,
+    UNSOLVED,
+)
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
@@ -217,11 +227,14 @@ def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, opti
 def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
     """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
 
-    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    Measured by velocities alone, those after the solve as well, of what was at rest: the residual is measured against
+    the impulse, which grows without bound.
     """
     for c in range(rows.counts[CONTACTS]):
         missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
-        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * rows.real[c, SPEED]:
+        speed = speed_at(bodies, rows.integer[c, A], rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
+        speed += speed_at(bodies, rows.integer[c, B], rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
+        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * max(rows.real[c, SPEED], SPEED_SHARE * speed):
             tally[CONTRADICTED_A] = 1.0 + bodies.kind[rows.integer[c, A], NUMBER]
             tally[CONTRADICTED_B] = 1.0 + bodies.kind[rows.integer[c, B], NUMBER]
 

@@ -18,6 +18,7 @@ from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import (
     FORCE_N,
     FORCE_T,
+    LOAD,
     MOTION,
     PN,
     PT,
@@ -43,6 +44,7 @@ from reference_solver.planar.step import move
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import (
+    BRIEF,
     CONFINED,
     CRAWL,
     ESCAPED,
@@ -58,9 +60,11 @@ from reference_solver.stepping.clock import (
     UNSETTLED,
     UNTIL_REST,
     count_event,
+    end_instant,
     end_settling,
-    hold_rest,
+    give_up_phase,
     open_step,
+    open_sub_step,
     weigh_event,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
@@ -156,7 +160,7 @@ def sub_step(
             curved = curve(bodies, rows, sub, tally)
         if curved == 0.0:
             if sub.clock[ROCKING] == 0.0:
-                hold_rest(sub.clock, tally)
+                give_up_phase(sub.clock, tally)
             go_back(tally, sub.tally[0])
             copy_vectors(sub.before, bodies.twist)
             return True
@@ -187,10 +191,24 @@ def sub_step(
         enter_contacts(bodies, rows, ledger)
         enter_release(bodies, rows, sub, options, end)
     haste, shortened = end < SHORT * options.dt, curved == end and sub.clock[OUTCOME] == SHORTENED
+    if sub.clock[BRIEF] > 0.0:
+        end_instant(sub.clock, tally, *gained_speed(bodies, sub, end))
     if end < left and (haste or not shortened):
         count_event(sub.clock, tally, (CRAWL if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
+
+
+@inner_kernel
+def gained_speed(bodies: Bodies, sub: SubStep, length: float) -> tuple[float, float]:
+    """Largest change of a velocity in a sub-step, and what loads do in it, over free bodies [m/s]."""
+    gained, loaded = 0.0, 0.0
+    for i in range(len(bodies.kind)):
+        for k in range(2):
+            if bodies.kind[i, MOTION] == FREE:
+                gained = max(gained, abs(bodies.twist[i, k] - sub.start[i, k]))
+                loaded = max(loaded, length * abs(bodies.real[i, LOAD + k]))
+    return gained, loaded
 
 
 @inner_kernel
@@ -249,7 +267,8 @@ def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, o
     """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
     left = sub.clock[LEFT]
     length, found = left, NO_IMPACT
-    sub.clock[ROCKING] = sub.clock[SERIES] = 0.0
+    sub.clock[ROCKING] = 0.0
+    open_sub_step(sub.clock, options.dt)
     keep(tally, sub.tally[0])
     for k in range(SERIES_PASSES):
         if k > 0:

@@ -1,4 +1,4 @@
-"""Bodies that rock to rest on each other: a series of impacts at two points, and hops that are mere noise (E22)."""
+"""Bodies that rock to rest on each other: a series of impacts at two points (E22)."""
 
 from __future__ import annotations
 
@@ -8,37 +8,20 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
-from reference_solver.planar.impact import flies, gap_noise
-from reference_solver.planar.kinematics import load_speed, normal_velocity
-from reference_solver.planar.lasting import evaluate, free_accelerations, hold
+from reference_solver.planar.impact import gap_noise
+from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.press import press
-from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
+from reference_solver.planar.state import MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back
 from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, is_patient, weigh_event
-from reference_solver.stepping.equalities import row_value
-from reference_solver.stepping.impacts import BOUNCES, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
-from reference_solver.stepping.lasting import CONTACTS as LASTING
-from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.impacts import BOUNCES, SERIES_DRIFT, SERIES_ENDS
 from reference_solver.stepping.noise import NOISE, SHORT
 from reference_solver.stepping.options import Options
 
 
 @inner_kernel
-def is_pulled_back(bodies: Bodies, rows: Rows, lasting: Lasting, c: int) -> bool:
-    """Whether a contact that parts is accelerated back together: by loads, less what going round each other takes.
-
-    A disc that has just left the top of another parts from it by less than round-off for a while, and never returns.
-    """
-    hold(bodies, rows, lasting, c, 0)
-    lasting.size[LASTING] = 1
-    evaluate(bodies, lasting)
-    free_accelerations(bodies, lasting)
-    return bool(row_value(lasting, 0, 0, lasting.free) + lasting.gamma[0, 0] < 0.0)
-
-
-@inner_kernel
 def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tuple[float, float]:
-    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow, and hops of noise.
+    """Mark contacts between which two bodies rock to rest in this sub-step, or too fast to follow.
 
     ``bodies.twist`` are the velocities after ``length`` of it. One contact was hit, the other leaves and returns: with
     e = 0 speeds of impacts, and times between them, go on by the same ratio (G. Housner, *Bull. Seismol. Soc. Am.*
@@ -46,13 +29,6 @@ def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tupl
     infinite if there are none.
     """
     left, longest, shortest = sub.clock[LEFT], 0.0, math.inf
-    for c in range(rows.counts[CONTACTS]):
-        leaves = normal_velocity(sub.start, rows, c)
-        hops = leaves > NOISE * rows.real[c, SPEED] and rows.integer[c, ENDING] == OPEN_ENDED
-        hops = hops and not flies(bodies, rows, c, leaves, left)
-        if hops and is_pulled_back(bodies, rows, sub.lasting, c):
-            longest = max(longest, 2.0 * leaves / load_speed(bodies, rows, c, 1.0))
-            rows.integer[c, ENDING] = SERIES_ENDS
     for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         for k in range(2 if rows.manifold[m + 1] - first == 2 else 0):

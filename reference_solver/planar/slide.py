@@ -15,7 +15,7 @@ from reference_solver.planar.kinematics import tangent_velocity
 from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back, keep
-from reference_solver.stepping.clock import HELD, SERIES
+from reference_solver.stepping.clock import BRIEF, HELD, SERIES
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES
@@ -61,7 +61,7 @@ def press_until_stick(
     """
     keep(tally, sub.tally[1])
     press(bodies, rows, problem, sub, options, tally, left)
-    if not options.friction or sub.clock[HELD] > 0.0:
+    if not options.friction or sub.clock[HELD] > 0.0 or sub.clock[BRIEF] > 0.0:
         return left
     length, slipped = left, 0.0
     for k in range(STICK_SOLVES):

@@ -75,11 +75,17 @@ def set_reference_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u:
     round-off is of the size of the parts. Against loads of a short sub-step it could never be small.
     """
     measure_speed(bodies, manifolds, m, p, u, dt)
+    manifolds.speed[m, p] = max(manifolds.speed[m, p], SPEED_SHARE * speed_of_parts(bodies, manifolds, m, p))
+
+
+@inner_kernel
+def speed_of_parts(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
+    """Size of the velocities that the relative one of a point is the sum of [m/s]."""
     a, b = manifolds.body_a[m], manifolds.body_b[m]
     parts = length(row(bodies.twist, a, 0)) + length(row(bodies.twist, b, 0))
     parts += length(row(bodies.twist, a, 3)) * length(row(manifolds.arm_a[m], p, 0))
     parts += length(row(bodies.twist, b, 3)) * length(row(manifolds.arm_b[m], p, 0))
-    manifolds.speed[m, p] = max(manifolds.speed[m, p], SPEED_SHARE * parts)
+    return parts
 
 
 @inner_kernel
@@ -147,15 +153,15 @@ def collide_now(bodies: Bodies, manifolds: Manifolds, problem: Problem, options:
 def doubt(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
     """Note the first pair that still approaches after a solve: no impulses keep it apart, however large they are.
 
-    Measured by velocities alone: the residual is measured against the impulse as well, which grows without bound.
+    Measured by velocities alone, those after the solve as well, of what was at rest: the residual is measured against
+    the impulse, which grows without bound.
     """
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             missing = manifolds.target[m, p] - velocity_at(v, w, manifolds, m, p)[2]
-            if manifolds.open[m, p]:
-                continue
-            if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * manifolds.speed[m, p]:
+            speed = max(manifolds.speed[m, p], SPEED_SHARE * speed_of_parts(bodies, manifolds, m, p))
+            if manifolds.open[m, p] == 0 and tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * speed:
                 tally[CONTRADICTED_A] = 1.0 + bodies.number[manifolds.body_a[m]]
                 tally[CONTRADICTED_B] = 1.0 + bodies.number[manifolds.body_b[m]]
 

@@ -53,6 +53,7 @@ from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import (
+    BRIEF,
     CONFINED,
     CRAWL,
     ESCAPED,
@@ -63,12 +64,13 @@ from reference_solver.stepping.clock import (
     LEFT,
     OUTCOME,
     REBOUND,
-    SERIES,
     UNSETTLED,
     count_event,
+    end_instant,
     end_settling,
-    hold_rest,
+    give_up_phase,
     open_step,
+    open_sub_step,
     weigh_event,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
@@ -168,7 +170,7 @@ def sub_step(
     length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
     smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
     if smooth == NO_PHASE:
-        hold_rest(sub.clock, tally)
+        give_up_phase(sub.clock, tally)
         go_back(tally, sub.opened)
         copy_twists(bodies.before, bodies.twist)
         return True
@@ -215,11 +217,25 @@ def sub_step(
         enter_contacts(bodies, manifolds, ledger)
         enter_release(bodies, manifolds, sub, options, end)
     haste, shortened = end < SHORT * options.dt, smooth == end and sub.clock[OUTCOME] == SHORTENED
+    if sub.clock[BRIEF] > 0.0:
+        end_instant(sub.clock, tally, *gained_speed(bodies, end))
     if end < left and (haste or not shortened):
         crawl = CRAWL * max(1.0, sub.lasting.size[LASTING] / CHEAP)
         count_event(sub.clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
     sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
+
+
+@inner_kernel
+def gained_speed(bodies: Bodies, length: float) -> tuple[float, float]:
+    """Largest change of a velocity in a sub-step, and what loads do in it, over free bodies [m/s]."""
+    gained, loaded = 0.0, 0.0
+    for i in range(len(bodies)):
+        for k in range(3):
+            if bodies.motion[i] == FREE:
+                gained = max(gained, abs(bodies.twist[i, k] - bodies.first[i, k]))
+                loaded = max(loaded, length * abs(bodies.acceleration[i, k]))
+    return gained, loaded
 
 
 @inner_kernel
@@ -287,7 +303,7 @@ def solve_sub_step(
     copy_twists(bodies.twist, bodies.before)
     prepare_wrenches(bodies, manifolds, options)
     length, found = sub.clock[LEFT], NO_IMPACT
-    sub.clock[SERIES] = 0.0
+    open_sub_step(sub.clock, options.dt)
     for k in range(SERIES_PASSES):
         if k > 0:
             go_back(tally, sub.opened)

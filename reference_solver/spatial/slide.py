@@ -17,7 +17,7 @@ from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
-from reference_solver.stepping.clock import LEFT, SERIES
+from reference_solver.stepping.clock import BRIEF, LEFT, SERIES
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
@@ -174,7 +174,7 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
-    if not (struck and options.restitution):
+    if not (struck and options.restitution) and sub_step.clock[BRIEF] == 0.0:
         begin_press(bodies, manifolds, options, left, left, struck)
         copy_twists(bodies.first, bodies.last)
         if not is_exact(bodies, manifolds, sub_step, left):
@@ -183,7 +183,7 @@ def press_until_stick(
     residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
     press(bodies, manifolds, problem, options, tally, left, left, struck)
     length, slipped = left, 0.0
-    for k in range(STICK_SOLVES if options.friction else 0):
+    for k in range(STICK_SOLVES if options.friction and sub_step.clock[BRIEF] == 0.0 else 0):
         end = slip_end(bodies, manifolds, options, length)
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break

@@ -157,7 +157,7 @@ class World:
         memory = allocate_memory(2 * len(self._memory))
         memory[: len(self._memory)] = self._memory
         self._memory = memory
-        past = allocate_memory(len(memory))
+        past = allocate_memory(max(len(memory), len(self._sub_step.past)))
         past[: len(self._sub_step.past)] = self._sub_step.past
         self._manifolds = allocate_manifolds(2 * len(self._manifolds))
         self._sub_step = self._sub_step._replace(kept=allocate_manifolds(len(self._manifolds)), past=past)

@@ -23,10 +23,16 @@ WEIGHT = 10
 ROCKING, ROCKS = 11, 12
 #: How long contacts are held whose series of rebounds ends in the sub-step, where rows turn [s]; 0: no such one.
 SERIES = 13
-CLOCK_SIZE = 14
+#: 1 where the next sub-step is so short that nothing but a jam happens in it.
+BRIEF = 14
+CLOCK_SIZE = 15
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
+
+#: Length of such a sub-step, as a share of a step: loads do more in it than residuals leave, and bodies go nowhere. And
+#: how many times what loads do in it velocities change in a jam.
+INSTANT, JUMP = 1e-8, 1e3
 
 #: Soft events located in a step, and one more per body. Of 16 two discs that bounce on each other and the floor used up
 #: half in a step of 1/60 s, and the series that was held then was 1e-6 m off.
@@ -54,7 +60,7 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = MOST_SOFT + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = 0.0
 
 
 @kernel
@@ -99,6 +105,35 @@ def hold_rest(clock: Array, tally: Array) -> None:
     """Let what is left of the step go by the impulse-level scheme."""
     clock[HELD] = 1.0
     tally[STEPS_HELD] += 1.0
+
+
+@kernel
+def give_up_phase(clock: Array, tally: Array) -> None:
+    """No phase is found: look for a jam first (E54), then let what is left of the step go by the impulse-level scheme.
+
+    A slip that no force can stand against ends at once, by impulses without a collision: those of the impulse-level
+    solve E19 for a sub-step of no length. After it a phase may be found.
+    """
+    if clock[BRIEF] == 0.0 and clock[JAMMED] == 0.0:
+        clock[BRIEF] = 1.0
+    else:
+        clock[BRIEF] = 0.0
+        hold_rest(clock, tally)
+
+
+@kernel
+def open_sub_step(clock: Array, dt: float) -> None:
+    """No series of rebounds ends; where a jam is looked for rows are held for an instant."""
+    clock[SERIES] = INSTANT * dt if clock[BRIEF] > 0.0 else 0.0
+
+
+@kernel
+def end_instant(clock: Array, tally: Array, gained: float, loaded: float) -> None:
+    """Whether a jam was found: velocities gained far more than what loads do; else the rest of the step is held."""
+    if clock[BRIEF] > 0.0:
+        clock[BRIEF] = 0.0
+        if gained <= JUMP * loaded:
+            hold_rest(clock, tally)
 
 
 @kernel
