@@ -8,15 +8,47 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
-from reference_solver.planar.impact import gap_noise
-from reference_solver.planar.kinematics import normal_velocity
+from reference_solver.planar.impact import flies, gap_noise, row_turn
+from reference_solver.planar.kinematics import copy_vectors, normal_velocity
+from reference_solver.planar.lasting import evaluate, free_accelerations, hold
 from reference_solver.planar.press import press
-from reference_solver.planar.state import MANIFOLDS, Bodies, Rows, SubStep
+from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back
-from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, is_patient, weigh_event
-from reference_solver.stepping.impacts import BOUNCES, SERIES_DRIFT, SERIES_ENDS
-from reference_solver.stepping.noise import NOISE, SHORT
+from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, SERIES, is_patient, weigh_event
+from reference_solver.stepping.equalities import row_value
+from reference_solver.stepping.impacts import BOUNCES, HOPS, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
+from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.noise import FROZEN, NOISE, SHORT
 from reference_solver.stepping.options import Options
+
+
+@inner_kernel
+def hop_time(bodies: Bodies, rows: Rows, sub: SubStep) -> float:
+    """How long until contacts that part by mere noise, and turn, have come back [s]; 0 if there are none.
+
+    Loads, less what going round each other takes, bring them back: a disc that has just left the top of another parts
+    from it by less than round-off for a while, and never returns. Uses up the first contact noted.
+    """
+    longest = 0.0
+    copy_vectors(bodies.twist, sub.after)
+    for c in range(rows.counts[CONTACTS]):
+        u = normal_velocity(sub.start, rows, c)
+        if rows.integer[c, ENDING] != OPEN_ENDED or not u > NOISE * rows.real[c, SPEED]:
+            continue
+        if flies(bodies, rows, c, u, sub.clock[LEFT]) or rows.real[c, GAP] > gap_noise(bodies, rows, c):
+            continue
+        if row_turn(bodies, rows, sub, c, 1.0) * sub.clock[LEFT] <= FROZEN:
+            continue
+        copy_vectors(sub.start, bodies.twist)
+        hold(bodies, rows, sub.lasting, c, 0)
+        sub.lasting.size[LASTING] = 1
+        evaluate(bodies, sub.lasting)
+        free_accelerations(bodies, sub.lasting)
+        copy_vectors(sub.after, bodies.twist)
+        pull = -(row_value(sub.lasting, 0, 0, sub.lasting.free) + sub.lasting.gamma[0, 0])
+        if pull > 0.0 and HOPS * u <= pull * sub.clock[LEFT]:
+            longest = max(longest, HOPS * u / pull)
+    return longest
 
 
 @inner_kernel
@@ -64,12 +96,17 @@ def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tupl
 def rest(
     bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array, length: float
 ) -> float:
-    """Hold contacts of bodies that rock to rest (E22), until they do; length of the sub-step."""
+    """Hold contacts of bodies that rock to rest (E22), until they do, or hop by mere noise; length of the sub-step."""
     left = sub.clock[LEFT]
     longest, shortest = end_rocking(bodies, rows, sub, length)
     if shortest < left:
         weigh_event(sub.clock, REBOUND)
     if longest == 0.0:
+        hop = hop_time(bodies, rows, sub) if sub.clock[SERIES] == 0.0 else 0.0
+        if hop > 0.0:
+            go_back(tally, sub.tally[1])
+            sub.clock[SERIES] = length = hop
+            press(bodies, rows, problem, sub, options, tally, length)
         return length
     go_back(tally, sub.tally[1])
     sub.clock[HELD] = sub.clock[ROCKS]  # if rows turn the impulse-level scheme does it

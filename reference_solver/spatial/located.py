@@ -35,7 +35,7 @@ from reference_solver.spatial.motion import accelerate, displace
 from reference_solver.spatial.phase import NO_PHASE, cut_phase, end_phase, enter_phase, part_points
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import warm_start
-from reference_solver.spatial.slide import certify_press, press_until_stick
+from reference_solver.spatial.slide import certify_press, hop_time, press_until_stick
 from reference_solver.spatial.state import (
     FREE,
     POINTS,
@@ -64,6 +64,7 @@ from reference_solver.stepping.clock import (
     LEFT,
     OUTCOME,
     REBOUND,
+    SERIES,
     UNSETTLED,
     count_event,
     end_instant,
@@ -302,7 +303,7 @@ def solve_sub_step(
     """
     copy_twists(bodies.twist, bodies.before)
     prepare_wrenches(bodies, manifolds, options)
-    length, found = sub.clock[LEFT], NO_IMPACT
+    length, found, struck = sub.clock[LEFT], NO_IMPACT, False
     open_sub_step(sub.clock, options.dt)
     for k in range(SERIES_PASSES):
         if k > 0:
@@ -318,6 +319,10 @@ def solve_sub_step(
             length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
         if not (struck and options.restitution and end_series(bodies, manifolds, sub, options, length)):
             break
+    if sub.clock[HELD] == 0.0 and sub.clock[SERIES] == 0.0:
+        sub.clock[SERIES] = hop_time(bodies, manifolds, sub, options)
+        if sub.clock[SERIES] > 0.0:
+            length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
     keep(tally, sub.saved)
