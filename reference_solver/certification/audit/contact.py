@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
-from reference_solver.certification.audit.space import normal_turns
+from reference_solver.certification.audit.turning import SOLVED, turned_contacts
 from reference_solver.model import Array
 
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
@@ -33,8 +33,11 @@ def _laws(run: Run) -> Iterator[float]:
         for late in (False, True)
     )
     approach, leaves = (before * n).sum(axis=1), (after * n).sum(axis=1)
-    pressed = (pieces.impulse * n).sum(axis=1)
-    along = pieces.impulse - pressed[:, None] * n
+    # Where rows turn within a piece its impulse is a mean over normals: what remains unknown of that mean adds a share
+    # of the normal impulse to the friction, and of the friction to the normal impulse.
+    over = turned_contacts(run)
+    pressed = (pieces.impulse * over.normal).sum(axis=1)
+    along = pieces.impulse - pressed[:, None] * over.normal
     held_back = np.linalg.norm(along, axis=1)
     mass = _reduced_mass(run)
     speed = _speeds(run)
@@ -46,9 +49,7 @@ def _laws(run: Run) -> Iterator[float]:
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
     yield _worst(np.where(correction, 0.0, -pressed), scale)
-    # Where rows turn within a piece its impulse is a mean over normals, of which the first is known: a turn by an angle
-    # adds that share of the normal impulse to the friction, and of the friction to the normal impulse.
-    leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * normal_turns(run)
+    leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning
     yield _worst(np.where(correction, 0.0, excess), scale)
 
@@ -68,23 +69,31 @@ def _laws(run: Run) -> Iterator[float]:
     defect = np.where(release | parting | coarse, 0.0, defect)
     yield _worst(defect, scale)
 
-    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it.
-    slip = np.where(frozen[:, None], after, before)
-    slip = slip - (slip * n).sum(axis=1)[:, None] * n
+    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is the
+    # mean of those at both ends, each at its own point and normal.
+    ended = run.velocity_at(row_b, b, over.last_point, True, late=True) - run.velocity_at(
+        row_a, a, over.last_point, True, late=True
+    )
+    first = before - approach[:, None] * n
+    last = ended - (ended * over.last_normal).sum(axis=1)[:, None] * over.last_normal
+    slip = np.where(frozen[:, None], after - leaves[:, None] * n, 0.5 * (first + last))
+    slip = slip - (slip * over.normal).sum(axis=1)[:, None] * over.normal
     wanted = along - mass[:, None] * slip
     size = np.linalg.norm(wanted, axis=1)
     limit = mu * pressed.clip(min=0.0)
     wanted *= np.where(size > limit, limit / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
-    # Where the direction of a slip turns within a piece, its friction is a mean of directions.
-    first, last = (x - (x * n).sum(axis=1)[:, None] * n for x in (before, after))
-    turned = np.where(frozen, 0.0, limit * _angle(first, last)) + leaning
-    missed = np.linalg.norm(along - wanted, axis=1) - turned
+    # Where the direction of a slip turns within a piece, its friction is a mean of directions; in the plane there are
+    # but two, and the normal's turn is known.
+    swing = _angle(first, last) if run.d == 3 else np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
+    missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * swing) - leaning
     yield _worst(np.where(coarse, 0.0, missed), scale)
 
-    about = cross(pieces.point, pieces.impulse)
+    about = cross(over.point, pieces.impulse)
+    force = np.linalg.norm(pieces.impulse, axis=1)
     arm = np.linalg.norm(pieces.point, axis=1) + run.size
-    off = np.linalg.norm(pieces.moment - about, axis=1)
-    yield _worst(np.where(frozen, off, 0.0), arm * np.linalg.norm(pieces.impulse, axis=1))
+    with np.errstate(invalid="ignore"):  # of no impulse times an unknown point
+        off = np.linalg.norm(pieces.moment - about, axis=1) - np.where(force > 0.0, over.stray * force, 0.0)
+    yield _worst(np.where(coarse & ~frozen, 0.0, off), arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
     yield float(held.sum() + (release & (pressed > 0.0)).sum())

@@ -7,18 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit.run import Indices, Run, twist_of
+from reference_solver.certification.audit.run import POINT, Indices, Run, placed, twist_of
 from reference_solver.certification.geometry import Nearest, gap, nearest, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Halvings of an interval in which two bodies might have met: sixteen parts of it.
 HALVINGS = 4
-
-
-class _Point:
-    """A shape without extent: its distance from a body is that of a place."""
-
-    radius = 0.0
 
 
 class Path(NamedTuple):
@@ -70,44 +64,10 @@ def _touching(run: Run) -> tuple[float, float, float]:
         lost = (found.gap - parted - noise) / size
         length = np.abs(np.linalg.norm(n, axis=1) - 1.0)
         worst[1] = max(worst[1], float(lost.max()), float(length.max()))
-        place = _placed(pieces.point[rows], run.d)
-        sides = [_distinct(shape, pose, _Point(), place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
+        place = placed(pieces.point[rows], run.d)
+        sides = [_distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
         worst[2] = max(worst[2], float(max((np.abs(s) - np.abs(found.gap) - noise).max() for s in sides) / size))
     return max(worst[0], 0.0), max(worst[1], 0.0), max(worst[2], 0.0)
-
-
-def normal_turns(run: Run) -> Array:
-    """By how much (c,) the normal of each contact turns within its piece [rad]; 0 where rows stood still.
-
-    From its start to its end by the geometry; in between it leaves the chord by up to an eighth of what its rate
-    changes, times the length: rates are spins, and of round bodies that pass each other their speed over their
-    distance.
-    """
-    pieces = run.pieces
-    found = np.zeros(len(pieces.body_a))
-    turning = ~run.is_frozen[run.contact_owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
-    pairs = pieces.body_a * len(run.free) + pieces.body_b
-    for pair in np.unique(pairs[turning]):
-        rows = np.flatnonzero(turning & (pairs == pair))
-        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
-        ends = (_pose(run, i, run.side[k][rows], late=True) for k, i in enumerate((a, b)))
-        end_a, end_b = ends
-        last = nearest(run.model.bodies[a].shape, end_a, run.model.bodies[b].shape, end_b).normal
-        chord = np.linalg.norm(last - pieces.normal[rows], axis=1)
-        changes = [_changes(run, run.side[k][rows]) for k in range(2)]
-        apart = np.linalg.norm(end_a[:, : run.d] - end_b[:, : run.d], axis=1)
-        passing = np.linalg.norm(changes[0][:, : run.d] - changes[1][:, : run.d], axis=1)
-        spins = sum(np.linalg.norm(change[:, run.d :], axis=1) for change in changes)
-        bulge = (
-            0.125 * pieces.length[run.contact_owner[rows]] * (spins + passing / np.where(apart > 0.0, apart, run.size))
-        )
-        found[rows] = chord + bulge
-    return found
-
-
-def _changes(run: Run, rows: Indices) -> Array:
-    """Change of twist (s, 3 | 6) of bodies in their pieces; none where a piece does not hold one."""
-    return np.where((rows >= 0)[:, None], run.pieces.twist_after[rows] - run.pieces.twist_before[rows], 0.0)
 
 
 def _distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Nearest:
@@ -124,13 +84,6 @@ def _pose(run: Run, i: int, rows: Indices, late: bool = False) -> Array:
     """Poses (s, P) of body i as the pieces of ``rows`` begin, or end; the model's where a piece does not hold it."""
     own = np.array(run.model.bodies[i].pose, dtype=float)
     return np.where((rows >= 0)[:, None], (run.pieces.pose_after if late else run.pieces.pose_before)[rows], own)
-
-
-def _placed(point: Array, d: int) -> Array:
-    """Poses of a place."""
-    return np.concatenate(
-        [point, np.zeros((len(point), 1))] if d == 2 else [point, np.tile(np.eye(4)[0], (len(point), 1))], axis=1
-    )
 
 
 def _along(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array, n: Array, d: int) -> Array:
