@@ -3,9 +3,10 @@
 *Error.* The run is made again at half the step. A scheme of order p is off by C h^p, so that both differ by
 ``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
 Halves end where the whole steps end. What a solver decides by the time that is left of a step (whether a series of
-rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with 34 steps
-for each 13, or others whose ratio is near the square of the golden mean too: no such steps end near the whole ones but
-the last of all, where the runs are compared as well.
+rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with
+34 steps for each 13, or others whose ratio is near the square of the golden mean too: no such steps end near the whole
+ones but the last of all, where the runs are compared as well. Each rebound is smaller than the one before by e, and a
+run that leaves some out is off by as much for all steps that leave out as many: then it is made with 144 for 13, too.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.certification.audit import Finding, audit
+from reference_solver.certification.audit import Finding, audit, leaves_out_rebounds
 from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.model import Array, Model
@@ -34,8 +35,8 @@ GROWTH = 1e3
 #: Size of the disturbance, as a share of the fastest speed of the run: thousands of units in the last place, so that
 #: what it grows to is told from the round-off of either run.
 DISTURBANCE = 1e-12
-#: Steps in a row that are made again as more that end elsewhere, but for the last; and how many more at least.
-BLOCK, FINER = 13, 2.618
+#: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds.
+BLOCK, FINER, FINEST = 13, 2.618, 11.09
 #: Signs of the disturbance, one after the other.
 SEED = 20
 
@@ -87,7 +88,7 @@ class Certificate:
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs about six runs and the audit.
+    """Run ``model`` and certify the run; costs about six runs, or seventeen, and the audit.
 
     Raises
     ------
@@ -117,20 +118,22 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
 
 def _error(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> Array:
     """Bound (s,) of what the record is off for its finite step [m]; the largest so far."""
-    finer = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
-    error = 2.0 * distance(model, record.pose, finer.pose)
+    half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
+    error = 2.0 * distance(model, record.pose, half.pose)
     samples = len(record.t) - 1
     each = min(max(BLOCK // stride, 1), samples)  # samples from one comparison to the next
     block = each * stride
-    more = next(k for k in count(round(FINER * block)) if gcd(k, block) == 1)
-    share = block / more
     blocks = samples // each
-    other = Simulation(model, replace(settings, dt=share * settings.dt)).record(blocks * more, more)
-    off = distance(model, record.pose[: blocks * each + 1 : each], other.pose) / (1.0 - share)
     # What a block ends with may have come at any time in it; what is left over has no end to be compared at.
     until = np.minimum((np.arange(samples + 1) + each - 1) // each, blocks)
+    for ratio in (FINER, FINEST)[: 1 + leaves_out_rebounds(model, record, settings.dt)]:
+        more = next(k for k in count(round(ratio * block)) if gcd(k, block) == 1)
+        share = block / more
+        other = Simulation(model, replace(settings, dt=share * settings.dt)).record(blocks * more, more)
+        off = distance(model, record.pose[: blocks * each + 1 : each], other.pose) / (1.0 - share)
+        error = np.maximum(error, off[until])
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
-    return np.maximum.accumulate(np.maximum(error, off[until]) + noise)
+    return np.maximum.accumulate(error + noise)
 
 
 def _horizon(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> tuple[Array, float]:

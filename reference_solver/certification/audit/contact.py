@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.audit.turning import SOLVED, turned_contacts
 from reference_solver.model import Array
+from reference_solver.pieces import ROCKING
+from reference_solver.shapes import Disc, Sphere
 
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
@@ -21,6 +24,30 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
         yield from ((name, 0.0) for name in names)
         return
     yield from zip(names, _laws(run), strict=True)
+
+
+def ends_of_series(run: Run) -> NDArray[np.bool_]:
+    """Whether (c,) a contact whose lever turns holds a rebound that its law calls for, or comes to rest by rocking.
+
+    What such an end leaves out hangs on the number of rebounds that it leaves out, not on the step in which it is.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    a, b, n = pieces.body_a, pieces.body_b, pieces.normal
+    cornered = np.array(
+        [
+            free and not isinstance(body.shape, Disc | Sphere)
+            for free, body in zip(run.free, run.model.bodies, strict=True)
+        ]
+    )
+    approach, leaves = (
+        ((run.velocity_at(run.side[1], b, pieces.point, x) - run.velocity_at(run.side[0], a, pieces.point, x)) * n).sum(
+            axis=1
+        )
+        for x in (False, True)
+    )
+    rebound = -run.model.restitution[a, b] * approach
+    held = run.is_impact[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
+    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
 
 
 def _laws(run: Run) -> Iterator[float]:
@@ -39,7 +66,7 @@ def _laws(run: Run) -> Iterator[float]:
     pressed = (pieces.impulse * over.normal).sum(axis=1)
     along = pieces.impulse - pressed[:, None] * over.normal
     held_back = np.linalg.norm(along, axis=1)
-    mass = _reduced_mass(run)
+    mass = reduced_mass(run)
     speed = _speeds(run)
     scale = mass * speed + pressed.clip(min=0.0)
     owner = run.contact_owner
@@ -48,7 +75,7 @@ def _laws(run: Run) -> Iterator[float]:
     correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
-    yield _worst(np.where(correction, 0.0, -pressed), scale)
+    yield _worst(np.where(correction, 0.0, -pressed - over.lean * held_back), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning
     yield _worst(np.where(correction, 0.0, excess), scale)
@@ -63,19 +90,22 @@ def _laws(run: Run) -> Iterator[float]:
     stopped = np.abs(pressed - np.maximum(pressed - mass * ends, 0.0))
     held = impact & soft & (rebound > 0.0) & (stopped < defect)
     defect = np.where(held, stopped, defect)
-    # Rebounds that are released leave with what was held, which their own piece cannot tell; and what is not pressed
-    # and is not an impact may part, or come closer: a gap is a matter of geometry.
+    # Rebounds that are released leave with what was held in their step at most; and what is not pressed and is not an
+    # impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
-    defect = np.where(release | parting | coarse, 0.0, defect)
+    defect = np.where(parting | coarse, 0.0, defect)
+    defect = np.where(release, mass * np.maximum(leaves - _held_back(run, rebound), 0.0), defect)
     yield _worst(defect, scale)
 
-    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is the
-    # mean of those at both ends, each at its own point and normal.
+    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
+    # the mean of those at both ends, each at its own point and normal.
     ended = run.velocity_at(row_b, b, over.last_point, True, late=True) - run.velocity_at(
         row_a, a, over.last_point, True, late=True
     )
     first = before - approach[:, None] * n
     last = ended - (ended * over.last_normal).sum(axis=1)[:, None] * over.last_normal
+    # Where that point is not known, the slip of the start has to do.
+    last = np.where(np.isfinite(over.stray)[:, None], last, first)
     slip = np.where(frozen[:, None], after - leaves[:, None] * n, 0.5 * (first + last))
     slip = slip - (slip * over.normal).sum(axis=1)[:, None] * over.normal
     wanted = along - mass[:, None] * slip
@@ -101,7 +131,17 @@ def _laws(run: Run) -> Iterator[float]:
     yield float(movable.sum())
 
 
-def _reduced_mass(run: Run) -> Array:
+def _held_back(run: Run, rebound: Array) -> Array:
+    """Fastest rebound (c,) that impacts of the same pair in the same step called for [m/s]."""
+    pieces, n = run.pieces, len(run.free)
+    keys = (pieces.step[run.contact_owner] * n + pieces.body_a) * n + pieces.body_b
+    _, which = np.unique(keys, return_inverse=True)
+    most = np.zeros(which.max() + 1)
+    np.maximum.at(most, which, rebound)
+    return np.asarray(most[which])
+
+
+def reduced_mass(run: Run) -> Array:
     """Mass (c,) that a contact feels at least along its normal [kg]: levers only lower it."""
     pieces = run.pieces
     inverse = np.zeros(len(pieces.body_a))

@@ -50,7 +50,7 @@ def turned_contacts(run: Run) -> Turned:
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     alone = _alone(owner, pairs)
     if turning.any():
-        change = np.where(turning, _changes_of_force(run, pairs), 0.0)
+        change = np.where(turning, changes_of_force(run), 0.0)
     for pair in np.unique(pairs[turning]):
         rows = np.flatnonzero(turning & (pairs == pair))
         a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
@@ -74,7 +74,7 @@ def turned_contacts(run: Run) -> Turned:
         lean[rows] = np.where(told, SLACK * chord * (chord + change[rows]) + chord.clip(max=SAME), 2.0 * most) + SOLVED
         place, sure = _places(run, rows, seen)
         moved = np.linalg.norm(place[2] - place[0], axis=1)
-        sure &= told & alone[rows]
+        sure = sure & told & alone[rows]
         point[rows] = np.where(sure[:, None], (place[0] + 4.0 * place[1] + place[2]) / 6.0, point[rows])
         last_point[rows] = np.where(sure[:, None], place[2], last_point[rows])
         far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size + _unseen(run, rows)
@@ -84,14 +84,15 @@ def turned_contacts(run: Run) -> Turned:
 
 def _alone(owner: Indices, pairs: Indices) -> Array:
     """Whether (c,) a contact is the only one of its pair in its piece."""
-    keys = owner * (pairs.max(initial=0) + 1) + pairs
+    keys = owner * (int(pairs.max(initial=0)) + 1) + pairs
     _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
     return np.asarray(count[which] == 1)
 
 
-def _changes_of_force(run: Run, pairs: Indices) -> Array:
+def changes_of_force(run: Run) -> Array:
     """Share (c,) by which the force between two bodies changes in a piece, as its neighbours in time tell."""
     pieces, owner = run.pieces, run.contact_owner
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
     length = pieces.length[owner]
     lasting = length > 0.0
     found = np.full(len(pairs), UNKNOWN_CHANGE)
@@ -156,7 +157,7 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
         other = [
             nearest(shapes[1 - k], x[1 - k], POINT, placed(at, run.d)).gap for x, at in zip(poses, later, strict=True)
         ]
-        fits = (np.abs(np.array(other)) <= SAME * run.size).all(axis=0)
+        fits = np.asarray((np.abs(np.array(other)) <= SAME * run.size).all(axis=0))
         # Of faces that lie flush a corner of either fits, and both go ways of their own.
         differ = np.linalg.norm(later[2] - place[2], axis=1) > 1e-12 * run.size
         place = [np.where(fits[:, None], new, old) for new, old in zip(later, place, strict=True)]
