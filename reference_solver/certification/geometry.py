@@ -102,6 +102,31 @@ def nearest(shape_a: Any, pose_a: ArrayLike, shape_b: Any, pose_b: ArrayLike) ->
     return Nearest(*(field.reshape(form + field.shape[1:]) for field in joined))
 
 
+def distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Nearest:
+    """As `nearest`, asked once where poses (s, P) repeat those before: what rests costs nothing."""
+    both = np.concatenate([pose_a, pose_b], axis=1)
+    new = np.ones(len(both), bool)
+    new[1:] = (both[1:] != both[:-1]).any(axis=1)
+    found = nearest(shape_a, pose_a[new], shape_b, pose_b[new])
+    which = np.cumsum(new) - 1
+    return Nearest(*(field[which] for field in found))
+
+
+def partings(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> tuple[Array, Array]:
+    """Return how far apart planar cores are along each of their edges' normals (s, m), and those from A to B (s, m, 2).
+
+    Raises
+    ------
+    ValueError
+        For shapes whose cores have no edges: discs.
+    """
+    a, b = _core(shape_a, pose_a), _core(shape_b, pose_b)
+    axes = _edge_normals(a, b)
+    if axes is None:
+        raise ValueError("shapes: two points have no edges")
+    return _parted(a, b, axes), axes
+
+
 def rotation(pose: Array) -> Array:
     """Return the rotation matrices (..., d, d) of poses (..., 3 | 7), body axes to world axes.
 
@@ -224,12 +249,17 @@ def _deepest(a: Core, b: Core) -> tuple[Array, Array]:
     candidates = _edge_normals(a, b) if d == 2 else _face_normals(a, b)
     if candidates is None:
         return np.full(s, np.inf), _across(a, b)
-    low = np.einsum("ski,smi->smk", b.vertex - a.centre[:, None], candidates).min(axis=2)
-    high = np.einsum("ski,smi->smk", a.vertex - a.centre[:, None], candidates).max(axis=2)
-    apart = low - high
+    apart = _parted(a, b, candidates)
     best = apart.argmax(axis=1)
     rows = np.arange(s)
     return apart[rows, best], candidates[rows, best]
+
+
+def _parted(a: Core, b: Core, axes: Array) -> Array:
+    """How far apart (s, m) cores are along directions (s, m, d) from A to B."""
+    low = np.einsum("ski,smi->smk", b.vertex - a.centre[:, None], axes).min(axis=2)
+    high = np.einsum("ski,smi->smk", a.vertex - a.centre[:, None], axes).max(axis=2)
+    return np.asarray(low - high)
 
 
 def _across(a: Core, b: Core) -> Array:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
-from reference_solver.certification.audit.space import normal_turns
+from reference_solver.certification.audit.turning import SOLVED, turned_contacts
 from reference_solver.model import Array
+from reference_solver.pieces import ROCKING
+from reference_solver.shapes import Disc, Sphere
 
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
@@ -23,6 +26,30 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
     yield from zip(names, _laws(run), strict=True)
 
 
+def ends_of_series(run: Run) -> NDArray[np.bool_]:
+    """Whether (c,) a contact whose lever turns holds a rebound that its law calls for, or comes to rest by rocking.
+
+    What such an end leaves out hangs on the number of rebounds that it leaves out, not on the step in which it is.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    a, b, n = pieces.body_a, pieces.body_b, pieces.normal
+    cornered = np.array(
+        [
+            free and not isinstance(body.shape, Disc | Sphere)
+            for free, body in zip(run.free, run.model.bodies, strict=True)
+        ]
+    )
+    approach, leaves = (
+        ((run.velocity_at(run.side[1], b, pieces.point, x) - run.velocity_at(run.side[0], a, pieces.point, x)) * n).sum(
+            axis=1
+        )
+        for x in (False, True)
+    )
+    rebound = -run.model.restitution[a, b] * approach
+    held = run.is_impact[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
+    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
+
+
 def _laws(run: Run) -> Iterator[float]:
     pieces = run.pieces
     row_a, row_b = run.side
@@ -33,10 +60,13 @@ def _laws(run: Run) -> Iterator[float]:
         for late in (False, True)
     )
     approach, leaves = (before * n).sum(axis=1), (after * n).sum(axis=1)
-    pressed = (pieces.impulse * n).sum(axis=1)
-    along = pieces.impulse - pressed[:, None] * n
+    # Where rows turn within a piece its impulse is a mean over normals: what remains unknown of that mean adds a share
+    # of the normal impulse to the friction, and of the friction to the normal impulse.
+    over = turned_contacts(run)
+    pressed = (pieces.impulse * over.normal).sum(axis=1)
+    along = pieces.impulse - pressed[:, None] * over.normal
     held_back = np.linalg.norm(along, axis=1)
-    mass = _reduced_mass(run)
+    mass = reduced_mass(run)
     speed = _speeds(run)
     scale = mass * speed + pressed.clip(min=0.0)
     owner = run.contact_owner
@@ -45,10 +75,8 @@ def _laws(run: Run) -> Iterator[float]:
     correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
-    yield _worst(np.where(correction, 0.0, -pressed), scale)
-    # Where rows turn within a piece its impulse is a mean over normals, of which the first is known: a turn by an angle
-    # adds that share of the normal impulse to the friction, and of the friction to the normal impulse.
-    leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * normal_turns(run)
+    yield _worst(np.where(correction, 0.0, -pressed - over.lean * held_back), scale)
+    leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning
     yield _worst(np.where(correction, 0.0, excess), scale)
 
@@ -62,29 +90,40 @@ def _laws(run: Run) -> Iterator[float]:
     stopped = np.abs(pressed - np.maximum(pressed - mass * ends, 0.0))
     held = impact & soft & (rebound > 0.0) & (stopped < defect)
     defect = np.where(held, stopped, defect)
-    # Rebounds that are released leave with what was held, which their own piece cannot tell; and what is not pressed
-    # and is not an impact may part, or come closer: a gap is a matter of geometry.
+    # Rebounds that are released leave with what was held in their step at most; and what is not pressed and is not an
+    # impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
-    defect = np.where(release | parting | coarse, 0.0, defect)
+    defect = np.where(parting | coarse, 0.0, defect)
+    defect = np.where(release, mass * np.maximum(leaves - _held_back(run, rebound), 0.0), defect)
     yield _worst(defect, scale)
 
-    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it.
-    slip = np.where(frozen[:, None], after, before)
-    slip = slip - (slip * n).sum(axis=1)[:, None] * n
+    # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
+    # the mean of those at both ends, each at its own point and normal.
+    ended = run.velocity_at(row_b, b, over.last_point, True, late=True) - run.velocity_at(
+        row_a, a, over.last_point, True, late=True
+    )
+    first = before - approach[:, None] * n
+    last = ended - (ended * over.last_normal).sum(axis=1)[:, None] * over.last_normal
+    # Where that point is not known, the slip of the start has to do.
+    last = np.where(np.isfinite(over.stray)[:, None], last, first)
+    slip = np.where(frozen[:, None], after - leaves[:, None] * n, 0.5 * (first + last))
+    slip = slip - (slip * over.normal).sum(axis=1)[:, None] * over.normal
     wanted = along - mass[:, None] * slip
     size = np.linalg.norm(wanted, axis=1)
     limit = mu * pressed.clip(min=0.0)
     wanted *= np.where(size > limit, limit / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
-    # Where the direction of a slip turns within a piece, its friction is a mean of directions.
-    first, last = (x - (x * n).sum(axis=1)[:, None] * n for x in (before, after))
-    turned = np.where(frozen, 0.0, limit * _angle(first, last)) + leaning
-    missed = np.linalg.norm(along - wanted, axis=1) - turned
+    # Where the direction of a slip turns within a piece, its friction is a mean of directions; in the plane there are
+    # but two, and the normal's turn is known.
+    swing = _angle(first, last) if run.d == 3 else np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
+    missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * swing) - leaning
     yield _worst(np.where(coarse, 0.0, missed), scale)
 
-    about = cross(pieces.point, pieces.impulse)
+    about = cross(over.point, pieces.impulse)
+    force = np.linalg.norm(pieces.impulse, axis=1)
     arm = np.linalg.norm(pieces.point, axis=1) + run.size
-    off = np.linalg.norm(pieces.moment - about, axis=1)
-    yield _worst(np.where(frozen, off, 0.0), arm * np.linalg.norm(pieces.impulse, axis=1))
+    with np.errstate(invalid="ignore"):  # of no impulse times an unknown point
+        off = np.linalg.norm(pieces.moment - about, axis=1) - np.where(force > 0.0, over.stray * force, 0.0)
+    yield _worst(np.where(coarse & ~frozen, 0.0, off), arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
     yield float(held.sum() + (release & (pressed > 0.0)).sum())
@@ -92,7 +131,17 @@ def _laws(run: Run) -> Iterator[float]:
     yield float(movable.sum())
 
 
-def _reduced_mass(run: Run) -> Array:
+def _held_back(run: Run, rebound: Array) -> Array:
+    """Fastest rebound (c,) that impacts of the same pair in the same step called for [m/s]."""
+    pieces, n = run.pieces, len(run.free)
+    keys = (pieces.step[run.contact_owner] * n + pieces.body_a) * n + pieces.body_b
+    _, which = np.unique(keys, return_inverse=True)
+    most = np.zeros(which.max() + 1)
+    np.maximum.at(most, which, rebound)
+    return np.asarray(most[which])
+
+
+def reduced_mass(run: Run) -> Array:
     """Mass (c,) that a contact feels at least along its normal [kg]: levers only lower it."""
     pieces = run.pieces
     inverse = np.zeros(len(pieces.body_a))

@@ -1,4 +1,4 @@
-"""Where energy comes from: contacts take it, prescribed surfaces and loads give it, and nothing else does."""
+"""Where energy comes from and goes: prescribed surfaces and loads give it, friction takes it, and nothing else does."""
 
 from __future__ import annotations
 
@@ -6,22 +6,51 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from reference_solver.certification.audit.contact import reduced_mass
+from reference_solver.certification.audit.motion import swings
 from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.turning import turned_contacts
 from reference_solver.model import Array
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of the energy."""
     if not len(run.pieces):
-        yield "gained", 0.0
+        yield from (("gained", 0.0), ("lost", 0.0))
         return
-    gained, exempt, scale = _gains(run)
-    without = np.where(exempt, 0.0, gained)
+    gained, exempt, unseen, scale = _gains(run)
+    without = np.where(exempt, 0.0, np.sign(gained) * np.maximum(np.abs(gained) - unseen, 0.0))
     yield "gained", float(max(np.cumsum(without).max(initial=0.0), without.max(initial=0.0)) / scale)
+    # In a force phase friction takes energy where something slips, and nothing else does. What goes at fixed steps or
+    # at impulse level loses more.
+    asked = run.is_forces & (run.pieces.length > 0.0) & ~run.is_fixed & ~run.is_impulse_level
+    yield "lost", float(np.where(asked, -without - _friction(run), 0.0).max(initial=0.0) / scale)
 
 
-def _gains(run: Run) -> tuple[Array, np.ndarray, float]:
+def _friction(run: Run) -> Array:
+    """Energy (p,) that friction takes at most in each piece: its impulses times the larger slip of both ends [J].
+
+    Between them a slip may be faster: by an eighth of what accelerations add, times the share by which they change.
+    """
+    pieces, over = run.pieces, turned_contacts(run)
+    (row_a, row_b), (a, b) = run.side, (pieces.body_a, pieces.body_b)
+    slips = []
+    for late, point, normal in ((False, pieces.point, pieces.normal), (True, over.last_point, over.last_normal)):
+        moving = run.velocity_at(row_b, b, point, late, late) - run.velocity_at(row_a, a, point, late, late)
+        slips.append(np.linalg.norm(moving - (moving * normal).sum(axis=1)[:, None] * normal, axis=1))
+    along = pieces.impulse - (pieces.impulse * over.normal).sum(axis=1)[:, None] * over.normal
+    # A mean normal is known but for its lean, a mean slip but for that of its direction.
+    size = np.linalg.norm(along, axis=1) + over.lean * np.linalg.norm(pieces.impulse, axis=1)
+    added = np.linalg.norm(pieces.impulse, axis=1) / reduced_mass(run) + run.pull * pieces.length[run.contact_owner]
+    taken = np.zeros(len(pieces))
+    np.add.at(taken, run.contact_owner, size * (np.maximum(*slips) + 0.25 * swings(run)[run.contact_owner] * added))
+    return taken
+
+
+def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     """Energy (p,) that each piece gained beyond what loads and surfaces gave, which pieces the law may, and a scale.
+
+    The third is what is not known of the work of surfaces.
 
     Newton's restitution with friction may create energy (E63), and so may the release of a held rebound: energy that
     was taken away before. Both are exempt and judged by their laws.
@@ -36,7 +65,10 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, float]:
     load += (run.torque[body] * turn).sum(axis=1)
     gained = np.zeros(len(pieces))
     np.add.at(gained, owner, np.where(free, after - before - load, 0.0))
-    np.add.at(gained, run.contact_owner, -_surface_work(run))
+    work, unseen_work = _surface_work(run)
+    np.add.at(gained, run.contact_owner, -work)
+    unseen = np.zeros(len(pieces))
+    np.add.at(unseen, run.contact_owner, unseen_work)
     most = np.zeros(len(pieces))
     np.add.at(most, owner, np.where(free, before + after + np.abs(load), 0.0))
     # What loads do to all free bodies in a step: at rest, all that there is of kinetic energy is round-off.
@@ -45,7 +77,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, float]:
     a, b = pieces.body_a, pieces.body_b
     lawful = (run.model.restitution[a, b] > 0.0) & (run.model.friction[a, b] > 0.0)
     mixed[run.contact_owner[lawful]] = True
-    return gained, run.is_release | (run.is_impact & mixed), max(float(most.max()), usual)
+    return gained, run.is_release | (run.is_impact & mixed), unseen, max(float(most.max()), usual)
 
 
 def _kinetic(run: Run, late: int) -> Array:
@@ -56,17 +88,26 @@ def _kinetic(run: Run, late: int) -> Array:
     return np.asarray(0.5 * run.mass[pieces.body] * (v * v).sum(axis=1) + 0.5 * (run.spin[late] * w).sum(axis=1))
 
 
-def _surface_work(run: Run) -> Array:
-    """Work (c,) that surfaces which move as prescribed do on free bodies [J]."""
+def _surface_work(run: Run) -> tuple[Array, Array]:
+    """Work (c,) that surfaces which move as prescribed do on free bodies [J], and what is not known of it.
+
+    Places are those of the middle of a piece: a force that changes, on a surface that turns while it moves, does more
+    or less by a twelfth of its change times both.
+    """
     pieces = run.pieces
-    work = np.zeros(len(pieces.body_a))
+    work, unseen = np.zeros(len(pieces.body_a)), np.zeros(len(pieces.body_a))
+    swing = swings(run)[run.contact_owner]
     for i, sign in ((pieces.body_a, 1.0), (pieces.body_b, -1.0)):
         twist = np.array([twist_of(body) for body in run.model.bodies])[i]
         place = np.array([body.pose[: run.d] for body in run.model.bodies], dtype=float)[i]
-        time = pieces.begin[run.contact_owner] + 0.5 * pieces.length[run.contact_owner]
+        length = pieces.length[run.contact_owner]
+        time = pieces.begin[run.contact_owner] + 0.5 * length
         place = place + time[:, None] * twist[:, : run.d]
         impulse = sign * pieces.impulse
         moment = sign * pieces.moment - cross(place, impulse)
         power = (impulse * twist[:, : run.d]).sum(axis=1) + (moment * twist[:, run.d :]).sum(axis=1)
+        moved = run.is_frozen[run.contact_owner] | run.free[i]
+        speed, spin = np.linalg.norm(twist[:, : run.d], axis=1), np.linalg.norm(twist[:, run.d :], axis=1)
         work += np.where(run.free[i], 0.0, power)
-    return work
+        unseen += np.where(moved, 0.0, length * speed * spin * np.linalg.norm(impulse, axis=1) * swing / 6.0)
+    return work, unseen

@@ -8,25 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
-from reference_solver.certification.audit.space import normal_turns
+from reference_solver.certification.audit.turning import changes_of_force
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
+from reference_solver.records import Record
 
 #: Classical Runge-Kutta steps in which a turn is integrated: one of .3 rad is off by 1e-11.
 TURN_STEPS = 16
-#: What Hermite's polynomial misses of the integral of a way over time h, as a share of h times how far the way may lie
-#: off the mean velocity (B = a h^2 angle/2): h^5/720 of the way's fourth derivative, a ((angle/h)^2 + 2 angle/h^2) for
-#: a turn at a steady rate and for one that begins, at angles of up to half a radian.
-HERMITE = 5.0 / 720.0
+#: Share of h^5 times the fourth derivative of a way that its integral by both ends leaves out: 1/720, six times.
+UNSEEN = 6.0 / 720.0
 #: Largest displacement, as a share of a body, that closes a gap of the impulse-level scheme.
 CORRECTED = 1e-4
 
 
-def measured(run: Run, pose: Array, end: Array) -> Iterator[tuple[str, float]]:
-    """Yield what is measured of the motion; ``pose`` (n, P) at the start, ``end`` (n, P) as samples have it last."""
+def measured(run: Run, pose: Array, record: Record) -> Iterator[tuple[str, float]]:
+    """Yield what is measured of the motion; ``pose`` (n, P) at the start, samples as the record has them."""
+    end = record.pose[-1]
     yield "finite", 0.0 if _all_finite(run) else 1.0
-    yield "joined", _joined(run, pose, end)
+    yield "joined", max(_joined(run, pose, end), _sampled(run, record))
     yield "time", _time(run)
     yield "momentum", _momentum(run)
     yield "spin", _spin(run)
@@ -64,6 +64,22 @@ def _joined(run: Run, pose: Array, end: Array) -> float:
         places = np.abs(pieces.pose_after[here] - pieces.pose_before[then]).max(initial=0.0)
         speeds = np.abs(pieces.twist_after[here] - pieces.twist_before[then]).max(initial=0.0)
         worst = max(worst, float(starts), float(ends), float(twist), float(places), float(speeds))
+    return worst
+
+
+def _sampled(run: Run, record: Record) -> float:
+    """Largest distance of a sample, its velocity or its time from what the pieces say of the end of that step."""
+    pieces = run.pieces
+    steps = np.rint(record.t / run.dt).astype(np.int64)
+    worst = float(np.abs(record.t - steps * run.dt).max(initial=0.0) / run.dt)
+    worst = worst if worst > 1e-12 else 0.0
+    for i in np.flatnonzero(run.free):
+        rows = np.flatnonzero(pieces.body == i)
+        last = np.searchsorted(pieces.step[run.owner[rows]], steps) - 1
+        known = last >= 0
+        at = rows[last[known]]
+        worst = max(worst, float(np.abs(record.pose[known, i] - pieces.pose_after[at]).max(initial=0.0)))
+        worst = max(worst, float(np.abs(record.twist[known, i] - pieces.twist_after[at]).max(initial=0.0)))
     return worst
 
 
@@ -107,21 +123,28 @@ def _spin(run: Run) -> float:
     way = pieces.pose_after[:, : run.d] - pieces.pose_before[:, : run.d]
     first, last = pieces.twist_before[:, : run.d], pieces.twist_after[:, : run.d]
     over = 0.5 * length * way + length**2 * (first - last) / 12.0
-    gained = np.where(run.is_frozen[run.owner][:, None], gained, gained + cross(way, mass * last) - cross(over, force))
+    frozen = run.is_frozen[run.owner]
+    gained = np.where(frozen[:, None], gained, gained + cross(way, mass * last) - cross(over, force))
+    # What that polynomial does not see of the way: h^5/720 of its fourth derivative, an acceleration times w^2.
+    spins = [np.linalg.norm(twist[:, run.d :], axis=1) for twist in (pieces.twist_before, pieces.twist_after)]
+    turning = np.linalg.norm(pieces.twist_after[:, run.d :] - pieces.twist_before[:, run.d :], axis=1)
+    load, time = np.linalg.norm(force, axis=1), length[:, 0]
+    pulled = load / mass[:, 0] * time + np.linalg.norm(last - first, axis=1)
+    unseen = UNSEEN * load * time**2 * pulled * ((time * np.maximum(*spins)) ** 2 + time * turning)
     # A body that spins about nothing has the momentum that its speed gives to a point at its outermost.
     arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
     speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1) + run.still[body]
     parts = (np.linalg.norm(x, axis=1) for x in (before, after, torque))
     scale = sum(parts) + moment_size + arm * (run.mass[body] * speed + size)
-    missed = np.where(run.is_frozen[run.owner], 0.0, HERMITE * run.length * _bend(run) * np.linalg.norm(force, axis=1))
-    return _worst(np.maximum(np.linalg.norm(gained, axis=1) - missed, 0.0), scale, run.free[body])
+    defect = np.linalg.norm(gained, axis=1) - np.where(frozen, 0.0, unseen)
+    return _worst(np.maximum(defect, 0.0), scale, run.free[body])
 
 
 def _path(run: Run) -> Iterator[tuple[str, float]]:
     """Ways of free bodies against their velocities: those nothing touches, and those something touches.
 
     With constant acceleration the way is the mean velocity times the time. In a phase of fifth order the velocity
-    bends: by no more than what it changes, times the angle by which bodies or normals turn in the piece.
+    bends: by no more than what it changes, times the angle by which bodies turn in the piece.
     """
     pieces, body, length = run.pieces, run.pieces.body, run.length
     last = pieces.twist_after[:, : run.d]
@@ -133,9 +156,7 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
     # What rocks to rest goes anywhere between its speeds of the start and of the end, which comes first.
     change = np.linalg.norm(last - pieces.twist_before[:, : run.d], axis=1)
     bend = np.where((pieces.scheme == ROCKING)[run.owner], 0.5 * length * change, bend)
-    touched = np.zeros(len(body), bool)
-    for row in run.side:
-        touched[row[row >= 0]] = True
+    touched = _touched(run)
     noise = 8.0 * np.spacing(np.abs(pieces.pose_before[:, : run.d]).max(axis=1, initial=0.0))
     defect = np.maximum(defect - bend - noise - 4.0 * np.spacing(length * np.linalg.norm(mean, axis=1)), 0.0)
     size = np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
@@ -148,43 +169,72 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
 
 def _bend(run: Run) -> Array:
     """How far a path of a phase of fifth order may lie off the mean velocity times the time (m,) [m]."""
-    pieces, body, length = run.pieces, run.pieces.body, run.length
-    spin = np.linalg.norm(pieces.twist_before[:, run.d :], axis=1) + np.linalg.norm(
-        pieces.twist_after[:, run.d :], axis=1
-    )
+    body = run.pieces.body
+    acting = run.pushed[2] + run.length * np.linalg.norm(run.force[body], axis=1)
+    return np.asarray(0.5 * run.length * acting / run.mass[body] * np.minimum(swings(run)[run.owner], 1.0))
+
+
+def swings(run: Run) -> Array:
+    """Share (p,) by which accelerations of bodies may change in a piece.
+
+    By the angle that levers and normals turn through, with spins and with what spins change to; by contacts that go
+    along a body: a lever then changes by its way over it; and by forces that change, of which the way sees a sixth.
+    """
+    pieces, d = run.pieces, run.d
+    spins = [np.linalg.norm(twist[:, d:], axis=1) for twist in (pieces.twist_before, pieces.twist_after)]
+    gained = np.linalg.norm(pieces.twist_after[:, d:] - pieces.twist_before[:, d:], axis=1)
     angle = np.zeros(len(pieces))
-    np.maximum.at(angle, run.owner, 0.5 * length * spin)
-    # A disc that slides round another turns nothing but the normal.
-    np.maximum.at(angle, run.contact_owner, normal_turns(run))
-    change = np.linalg.norm(pieces.twist_after[:, : run.d] - pieces.twist_before[:, : run.d], axis=1)
-    load = length * np.linalg.norm(run.force[body], axis=1) / run.mass[body]
-    return np.asarray(0.5 * length * (change + load) * np.minimum(angle[run.owner], 1.0))
+    np.maximum.at(angle, run.owner, 0.5 * run.length * sum(spins) + np.sqrt(run.length * gained))
+    slip = np.zeros((len(pieces.body_a), d))
+    size = np.full(len(pieces.body_a), np.inf)
+    for row, body, sign in zip(run.side, (pieces.body_a, pieces.body_b), (-1.0, 1.0), strict=True):
+        slip += sign * run.velocity_at(row, body, pieces.point, after=False)
+        size = np.minimum(size, run.extent[body])
+    slid = pieces.length[run.contact_owner] * np.linalg.norm(slip, axis=1) / size
+    np.maximum.at(angle, run.contact_owner, slid)
+    share = np.zeros(len(pieces))
+    np.maximum.at(share, run.contact_owner, changes_of_force(run))
+    return np.asarray(angle + 0.25 * share)
 
 
 def _turn(run: Run) -> float:
-    """Orientations of free bodies that nothing touches against Euler's equations, [rad]; 1e-15 a unit is round-off."""
-    pieces = run.pieces
-    alone = run.free[pieces.body] & (run.length > 0.0)
-    for row in run.side:
-        alone[row[row >= 0]] = False
-    rows = np.flatnonzero(alone)
+    """Orientations of free bodies against their spins, in space by Euler's equations [rad].
+
+    Torques are constant where rows stand still; where they turn, spins bend as paths do. What the impulse-level scheme
+    turns is not asked.
+    """
+    pieces, owner = run.pieces, run.owner
+    rows = np.flatnonzero(run.free[pieces.body] & (run.length > 0.0) & ~run.is_impulse_level[owner])
     if not len(rows):
         return 0.0
-    length = run.length[rows]
+    length, body = run.length[rows], pieces.body[rows]
+    first, last = pieces.twist_before[rows, run.d :], pieces.twist_after[rows, run.d :]
+    arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
+    acting = arm * run.pushed[2][rows] + length * np.linalg.norm(run.torque[body], axis=1)
+    bend = 0.5 * length * acting / run.moments[body].min(axis=1) * np.minimum(swings(run)[owner[rows]], 1.0)
+    bend = np.where(run.is_frozen[owner[rows]] | ~_touched(run)[rows], 0.0, bend)
     if run.d == 2:
-        last = pieces.twist_after[rows, 2]
-        mean = np.where(run.is_fixed[run.owner[rows]], last, 0.5 * (pieces.twist_before[rows, 2] + last))
+        mean = np.where(run.is_fixed[owner[rows]], last[:, 0], 0.5 * (first + last)[:, 0])
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
-        noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2]))
+        noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2])) + bend
         return float(np.maximum(np.abs(turn - length * mean) - noise, 0.0).max())
     before, after = (spin[rows] for spin in run.spin)
-    moments = run.moments[pieces.body[rows]]
+    moments = run.moments[body]
+    # At fixed steps a body turns with the momentum that it has afterwards.
+    before = np.where(run.is_fixed[owner[rows]][:, None], after, before)
     q = integrated_turn(pieces.pose_before[rows, 3:], before, after, moments, length)
-    dot = np.abs((q * pieces.pose_after[rows, 3:]).sum(axis=1) / np.linalg.norm(pieces.pose_after[rows, 3:], axis=1))
-    off = np.linalg.norm(
-        q * np.sign((q * pieces.pose_after[rows, 3:]).sum(axis=1))[:, None] - pieces.pose_after[rows, 3:], axis=1
-    )
-    return float(np.where(dot > 0.5, 2.0 * off, np.pi).max())
+    dot = (q * pieces.pose_after[rows, 3:]).sum(axis=1)
+    off = 2.0 * np.linalg.norm(q * np.sign(dot)[:, None] - pieces.pose_after[rows, 3:], axis=1)
+    whole = np.linalg.norm(pieces.pose_after[rows, 3:], axis=1)
+    return float(np.where(np.abs(dot) > 0.5 * whole, np.maximum(off - bend, 0.0), np.pi).max())
+
+
+def _touched(run: Run) -> NDArray[np.bool_]:
+    """Whether (m,) a body has a contact in its piece."""
+    found = np.zeros(len(run.pieces.body), bool)
+    for row in run.side:
+        found[row[row >= 0]] = True
+    return found
 
 
 def integrated_turn(q: Array, before: Array, after: Array, moments: Array, length: Array) -> Array:

@@ -20,6 +20,22 @@ Indices = NDArray[np.int64]
 UNITS = 1e-15
 
 
+class _Point:
+    """A shape without extent: its distance from a body is that of a place."""
+
+    radius = 0.0
+
+
+POINT = _Point()
+
+
+def placed(point: Array, d: int) -> Array:
+    """Poses (s, 3 | 7) of places (s, d)."""
+    return np.concatenate(
+        [point, np.zeros((len(point), 1))] if d == 2 else [point, np.tile(np.eye(4)[0], (len(point), 1))], axis=1
+    )
+
+
 @dataclass(frozen=True)
 class Run:
     """A model and the pieces of one run of it, with what follows for each *row*: one body in one piece.
@@ -218,12 +234,16 @@ class Run:
         vector = c * v + s * (w * axis + np.cross(axis, v))
         return np.concatenate([place, c * w - s * (axis @ v), vector], axis=1)
 
-    def velocity_at(self, row: Indices, body: Indices, point: Array, after: bool) -> Array:
-        """Velocities (c, d) of ``point`` on the bodies of ``row``; a body that the piece does not hold is at rest."""
+    def velocity_at(self, row: Indices, body: Indices, point: Array, after: bool, late: bool = False) -> Array:
+        """Velocities (c, d) of ``point`` on the bodies of ``row``; a body that the piece does not hold is at rest.
+
+        Those before or ``after`` the piece, for levers from where bodies were as it began or, ``late``, as it ended.
+        """
         twist = self.pieces.twist_after if after else self.pieces.twist_before
+        pose = self.pieces.pose_after if late else self.pieces.pose_before
         known = (row >= 0)[:, None]
         motion = np.where(known, twist[row], 0.0)
-        arm = point - np.where(known, self.pieces.pose_before[row, : self.d], point)
+        arm = point - np.where(known, pose[row, : self.d], point)
         return motion[:, : self.d] + turned(motion[:, self.d :], arm)
 
 

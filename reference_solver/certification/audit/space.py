@@ -1,4 +1,4 @@
-"""Where bodies are to each other, by the certificate's own geometry: overlaps, missed contacts, wrong normals."""
+"""Where bodies are to each other at all times, by the certificate's own geometry: overlaps and missed contacts."""
 
 from __future__ import annotations
 
@@ -8,17 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference_solver.certification.audit.run import Indices, Run, twist_of
-from reference_solver.certification.geometry import Nearest, gap, nearest, rotation
+from reference_solver.certification.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Halvings of an interval in which two bodies might have met: sixteen parts of it.
 HALVINGS = 4
-
-
-class _Point:
-    """A shape without extent: its distance from a body is that of a place."""
-
-    radius = 0.0
 
 
 class Path(NamedTuple):
@@ -34,129 +28,10 @@ class Path(NamedTuple):
 
 def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all pairs of bodies; ``start`` (n, P) are the poses at the start."""
-    contacts = _touching(run)
-    yield "apart", contacts[0]
-    yield "direction", contacts[1]
-    yield "place", contacts[2]
     yield "resolution", float(np.spacing(np.abs(start[run.free, : run.d]).max(initial=0.0)) / run.size)
     deep, first = _overlaps(run, start)
     yield "overlap", deep
     yield "start", first
-
-
-def _touching(run: Run) -> tuple[float, float, float]:
-    """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
-
-    Of contacts that carry something. Those of the fixed-step law and of the impulse-level scheme may close a gap, and
-    have the levers of another time: they are not asked.
-    """
-    pieces = run.pieces
-    worst = [0.0, 0.0, 0.0]
-    fixed = (run.is_fixed | run.is_impulse_level)[run.contact_owner]
-    carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~fixed & np.isfinite(pieces.normal).all(axis=1)
-    pairs = pieces.body_a * len(run.free) + pieces.body_b
-    for pair in np.unique(pairs[carry]):
-        rows = np.flatnonzero(carry & (pairs == pair))
-        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
-        pose_a, pose_b = (_pose(run, i, run.side[k][rows]) for k, i in enumerate((a, b)))
-        shape_a, shape_b = run.model.bodies[a].shape, run.model.bodies[b].shape
-        found = _distinct(shape_a, pose_a, shape_b, pose_b)
-        size = min(run.extent[a], run.extent[b])
-        noise = 16.0 * np.spacing(max(np.abs(pieces.point[rows]).max(), np.abs(pose_b[:, : run.d]).max()))
-        worst[0] = max(worst[0], float((np.abs(found.gap) - noise).max() / size))
-        # Any direction along which the bodies are as far apart as they are is a normal: of edges there are many.
-        n = pieces.normal[rows]
-        parted = _along(shape_a, pose_a, shape_b, pose_b, n, run.d)
-        lost = (found.gap - parted - noise) / size
-        length = np.abs(np.linalg.norm(n, axis=1) - 1.0)
-        worst[1] = max(worst[1], float(lost.max()), float(length.max()))
-        place = _placed(pieces.point[rows], run.d)
-        sides = [_distinct(shape, pose, _Point(), place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
-        worst[2] = max(worst[2], float(max((np.abs(s) - np.abs(found.gap) - noise).max() for s in sides) / size))
-    return max(worst[0], 0.0), max(worst[1], 0.0), max(worst[2], 0.0)
-
-
-def normal_turns(run: Run) -> Array:
-    """By how much (c,) the normal of each contact turns within its piece [rad]; 0 where rows stood still.
-
-    From its start to its end by the geometry; in between it leaves the chord by up to an eighth of what its rate
-    changes, times the length: rates are spins, and of round bodies that pass each other their speed over their
-    distance.
-    """
-    pieces = run.pieces
-    found = np.zeros(len(pieces.body_a))
-    turning = ~run.is_frozen[run.contact_owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
-    pairs = pieces.body_a * len(run.free) + pieces.body_b
-    for pair in np.unique(pairs[turning]):
-        rows = np.flatnonzero(turning & (pairs == pair))
-        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
-        ends = (_pose(run, i, run.side[k][rows], late=True) for k, i in enumerate((a, b)))
-        end_a, end_b = ends
-        last = nearest(run.model.bodies[a].shape, end_a, run.model.bodies[b].shape, end_b).normal
-        chord = np.linalg.norm(last - pieces.normal[rows], axis=1)
-        changes = [_changes(run, run.side[k][rows]) for k in range(2)]
-        apart = np.linalg.norm(end_a[:, : run.d] - end_b[:, : run.d], axis=1)
-        passing = np.linalg.norm(changes[0][:, : run.d] - changes[1][:, : run.d], axis=1)
-        spins = sum(np.linalg.norm(change[:, run.d :], axis=1) for change in changes)
-        bulge = (
-            0.125 * pieces.length[run.contact_owner[rows]] * (spins + passing / np.where(apart > 0.0, apart, run.size))
-        )
-        found[rows] = chord + bulge
-    return found
-
-
-def _changes(run: Run, rows: Indices) -> Array:
-    """Change of twist (s, 3 | 6) of bodies in their pieces; none where a piece does not hold one."""
-    return np.where((rows >= 0)[:, None], run.pieces.twist_after[rows] - run.pieces.twist_before[rows], 0.0)
-
-
-def _distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Nearest:
-    """As `nearest`, asked once where poses (s, P) repeat those before: what rests costs nothing."""
-    both = np.concatenate([pose_a, pose_b], axis=1)
-    new = np.ones(len(both), bool)
-    new[1:] = (both[1:] != both[:-1]).any(axis=1)
-    found = nearest(shape_a, pose_a[new], shape_b, pose_b[new])
-    which = np.cumsum(new) - 1
-    return Nearest(*(field[which] for field in found))
-
-
-def _pose(run: Run, i: int, rows: Indices, late: bool = False) -> Array:
-    """Poses (s, P) of body i as the pieces of ``rows`` begin, or end; the model's where a piece does not hold it."""
-    own = np.array(run.model.bodies[i].pose, dtype=float)
-    return np.where((rows >= 0)[:, None], (run.pieces.pose_after if late else run.pieces.pose_before)[rows], own)
-
-
-def _placed(point: Array, d: int) -> Array:
-    """Poses of a place."""
-    return np.concatenate(
-        [point, np.zeros((len(point), 1))] if d == 2 else [point, np.tile(np.eye(4)[0], (len(point), 1))], axis=1
-    )
-
-
-def _along(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array, n: Array, d: int) -> Array:
-    """Separation (s,) of two bodies along ``n``; of a half-space, less what another direction than its own loses."""
-    heights = []
-    for shape, pose, sign in ((shape_a, pose_a, 1.0), (shape_b, pose_b, -1.0)):
-        if isinstance(shape, HalfSpace):
-            own = np.einsum("sij,j->si", rotation(pose), np.array(shape.normal))
-            # Its surface along n is its own, where n is its normal; the miss counts in full.
-            heights.append((own * pose[:, :d]).sum(axis=1) + shape.offset + np.linalg.norm(sign * n - own, axis=1))
-        else:
-            centre = (sign * n * pose[:, :d]).sum(axis=1)
-            heights.append(centre + _half_width(shape, pose, sign * n))
-    return np.asarray(-heights[0] - heights[1])
-
-
-def _half_width(shape: Any, pose: Array, n: Array) -> Array:
-    """How far a body reaches along n (s, d) from its centre [m]."""
-    local = np.einsum("sij,si->sj", rotation(pose), n)
-    if hasattr(shape, "half_extents"):
-        return np.asarray(np.abs(local) @ np.array(shape.half_extents))
-    if hasattr(shape, "vertices"):
-        return np.asarray((local @ np.array(shape.vertices).T).max(axis=1))
-    if hasattr(shape, "half_length"):
-        return np.asarray(np.abs(local[:, 0]) * shape.half_length + shape.radius)
-    return np.full(len(n), float(shape.radius))
 
 
 def _overlaps(run: Run, start: Array) -> tuple[float, float]:
@@ -261,7 +136,7 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
 
     def gaps(t: Array, k: Indices, m: Indices) -> Array:
         pose_i, pose_j = _pose_at(one, k, t - one.begin[k]), _pose_at(other, m, t - other.begin[m])
-        return _distinct(shapes[0], pose_i, shapes[1], pose_j).gap
+        return distinct(shapes[0], pose_i, shapes[1], pose_j).gap
 
     rate = _closing(run, i, j, one, other, k[:-1], m[:-1])
     near = _near(run, i, j, one, other, times, k, m, rate)

@@ -1,0 +1,183 @@
+"""Whether bodies touch where contacts say, along their normals, and only there, by the certificate's own geometry.
+
+Along a normal bodies are as far apart as they are at all. Where one of them is round, and their cores are apart, one
+direction alone is that; of corners that meet there are many, and the one is right along which they close last (E50).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
+from reference_solver.certification.geometry import distinct, partings, rotation
+from reference_solver.model import Array, HalfSpace
+
+#: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
+NO_GAP = 1e-13
+#: Angle up to which two normals are one [rad], and share of the half width within which two gaps tie.
+ONE_NORMAL, TIED = 1e-6, 1e-12
+
+
+def measured(run: Run) -> Iterator[tuple[str, float]]:
+    """Yield what is measured of all contacts that carry something, and of all pairs at impacts."""
+    yield from zip(("apart", "direction", "place", "choice"), _touching(run), strict=True)
+    yield "together", _left_out(run)
+
+
+def _touching(run: Run) -> tuple[float, float, float, float]:
+    """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
+
+    And by how much faster bodies close along a normal than along another that is as good, as a share of their speeds.
+    Of contacts that carry something. Those of the fixed-step law and of the impulse-level scheme may close a gap, and
+    have the levers of another time: they are not asked.
+    """
+    pieces = run.pieces
+    worst = np.zeros(4)
+    coarse = (run.is_fixed | run.is_impulse_level)[run.contact_owner]
+    carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse & np.isfinite(pieces.normal).all(axis=1)
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    for pair in np.unique(pairs[carry]):
+        rows = np.flatnonzero(carry & (pairs == pair))
+        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+        pose_a, pose_b = (_pose(run, i, run.side[k][rows]) for k, i in enumerate((a, b)))
+        shape_a, shape_b = run.model.bodies[a].shape, run.model.bodies[b].shape
+        found = distinct(shape_a, pose_a, shape_b, pose_b)
+        size = min(run.extent[a], run.extent[b])
+        noise = 16.0 * np.spacing(max(np.abs(pieces.point[rows]).max(), np.abs(pose_b[:, : run.d]).max()))
+        n = pieces.normal[rows]
+        lost = (found.gap - _along(shape_a, pose_a, shape_b, pose_b, n, run.d) - noise) / size
+        length = np.abs(np.linalg.norm(n, axis=1) - 1.0)
+        off = np.zeros(len(rows))
+        radius = _radius(shape_a) + _radius(shape_b)
+        if radius > 0.0:  # a normal's error is of second order in the gap along it, its tilt of the impulse is not
+            off = np.linalg.norm(n - found.normal, axis=1) - noise / radius
+        place = placed(pieces.point[rows], run.d)
+        sides = [distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
+        strayed = max((np.abs(side) - np.abs(found.gap) - noise).max() for side in sides) / size
+        here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), strayed)
+        worst = np.maximum(worst, [*here, _worse(run, rows, (shape_a, shape_b), (pose_a, pose_b), found.gap)])
+    return float(worst[0]), float(worst[1]), float(worst[2]), float(worst[3])
+
+
+def _worse(run: Run, rows: Indices, shapes: tuple[Any, Any], poses: tuple[Array, Array], gap: Array) -> float:
+    """How much faster (a share of the speeds) planar corners close along a normal than along one that ties with it."""
+    pieces = run.pieces
+    rows_at = run.is_impact[run.contact_owner[rows]]
+    if run.d == 3 or _radius(shapes[0]) + _radius(shapes[1]) > 0.0 or not rows_at.any():
+        return 0.0
+    rows, gap = rows[rows_at], gap[rows_at]
+    a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+    if any(isinstance(shape, HalfSpace) for shape in shapes):
+        return 0.0
+    apart, axes = partings(shapes[0], poses[0][rows_at], shapes[1], poses[1][rows_at])
+    sides = [run.velocity_at(run.side[k][rows], pieces.body_a[rows], pieces.point[rows], False) for k in range(2)]
+    closing = -((sides[1] - sides[0])[:, None] * axes).sum(axis=2)
+    own = -((sides[1] - sides[0]) * pieces.normal[rows]).sum(axis=1)
+    other = np.linalg.norm(axes - pieces.normal[rows][:, None], axis=2) > ONE_NORMAL
+    noise = 16.0 * np.spacing(np.abs(pieces.point[rows]).max()) + TIED * min(run.extent[a], run.extent[b])
+    ties = other & (apart >= (gap - noise)[:, None])
+    least = np.where(ties, closing.clip(min=0.0), np.inf).min(axis=1)
+    speed = sum(np.linalg.norm(side, axis=1) for side in sides)
+    share = np.divide(own - least, speed, out=np.zeros(len(own)), where=np.isfinite(least) & (speed > 0.0))
+    return float(share.max())
+
+
+def _left_out(run: Run) -> float:
+    """Approach after an impact of a pair of its bodies that touches and is no contact of it, over the speeds there.
+
+    All that touches at that instant is solved together (E21): pair after pair would be another law.
+    """
+    pieces, d = run.pieces, run.d
+    worst = 0.0
+    impacts = np.flatnonzero(run.is_impact)
+    if not len(impacts):
+        return worst
+    rows = np.flatnonzero(run.is_impact[run.owner])
+    of = {(int(k), int(i)): int(row) for k, i, row in zip(run.owner[rows], pieces.body[rows], rows, strict=True)}
+    known = set(zip(run.contact_owner.tolist(), pieces.body_a.tolist(), pieces.body_b.tolist(), strict=True))
+    wanted: dict[tuple[int, int], list[int]] = {}
+    for k in impacts.tolist():
+        moved = [i for i in pieces.body[pieces.first_body[k] : pieces.first_body[k + 1]].tolist() if run.free[i]]
+        for i in moved:
+            for j in range(len(run.free)):
+                if (j > i or not run.free[j]) and (run.free[j] <= ((k, j) in of)):
+                    pair = (min(i, j), max(i, j))
+                    if (k, *pair) not in known:
+                        wanted.setdefault(pair, []).append(k)
+    for (i, j), pieces_of in wanted.items():
+        at = np.array(pieces_of)
+        sides = [np.array([of.get((k, body), -1) for k in pieces_of]) for body in (i, j)]
+        poses = [_at(run, body, side, at) for body, side in zip((i, j), sides, strict=True)]
+        apart = np.linalg.norm(poses[0][:, :d] - poses[1][:, :d], axis=1)
+        near = ~(apart > run.reach[i] + run.reach[j])
+        if not near.any():
+            continue
+        found = distinct(run.model.bodies[i].shape, poses[0][near], run.model.bodies[j].shape, poses[1][near])
+        size = min(run.extent[i], run.extent[j])
+        # At the middle of both points: of a face that lies flush the mean of its corners, as good as any.
+        point = 0.5 * (found.point_a + found.point_b)
+        speeds = [
+            _moving(run, body, side[near], point, pose[near])
+            for body, side, pose in zip((i, j), sides, poses, strict=True)
+        ]
+        closing = -((speeds[1] - speeds[0]) * found.normal).sum(axis=1)
+        touch = np.abs(found.gap) <= NO_GAP * size
+        speed = np.linalg.norm(speeds[0], axis=1) + np.linalg.norm(speeds[1], axis=1)
+        noise = run.pull * run.dt * 1e-9 + 1e-15 * size / run.dt
+        share = np.where(touch & (speed > 0.0), closing / (speed + noise), 0.0)
+        worst = max(worst, float(share.max()))
+    return worst
+
+
+def _at(run: Run, i: int, rows: Indices, pieces: Indices) -> Array:
+    """Poses (s, P) of body i in impacts: as the record has it, or as prescribed."""
+    if run.free[i]:
+        return np.asarray(run.pieces.pose_before[rows])
+    return run.prescribed_pose(i, run.pieces.begin[pieces])
+
+
+def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array) -> Array:
+    """Velocities (s, d) of points of body i after impacts."""
+    own = np.tile(twist_of(run.model.bodies[i]), (len(rows), 1))
+    twist = np.where((rows >= 0)[:, None], run.pieces.twist_after[rows], own) if run.free[i] else own
+    return np.asarray(twist[:, : run.d] + turned(twist[:, run.d :], point - pose[:, : run.d]))
+
+
+def _radius(shape: Any) -> float:
+    """What a shape's core is grown by [m]."""
+    return float(getattr(shape, "radius", 0.0))
+
+
+def _pose(run: Run, i: int, rows: Indices) -> Array:
+    """Poses (s, P) of body i as the pieces of ``rows`` begin; the model's where a piece does not hold it."""
+    own = np.array(run.model.bodies[i].pose, dtype=float)
+    return np.where((rows >= 0)[:, None], run.pieces.pose_before[rows], own)
+
+
+def _along(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array, n: Array, d: int) -> Array:
+    """Separation (s,) of two bodies along ``n``; of a half-space, less what another direction than its own loses."""
+    heights = []
+    for shape, pose, sign in ((shape_a, pose_a, 1.0), (shape_b, pose_b, -1.0)):
+        if isinstance(shape, HalfSpace):
+            own = np.einsum("sij,j->si", rotation(pose), np.array(shape.normal))
+            # Its surface along n is its own, where n is its normal; the miss counts in full.
+            heights.append((own * pose[:, :d]).sum(axis=1) + shape.offset + np.linalg.norm(sign * n - own, axis=1))
+        else:
+            centre = (sign * n * pose[:, :d]).sum(axis=1)
+            heights.append(centre + _half_width(shape, pose, sign * n))
+    return np.asarray(-heights[0] - heights[1])
+
+
+def _half_width(shape: Any, pose: Array, n: Array) -> Array:
+    """How far a body reaches along n (s, d) from its centre [m]."""
+    local = np.einsum("sij,si->sj", rotation(pose), n)
+    if hasattr(shape, "half_extents"):
+        return np.asarray(np.abs(local) @ np.array(shape.half_extents))
+    if hasattr(shape, "vertices"):
+        return np.asarray((local @ np.array(shape.vertices).T).max(axis=1))
+    if hasattr(shape, "half_length"):
+        return np.asarray(np.abs(local[:, 0]) * shape.half_length + shape.radius)
+    return np.full(len(n), float(shape.radius))

@@ -1,0 +1,215 @@
+"""Contacts whose rows turn within a piece: their normals and points on the way, by the certificate's own geometry.
+
+The impulse of such a piece is the mean of a force that turns with its normal, and acts at a point that moves. With
+Simpson's rule over start, middle and end, the mean normal is known to the fourth order of the turn. What a force that
+changes its size adds is the product of both changes: a twelfth of the turn times the share by which the force changes,
+were both linear.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_solver.certification.audit.run import POINT, Indices, Run, placed
+from reference_solver.certification.geometry import Nearest, nearest, rotation
+from reference_solver.model import Array
+
+#: Thrice a twelfth: forces and normals bend, too.
+SLACK = 0.25
+#: Largest error of a normal that the geometry tells anew with which it counts as the one that was used.
+SAME = 1e-6
+#: Share of an impulse by which a phase of fifth order, whose stages obey the laws, may miss them.
+SOLVED = 1e-8
+#: Change of a force as a share of it where no neighbour in time tells: it may end, or begin.
+UNKNOWN_CHANGE = 2.0
+
+
+class Turned(NamedTuple):
+    """Of each contact (c,), for its piece: where rows stand still, the normal and the point that the piece has."""
+
+    normal: Array  # (c, d) mean
+    last_normal: Array  # (c, d) at the end
+    point: Array  # (c, d) mean, world axes [m]
+    last_point: Array  # (c, d) at the end [m]
+    lean: Array  # (c,) angle by which the impulse may be off the mean normal for its turning [rad]
+    stray: Array  # (c,) length by which it may be off the mean point [m]; infinite where that is unknown
+    change: Array  # (c,) share by which its force changes within the piece
+
+
+def turned_contacts(run: Run) -> Turned:
+    """Return normals and points over each piece; pairs that touch in many points at once keep those of the start."""
+    pieces = run.pieces
+    c = len(pieces.body_a)
+    normal, last_normal = pieces.normal.copy(), pieces.normal.copy()
+    point, last_point = pieces.point.copy(), pieces.point.copy()
+    lean, stray, change = np.zeros(c), np.zeros(c), np.zeros(c)
+    owner = run.contact_owner
+    turning = ~run.is_frozen[owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    alone = _alone(owner, pairs)
+    if turning.any():
+        change = np.where(turning, changes_of_force(run), 0.0)
+    for pair in np.unique(pairs[turning]):
+        rows = np.flatnonzero(turning & (pairs == pair))
+        a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+        shapes = run.model.bodies[a].shape, run.model.bodies[b].shape
+        seen = [
+            nearest(shapes[0], _pose(run, a, run.side[0][rows], at), shapes[1], _pose(run, b, run.side[1][rows], at))
+            for at in (0.0, 0.5, 1.0)
+        ]
+        most = _largest_turn(run, rows)
+        chord = np.linalg.norm(seen[2].normal - pieces.normal[rows], axis=1)
+        # Where the geometry tells of another feature (faces that lie flush), only the bodies' spins bound the turn.
+        told = np.linalg.norm(seen[0].normal - pieces.normal[rows], axis=1) <= SAME
+        told &= (chord <= 2.0 * most) & (np.linalg.norm(seen[1].normal - pieces.normal[rows], axis=1) <= 2.0 * most)
+        # How it turns, from what it was: faces that lie nearly flush have nearly the same.
+        later = [np.where(told[:, None], x.normal - seen[0].normal, 0.0) for x in seen[1:]]
+        normal[rows] += (4.0 * later[0] + later[1]) / 6.0
+        normal[rows] /= np.linalg.norm(normal[rows], axis=1)[:, None]
+        last_normal[rows] += later[1]
+        # Of points that share a load, each may take it over from the others.
+        change[rows] = np.where(alone[rows], change[rows], UNKNOWN_CHANGE)
+        lean[rows] = np.where(told, SLACK * chord * (chord + change[rows]) + chord.clip(max=SAME), 2.0 * most) + SOLVED
+        place, sure = _places(run, rows, seen)
+        moved = np.linalg.norm(place[2] - place[0], axis=1)
+        sure = sure & told & alone[rows]
+        point[rows] = np.where(sure[:, None], (place[0] + 4.0 * place[1] + place[2]) / 6.0, point[rows])
+        last_point[rows] = np.where(sure[:, None], place[2], last_point[rows])
+        far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size + _unseen(run, rows)
+        stray[rows] = np.where(sure, far, np.inf)
+    return Turned(normal, last_normal, point, last_point, lean, stray, change)
+
+
+def _alone(owner: Indices, pairs: Indices) -> Array:
+    """Whether (c,) a contact is the only one of its pair in its piece."""
+    keys = owner * (int(pairs.max(initial=0)) + 1) + pairs
+    _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray(count[which] == 1)
+
+
+def changes_of_force(run: Run) -> Array:
+    """Share (c,) by which the force between two bodies changes in a piece, as its neighbours in time tell."""
+    pieces, owner = run.pieces, run.contact_owner
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    length = pieces.length[owner]
+    lasting = length > 0.0
+    found = np.full(len(pairs), UNKNOWN_CHANGE)
+    for pair in np.unique(pairs[lasting]):
+        rows = np.flatnonzero(lasting & (pairs == pair))
+        at, first = np.unique(owner[rows], return_inverse=True)
+        total = np.zeros((len(at), run.d))
+        np.add.at(total, first, pieces.impulse[rows])
+        force = np.linalg.norm(total, axis=1) / pieces.length[at]
+        begin, end = pieces.begin[at], pieces.begin[at] + pieces.length[at]
+        follows = np.abs(begin[1:] - end[:-1]) <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(end[:-1]))
+        step = np.abs(np.diff(force)) * 2.0 / (pieces.length[at][1:] + pieces.length[at][:-1])
+        step = np.where(follows, step, 0.0)
+        known = np.concatenate([[False], follows]) & np.concatenate([follows, [False]])
+        rate = np.maximum(np.concatenate([[0.0], step]), np.concatenate([step, [0.0]]))
+        share = rate * pieces.length[at] / np.where(force > 0.0, force, 1.0)
+        found[rows] = np.where(known, np.minimum(2.0 * share, UNKNOWN_CHANGE), UNKNOWN_CHANGE)[first]
+    return found
+
+
+def _largest_turn(run: Run, rows: Indices) -> Array:
+    """How far (s,) a normal can turn in its piece [rad]: by spins, and by bodies that pass each other."""
+    pieces = run.pieces
+    spins, passing = np.zeros(len(rows)), np.zeros((len(rows), run.d))
+    places = []
+    for k, sign in ((0, 1.0), (1, -1.0)):
+        row = run.side[k][rows]
+        known = (row >= 0)[:, None]
+        first, last = (np.where(known, x[row], 0.0) for x in (pieces.twist_before, pieces.twist_after))
+        spins += np.maximum(np.linalg.norm(first[:, run.d :], axis=1), np.linalg.norm(last[:, run.d :], axis=1))
+        passing += sign * 0.5 * (first + last)[:, : run.d]
+        places.append(_pose(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
+    apart = np.linalg.norm(places[0] - places[1], axis=1)
+    apart = np.where(apart > 0.0, apart, run.size)
+    length = pieces.length[run.contact_owner[rows]]
+    return np.asarray(length * (spins + np.linalg.norm(passing, axis=1) / apart) + 1e-12)
+
+
+def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], Array]:
+    """Where (s, d) a contact is at the start, the middle and the end of its piece, and whether (s,) that is sure.
+
+    The geometry tells where bodies touch that are round, or on a plane; else it is a corner of one of the two, which is
+    on both at all three times.
+    """
+    pieces = run.pieces
+    bodies = [int(body[rows[0]]) for body in (pieces.body_a, pieces.body_b)]
+    shapes = [run.model.bodies[i].shape for i in bodies]
+    start = pieces.point[rows]
+    if any(hasattr(shape, "radius") or hasattr(shape, "normal") for shape in shapes):
+        place = [0.5 * (x.point_a + x.point_b) for x in seen]
+        moved = np.linalg.norm(place[2] - place[0], axis=1)
+        sure = np.linalg.norm(place[0] - start, axis=1) <= SAME * run.size
+        # No point goes faster than twice the bodies; where one does, a face has come to lie flush.
+        sure &= moved <= 2.0 * _fastest(run, rows) + SAME * run.size
+        sure &= np.linalg.norm(2.0 * place[1] - place[0] - place[2], axis=1) <= 0.5 * moved + SAME * run.size
+        return place, sure
+    place, sure = [start, start, start], np.zeros(len(rows), bool)
+    for k in range(2):
+        poses = [[_pose(run, i, run.side[j][rows], at) for j, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)]
+        own = np.einsum("sji,sj->si", rotation(poses[0][k]), start - poses[0][k][:, : run.d])
+        later = [np.einsum("sij,sj->si", rotation(x[k]), own) + x[k][:, : run.d] for x in poses]
+        other = [
+            nearest(shapes[1 - k], x[1 - k], POINT, placed(at, run.d)).gap for x, at in zip(poses, later, strict=True)
+        ]
+        fits = np.asarray((np.abs(np.array(other)) <= SAME * run.size).all(axis=0))
+        # Of faces that lie flush a corner of either fits, and both go ways of their own.
+        differ = np.linalg.norm(later[2] - place[2], axis=1) > 1e-12 * run.size
+        place = [np.where(fits[:, None], new, old) for new, old in zip(later, place, strict=True)]
+        sure = np.where(sure & fits, ~differ, sure | fits)
+    return place, sure
+
+
+def _unseen(run: Run, rows: Indices) -> Array:
+    """How far (s,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
+    pieces, length = run.pieces, run.pieces.length[run.contact_owner[rows]]
+    found = np.zeros(len(rows))
+    for k, body in enumerate((pieces.body_a, pieces.body_b)):
+        row = run.side[k][rows]
+        arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body[rows]]
+        first, last = (x[row, run.d :] for x in (pieces.twist_before, pieces.twist_after))
+        spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
+        turn = (length * spin) ** 2 + length * np.linalg.norm(last - first, axis=1)
+        found += np.where(row >= 0, arm * turn * turn / 128.0, 0.0)
+    return found
+
+
+def _fastest(run: Run, rows: Indices) -> Array:
+    """How far (s,) a point of either body goes in its piece, at most [m]."""
+    pieces = run.pieces
+    found = np.zeros(len(rows))
+    for k, body in enumerate((pieces.body_a, pieces.body_b)):
+        row = run.side[k][rows]
+        arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body[rows]]
+        for twist in (pieces.twist_before, pieces.twist_after):
+            speed = np.linalg.norm(twist[row, : run.d], axis=1) + arm * np.linalg.norm(twist[row, run.d :], axis=1)
+            found = np.maximum(found, np.where(row >= 0, speed, 0.0))
+    return np.asarray(pieces.length[run.contact_owner[rows]] * found)
+
+
+def _pose(run: Run, i: int, rows: Indices, at: float) -> Array:
+    """Poses (s, P) of body i in the pieces of ``rows``: at their start, end, or middle by a cubic polynomial."""
+    own = np.array(run.model.bodies[i].pose, dtype=float)
+    pieces, d = run.pieces, run.d
+    known = (rows >= 0)[:, None]
+    if at != 0.5:
+        return np.where(known, (pieces.pose_after if at else pieces.pose_before)[rows], own)
+    first, last = pieces.pose_before[rows], pieces.pose_after[rows]
+    bend = 0.125 * run.length[rows][:, None] * (pieces.twist_before[rows] - pieces.twist_after[rows])
+    if d == 2:
+        return np.where(known, 0.5 * (first + last) + bend, own)
+    # Half way on the shorter arc, and turned by what the spins add.
+    last = last.copy()
+    last[:, 3:] *= np.where((first[:, 3:] * last[:, 3:]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    middle = 0.5 * (first + last)
+    middle[:, :3] += bend[:, :3]
+    w, v = middle[:, 3:4].copy(), middle[:, 4:].copy()
+    half = 0.5 * bend[:, 3:]
+    middle[:, 3:4] -= (half * v).sum(axis=1, keepdims=True)
+    middle[:, 4:] += w * half + np.cross(half, v)
+    return np.where(known, middle, own)
