@@ -10,14 +10,24 @@ from reference_solver.model import Array
 from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
 from reference_solver.planar.impact import flies, gap_noise, row_turn
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
-from reference_solver.planar.lasting import evaluate, free_accelerations, hold
-from reference_solver.planar.press import press
+from reference_solver.planar.lasting import free_accelerations
+from reference_solver.planar.press import press, row_gain
 from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back
-from reference_solver.stepping.clock import HELD, LEFT, REBOUND, ROCKING, ROCKS, SERIES, is_patient, weigh_event
+from reference_solver.stepping.clock import (
+    HELD,
+    HOPPED,
+    LEFT,
+    REBOUND,
+    ROCKING,
+    ROCKS,
+    SERIES,
+    hold_hops,
+    is_patient,
+    weigh_event,
+)
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.impacts import BOUNCES, HOPS, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
-from reference_solver.stepping.lasting import CONTACTS as LASTING
 from reference_solver.stepping.noise import FROZEN, NOISE, SHORT
 from reference_solver.stepping.options import Options
 
@@ -40,14 +50,12 @@ def hop_time(bodies: Bodies, rows: Rows, sub: SubStep) -> float:
         if row_turn(bodies, rows, sub, c, 1.0) * sub.clock[LEFT] <= FROZEN:
             continue
         copy_vectors(sub.start, bodies.twist)
-        hold(bodies, rows, sub.lasting, c, 0)
-        sub.lasting.size[LASTING] = 1
-        evaluate(bodies, sub.lasting)
+        gain = row_gain(bodies, rows, sub.lasting, c)
         free_accelerations(bodies, sub.lasting)
         copy_vectors(sub.after, bodies.twist)
-        pull = -(row_value(sub.lasting, 0, 0, sub.lasting.free) + sub.lasting.gamma[0, 0])
-        if pull > 0.0 and HOPS * u <= pull * sub.clock[LEFT]:
-            longest = max(longest, HOPS * u / pull)
+        load = -row_value(sub.lasting, 0, 0, sub.lasting.free)
+        if load > max(gain, 0.0) and HOPS * u <= load * sub.clock[LEFT]:
+            longest = max(longest, HOPS * u / load)
     return longest
 
 
@@ -102,10 +110,11 @@ def rest(
     if shortest < left:
         weigh_event(sub.clock, REBOUND)
     if longest == 0.0:
-        hop = hop_time(bodies, rows, sub) if sub.clock[SERIES] == 0.0 else 0.0
-        if hop > 0.0:
+        if sub.clock[SERIES] == 0.0:
+            hold_hops(sub.clock, hop_time(bodies, rows, sub))
+        if sub.clock[HOPPED] > 0.0:
             go_back(tally, sub.tally[1])
-            sub.clock[SERIES] = length = hop
+            length = sub.clock[SERIES]
             press(bodies, rows, problem, sub, options, tally, length)
         return length
     go_back(tally, sub.tally[1])

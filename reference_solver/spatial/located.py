@@ -60,6 +60,7 @@ from reference_solver.stepping.clock import (
     EVENTS,
     HASTE,
     HELD,
+    HOPPED,
     JAMMED,
     LEFT,
     OUTCOME,
@@ -70,6 +71,7 @@ from reference_solver.stepping.clock import (
     end_instant,
     end_settling,
     give_up_phase,
+    hold_hops,
     open_step,
     open_sub_step,
     weigh_event,
@@ -320,8 +322,8 @@ def solve_sub_step(
         if not (struck and options.restitution and end_series(bodies, manifolds, sub, options, length)):
             break
     if sub.clock[HELD] == 0.0 and sub.clock[SERIES] == 0.0:
-        sub.clock[SERIES] = hop_time(bodies, manifolds, sub, options)
-        if sub.clock[SERIES] > 0.0:
+        hold_hops(sub.clock, hop_time(bodies, manifolds, sub, options))
+        if sub.clock[HOPPED] > 0.0:
             length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
     if found >= REBOUNDED:
         weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)

@@ -8,12 +8,12 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.features import name_features
+from reference_solver.spatial.features import follow, name_features
 from reference_solver.spatial.impact import clear_point, copy_twists, doubt, row_turn, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
-from reference_solver.spatial.operations import Spatial, evaluate, free_accelerations
+from reference_solver.spatial.operations import Spatial, free_accelerations
 from reference_solver.spatial.phase import is_exact
 from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
@@ -22,7 +22,7 @@ from reference_solver.spatial.vector import Vector
 from reference_solver.stepping.clock import BRIEF, LEFT, SERIES
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.impacts import HOPS, OPEN_ENDED
-from reference_solver.stepping.lasting import BODIES, CONTACTS
+from reference_solver.stepping.lasting import BODIES, CONTACTS, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
@@ -134,6 +134,18 @@ def stuck(manifolds: Manifolds, m: int, p: int) -> bool:
 
 
 @inner_kernel
+def row_gain(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, m: int, p: int) -> float:
+    """Rate of the normal velocity of a point that turning alone brings about, without forces [m/s^2] (gamma, E36).
+
+    0 of one whose features cannot be followed. Uses up the first contact noted.
+    """
+    if not name_features(bodies, manifolds, lasting, POINTS * m + p, 0):
+        return 0.0
+    follow(bodies, lasting, 0)
+    return float(lasting.gamma[0, 0])
+
+
+@inner_kernel
 def hop_time(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options) -> float:
     """How long until points that part by mere noise, and turn, have come back [s]; 0 if there are none.
 
@@ -149,19 +161,17 @@ def hop_time(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: O
             if not hops or manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
                 continue
             turn = row_turn(bodies, manifolds, m, math.hypot(u[0], u[1]), 1.0)
-            if turn * sub_step.clock[LEFT] <= FROZEN or not name_features(
-                bodies, manifolds, lasting, POINTS * m + p, 0
-            ):
+            if turn * sub_step.clock[LEFT] <= FROZEN:
                 continue
             lasting.size[CONTACTS], lasting.size[BODIES] = 1, len(bodies)
             copy_twists(bodies.twist, bodies.last)
             copy_twists(bodies.first, bodies.twist)
-            evaluate(space, lasting)
+            gain = row_gain(bodies, manifolds, lasting, m, p)
             free_accelerations(space, lasting)
             copy_twists(bodies.last, bodies.twist)
-            pull = -(row_value(lasting, 0, 0, lasting.free) + lasting.gamma[0, 0])
-            if pull > 0.0 and HOPS * u[2] <= pull * sub_step.clock[LEFT]:
-                longest = max(longest, HOPS * u[2] / pull)
+            load = -row_value(lasting, 0, 0, lasting.free)
+            if load > max(gain, 0.0) and HOPS * u[2] <= load * sub_step.clock[LEFT]:
+                longest = max(longest, HOPS * u[2] / load)
     return longest
 
 

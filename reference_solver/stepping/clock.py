@@ -25,7 +25,9 @@ ROCKING, ROCKS = 11, 12
 SERIES = 13
 #: 1 where the next sub-step is so short that nothing but a jam happens in it.
 BRIEF = 14
-CLOCK_SIZE = 15
+#: 1 in a sub-step that holds hops of noise until they are over.
+HOPPED = 15
+CLOCK_SIZE = 16
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -36,7 +38,7 @@ INSTANT, JUMP = 1e-8, 1e3
 
 #: Soft events located in a step, and one more per body. Of 16 two discs that bounce on each other and the floor used up
 #: half in a step of 1/60 s, and the series that was held then was 1e-6 m off.
-MOST_SOFT = 64
+MOST_SOFT = 128
 #: Free bodies of a cluster from which on it may jam, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
 #: Free bodies from which on a cluster jams however few its contacts.
@@ -60,7 +62,7 @@ def open_step(clock: Array, bodies: int, dt: float) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = MOST_SOFT + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = clock[HOPPED] = 0.0
 
 
 @kernel
@@ -125,6 +127,14 @@ def give_up_phase(clock: Array, tally: Array) -> None:
 def open_sub_step(clock: Array, dt: float) -> None:
     """No series of rebounds ends; where a jam is looked for rows are held for an instant."""
     clock[SERIES] = INSTANT * dt if clock[BRIEF] > 0.0 else 0.0
+    clock[HOPPED] = 0.0
+
+
+@kernel
+def hold_hops(clock: Array, time: float) -> None:
+    """Hold rows for the time until hops of noise are over; 0: there are none."""
+    if time > 0.0:
+        clock[SERIES], clock[HOPPED] = time, 1.0
 
 
 @kernel

@@ -20,8 +20,9 @@ DRIFT_STEPS = 100.0
 #: An impact is soft that closes no more than this share of the smaller half width in a step. Without loads all others
 #: are hard, and of bodies caught between others they have no end, each slower than the one before.
 CREEP = 1e-6
-#: How many times its rise a hop is held: twice is until it lands, where little but its own loads pulls it back.
-HOPS = 2.5
+#: How many times the time in which loads stop a hop it is held. Rows that stand still leave the speed by which they
+#: should have turned, a share of that of the hop; the longer they do the larger.
+HOPS = 1.1
 #: Passes that mark ending series of rebounds; each marks at least one row more.
 SERIES_PASSES = 4
 
