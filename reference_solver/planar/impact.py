@@ -47,6 +47,7 @@ from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEM
 from reference_solver.stepping.clock import HELD, LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -291,7 +292,7 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
                 continue
             rows.integer[c, ENDING] = SERIES_ENDS
-            if rate * lasts > FROZEN:
+            if FROZEN < rate * lasts <= BRIEFLY:
                 sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             new = True
         elif returns * BOUNCES < left:

@@ -19,6 +19,7 @@ from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
 from reference_solver.stepping.clock import LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -224,7 +225,7 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 if aside > SERIES_DRIFT * extent and is_patient(sub_step.clock):
                     continue
                 manifolds.ending[m, p] = SERIES_ENDS
-                if rate * lasts > FROZEN:
+                if FROZEN < rate * lasts <= BRIEFLY:
                     sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 new = True
             elif 2.0 * leaves * BOUNCES < pull * left:
