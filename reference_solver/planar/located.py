@@ -52,6 +52,7 @@ from reference_solver.stepping.clock import (
     HELD,
     JAMMED,
     LEFT,
+    MOST_SOFT,
     OUTCOME,
     REBOUND,
     ROCKING,
@@ -86,7 +87,7 @@ def located_step(
     tally: Array,
 ) -> bool:
     """One step of an island; False if an array is too small, with the step unfinished."""
-    open_step(sub.clock, len(bodies.kind), options.dt)
+    open_step(sub.clock, len(bodies.kind), options.dt, MOST_SOFT)
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):

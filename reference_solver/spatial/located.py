@@ -63,6 +63,7 @@ from reference_solver.stepping.clock import (
     HOPPED,
     JAMMED,
     LEFT,
+    MOST_SOFT_IN_SPACE,
     OUTCOME,
     REBOUND,
     SERIES,
@@ -106,7 +107,7 @@ def located_step(
     tally: Array,
 ) -> bool:
     """One step of an island; False if an array is too small, with the step unfinished."""
-    open_step(sub.clock, len(bodies), options.dt)
+    open_step(sub.clock, len(bodies), options.dt, MOST_SOFT_IN_SPACE)
     while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
         if sub.clock[UNSETTLED] > 0.0:
             if not settle(bodies, detection, room, memory, problem, sub, ledger, options, tally):

@@ -7,7 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.spatial.box_box import EXACT_ADVANTAGE
 from reference_solver.spatial.broadphase import pair_bodies
-from reference_solver.spatial.flight import bound_flight, copy_body, curvature, place_at
+from reference_solver.spatial.flight import axis_drift, bound_flight, copy_body, curvature, place_at
 from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_world_points
@@ -49,6 +49,10 @@ def begin_paths(bodies: Bodies, paths: Paths, end: float) -> None:
             for d in range(3):
                 paths.coefficient[i, 3 * start + d, 1] = bodies.twist[i, 3 * start + d]
                 paths.coefficient[i, 3 * start + d, 2] = 0.5 * bend[d]
+            if start == 1:
+                drift = axis_drift(row(bodies.twist, i, 3), bend)
+                for d in range(3):
+                    paths.coefficient[i, 3 + d, 3] = drift[d]
 
 
 @inner_kernel

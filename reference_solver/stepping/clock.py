@@ -39,6 +39,8 @@ INSTANT, JUMP = 1e-8, 1e3
 #: Soft events located in a step, and one more per body. Of 16 two discs that bounce on each other and the floor used up
 #: half in a step of 1/60 s, and the series that was held then was 1e-6 m off.
 MOST_SOFT = 128
+#: The same in space, where an event of bodies with faces costs a hundred times as much.
+MOST_SOFT_IN_SPACE = 32
 #: Free bodies of a cluster from which on it may jam, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
 #: Free bodies from which on a cluster jams however few its contacts.
@@ -53,14 +55,14 @@ CRAWL = 0.1
 
 
 @kernel
-def open_step(clock: Array, bodies: int, dt: float) -> None:
+def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     """Start the clock of a step.
 
     Soft events, which are ends of slides and impacts no faster than what loads do in a step, try its patience: a pile
     of bodies that jam has no end of them, each smaller than the one before. Nothing is known of the step before.
     """
     clock[LEFT] = dt
-    clock[PATIENCE] = MOST_SOFT + bodies
+    clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
     clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = clock[HOPPED] = 0.0
 

@@ -101,7 +101,7 @@ def test_a_hard_impact_is_located_in_a_held_step_as_well():
 def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_before():
     clock, tally, bodies = np.zeros(CLOCK_SIZE), new_tally(), 4
     for _ in range(2):
-        open_step(clock, bodies, DT)
+        open_step(clock, bodies, DT, MOST_SOFT)
         assert (clock[LEFT], clock[PATIENCE], clock[HELD]) == (DT, MOST_SOFT + bodies, 0.0)
         for _ in range(MOST_SOFT + bodies):
             count_event(clock, tally, 1.0)
@@ -115,14 +115,14 @@ def test_a_cluster_jams_where_contacts_have_more_rows_than_bodies_have_freedoms_
     for rows, bodies, jammed in [(13, 4, True), (12, 4, False), (60, 3, False), (16, 8, True), (14, 7, False)]:
         assert jams(rows, 3 * bodies, bodies) == jammed
     clock = np.zeros(CLOCK_SIZE)
-    open_step(clock, 8, DT)
+    open_step(clock, 8, DT, MOST_SOFT)
     hurry(clock)
     assert (clock[JAMMED], clock[PATIENCE]) == (1.0, JAM_PATIENCE)
 
 
 def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
     clock, tally = np.zeros(CLOCK_SIZE), new_tally()
-    open_step(clock, 1, DT)
+    open_step(clock, 1, DT, MOST_SOFT)
     clock[EVENTS] = EVENT_BUDGET - 2
     for _ in range(2):
         count_event(clock, tally, 1.0)
