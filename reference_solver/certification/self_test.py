@@ -301,19 +301,24 @@ def settings(**fields: Callable[[float], Any]) -> Callable[[Scene, float], tuple
 
 
 def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
-    """Change the pieces; the last sample is made to fit them."""
+    """Change the pieces; the samples are made to fit them."""
 
     def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
         model, record, simulation = run(scene)
         assert record.pieces is not None
         copy = replace(record.pieces, **{n: v.copy() for n, v in vars(record.pieces).items()})
         pieces = edit(copy, size)
-        pose = record.pose.copy()
+        pose, twist = record.pose.copy(), record.twist.copy()
+        step = np.repeat(pieces.step, np.diff(pieces.first_body))
         for i in range(len(model.bodies)):
             rows = np.flatnonzero(pieces.body == i)
-            if len(rows):
-                pose[-1, i] = pieces.pose_after[rows[-1]]
-        return model, replace(record, pieces=pieces, pose=pose), simulation
+            last = np.searchsorted(step[rows], np.arange(len(pose))) - 1
+            known = last >= 0
+            pose[known, i], twist[known, i] = (
+                pieces.pose_after[rows[last[known]]],
+                pieces.twist_after[rows[last[known]]],
+            )
+        return model, replace(record, pieces=pieces, pose=pose, twist=twist), simulation
 
     return plant
 
@@ -500,6 +505,26 @@ def _leaning(pieces: Pieces, size: float) -> Pieces:
     return pieces
 
 
+def _spun(pieces: Pieces, size: float) -> Pieces:
+    """Let friction turn body 1 by more than its lever gives, by a share; its spin and angle are made to fit."""
+    contact = _contact(pieces, "last") - 5
+    piece = int(np.searchsorted(pieces.first_contact, contact, "right")) - 1
+    rows = np.flatnonzero(pieces.body == 1)
+    owner = np.repeat(np.arange(len(pieces)), np.diff(pieces.first_body))[rows]
+    more = size * 0.25 * float(np.linalg.norm(pieces.impulse[contact]))
+    pieces.moment[contact, 0] += more
+    gained, angle = more / 0.03125, 0.0
+    for row, k in zip(rows, owner, strict=True):
+        if k < piece:
+            continue
+        pieces.pose_before[row, 2] += angle
+        pieces.twist_before[row, 2] += gained * (k > piece)
+        pieces.twist_after[row, 2] += gained
+        angle += pieces.length[k] * gained * (0.5 if k == piece else 1.0)
+        pieces.pose_after[row, 2] += angle
+    return pieces
+
+
 def _pair_after_pair(pieces: Pieces, size: float) -> Pieces:
     """Leave the second pair out of an impact on two bodies that touch: what is hit moves on into the other."""
     contact = _contact(pieces, "impact")
@@ -646,6 +671,7 @@ CORRUPTIONS = (
     Corruption(
         "bookkeeping", "moment of an impulse", "box that slides", handed(field("moment", lambda m, s: m * (1.0 + s)))
     ),
+    Corruption("bookkeeping", "moment and spin over a hill", "disc that slides off a disc", handed(_spun)),
     Corruption("bookkeeping", "a share of an impulse is lost", "stack", handed(_without_contact)),
     Corruption("bookkeeping", "a share goes to other bodies", "stack", handed(_swapped)),
     Corruption("bookkeeping", "a share goes to another point", "stack", handed(_two_points)),

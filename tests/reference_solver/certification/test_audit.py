@@ -168,6 +168,17 @@ def test_corners_close_along_the_edge_along_which_they_close_last():
     assert "choice" not in seen[0] and "choice" in seen[1]
 
 
+@pytest.mark.parametrize("turn", [1e-8, 1e-6, 1e-4])
+def test_discs_have_one_normal(turn):
+    """Along another they are nearly as far apart, by the square of the turn: the normal itself is looked at."""
+    model = planar(disc(0.0, 0.0, 1.0, 0.0, 0.0), disc(1.05, 0.3), friction=0.0)
+    record = Simulation(model, Settings.reference(DT)).record(20, pieces=True)
+    n = record.pieces.normal
+    other = replace(record.pieces, normal=n + turn * np.stack([-n[:, 1], n[:, 0]], axis=1))
+    seen = [{f.name for f in audit(model, r, DT) if not f.holds} for r in (record, replace(record, pieces=other))]
+    assert len(n) and seen[0] == set() and "direction" in seen[1]
+
+
 class TestTruth:
     def test_the_error_bounds_what_a_scheme_of_first_order_is_off(self):
         """Free fall at fixed steps is off by g t dt / 2 (E17); half the step tells exactly that."""
