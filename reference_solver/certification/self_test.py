@@ -7,6 +7,7 @@ shares: of the value that is corrupted, of a radian, of a body's half width, of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,6 +50,13 @@ def _spatial(bodies: list[Body], restitution: float = 0.0, friction: float = 0.5
     return Scene(Model(3, [floor, *bodies], (0.0, 0.0, -G), restitution, friction), steps, REFERENCE)
 
 
+def _hill(friction: float, speed: float = 1.0) -> Scene:
+    """A disc on a fixed one, .3 rad beyond its top, that goes downhill and does not spin."""
+    c, s = math.cos(0.3), math.sin(0.3)
+    ball = Body(Disc(0.25), 1.0, 0.03125, (1.25 * s, 1.25 * c, 0.0), (speed * c, -speed * s, 0.0))
+    return Scene(Model(2, [Body(Disc(1.0), motion="fixed"), ball], (0.0, -G), 0.0, friction), 40, REFERENCE)
+
+
 def _disc(x: float, y: float, *twist: float, **fields: Any) -> Body:
     own: dict[str, Any] = {"mass": 1.0, "inertia": 0.125, "pose": (x, y, 0.0), "twist": twist or None}
     return Body(Disc(0.5), **(own | fields))
@@ -78,6 +86,9 @@ SCENES = {
     "sphere that bounces": _spatial(
         [Body(Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0.7, *UPRIGHT), (1.0, 0.5, -1.0, 1.0, 0.0, 0.0))], 0.8, 0.1
     ),
+    "disc that slides off a disc": _hill(0.2),
+    "disc that slides off a disc without friction": _hill(0.0),
+    "disc that rolls off a disc": _hill(1.0, 0.2),
     "cube in flight": _spatial(
         [Body(Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0, 0, 5.0, *UPRIGHT), (1.0, 0, 2.0, 1.0, 2.0, 3.0))], steps=40
     ),
@@ -290,19 +301,24 @@ def settings(**fields: Callable[[float], Any]) -> Callable[[Scene, float], tuple
 
 
 def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
-    """Change the pieces; the last sample is made to fit them."""
+    """Change the pieces; the samples are made to fit them."""
 
     def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
         model, record, simulation = run(scene)
         assert record.pieces is not None
         copy = replace(record.pieces, **{n: v.copy() for n, v in vars(record.pieces).items()})
         pieces = edit(copy, size)
-        pose = record.pose.copy()
+        pose, twist = record.pose.copy(), record.twist.copy()
+        step = np.repeat(pieces.step, np.diff(pieces.first_body))
         for i in range(len(model.bodies)):
             rows = np.flatnonzero(pieces.body == i)
-            if len(rows):
-                pose[-1, i] = pieces.pose_after[rows[-1]]
-        return model, replace(record, pieces=pieces, pose=pose), simulation
+            last = np.searchsorted(step[rows], np.arange(len(pose))) - 1
+            known = last >= 0
+            pose[known, i], twist[known, i] = (
+                pieces.pose_after[rows[last[known]]],
+                pieces.twist_after[rows[last[known]]],
+            )
+        return model, replace(record, pieces=pieces, pose=pose, twist=twist), simulation
 
     return plant
 
@@ -467,6 +483,63 @@ def _sampled(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
     return model, replace(record, pose=pose), simulation
 
 
+def _sampled_between(name: str) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
+    """Hand out a sample in the middle of the run that is not what the pieces have there."""
+
+    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+        model, record, simulation = run(scene)
+        values = getattr(record, name).copy()
+        values[len(values) // 2, 1, 0] += 0.5 * size
+        changed: dict[str, Any] = {name: values}
+        return model, replace(record, **changed), simulation
+
+    return plant
+
+
+def _leaning(pieces: Pieces, size: float) -> Pieces:
+    """Turn the normal of the first impact by the size [rad]."""
+    contact = _contact(pieces, "impact")
+    n = pieces.normal[contact].copy()
+    turned = np.cos(size) * n + np.sin(size) * np.array([-n[1], n[0]])
+    pieces.normal[contact] = turned
+    return pieces
+
+
+def _spun(pieces: Pieces, size: float) -> Pieces:
+    """Let friction turn body 1 by more than its lever gives, by a share; its spin and angle are made to fit."""
+    contact = _contact(pieces, "last") - 5
+    piece = int(np.searchsorted(pieces.first_contact, contact, "right")) - 1
+    rows = np.flatnonzero(pieces.body == 1)
+    owner = np.repeat(np.arange(len(pieces)), np.diff(pieces.first_body))[rows]
+    more = size * 0.25 * float(np.linalg.norm(pieces.impulse[contact]))
+    pieces.moment[contact, 0] += more
+    gained, angle = more / 0.03125, 0.0
+    for row, k in zip(rows, owner, strict=True):
+        if k < piece:
+            continue
+        pieces.pose_before[row, 2] += angle
+        pieces.twist_before[row, 2] += gained * (k > piece)
+        pieces.twist_after[row, 2] += gained
+        angle += pieces.length[k] * gained * (0.5 if k == piece else 1.0)
+        pieces.pose_after[row, 2] += angle
+    return pieces
+
+
+def _pair_after_pair(pieces: Pieces, size: float) -> Pieces:
+    """Leave the second pair out of an impact on two bodies that touch: what is hit moves on into the other."""
+    contact = _contact(pieces, "impact")
+    piece = int(np.searchsorted(pieces.first_contact, contact, "right")) - 1
+    away = [c for c in range(*pieces.first_contact[piece : piece + 2]) if pieces.body_a[c] > pieces.body_a[contact]]
+    contacts = ("body_a", "body_b", "feature", "point", "normal", "impulse", "moment")
+    fields: dict[str, Any] = {name: np.delete(getattr(pieces, name), away, axis=0) for name in contacts}
+    first = pieces.first_contact.copy()
+    first[piece + 1 :] -= len(away)
+    for row in range(*pieces.first_body[piece : piece + 2]):
+        if pieces.body[row] == pieces.body_b[contact]:
+            pieces.twist_after[row, 0] += 1.0
+    return replace(pieces, **fields, first_contact=first)
+
+
 def _left_out(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
     """Tamper with the state between two steps: a velocity changes that no piece tells of."""
     simulation = Simulation(scene.model, scene.settings)
@@ -486,7 +559,10 @@ def _joined(first: Record, then: Record) -> Record:
         for n in vars(one)
         if n[:6] == "first_"
     }
-    return replace(then, pieces=Pieces(**fields, **starts), pose=np.concatenate([first.pose, then.pose[1:]]))
+    samples: dict[str, Any] = {
+        name: np.concatenate([getattr(first, name), getattr(then, name)[1:]]) for name in ("t", "pose", "twist")
+    }
+    return replace(then, pieces=Pieces(**fields, **starts), **samples)
 
 
 def _restitution(model: Model, size: float) -> Model:
@@ -524,6 +600,15 @@ CORRUPTIONS = (
     Corruption("law", "friction across the slip [rad]", "sphere that slides", handed(answered("last", 0.1, _across))),
     Corruption("law", "normal impulse of a slide", "sphere that slides", handed(answered("last", 0.1, _normal))),
     Corruption("law", "friction impulse of a slide", "sphere that slides", handed(answered("last", 0.1, _tangent))),
+    Corruption("law", "friction of a slide over a hill", "disc that slides off a disc", given(_friction)),
+    Corruption(
+        "law",
+        "friction where there is none, over a hill",
+        "disc that slides off a disc without friction",
+        given(_sticky),
+    ),
+    Corruption("law", "pairs are hit one after the other (any size)", "discs in a row", handed(_pair_after_pair)),
+    Corruption("input", "inertia of what rolls over a hill", "disc that rolls off a disc", given(scaled(1, "inertia"))),
     Corruption("input", "gravity", "disc in flight", given(_gravity(turn=False))),
     Corruption("input", "direction of gravity [rad]", "box that slides", given(_gravity(turn=True))),
     Corruption("input", "mass", "discs that collide", given(scaled(2, "mass"))),
@@ -544,6 +629,7 @@ CORRUPTIONS = (
     Corruption(
         "detection", "normal [rad]", "sphere that slides", handed(field("normal", lambda n, s: n + s * n[[2, 0, 1]]))
     ),
+    Corruption("detection", "normal of discs [rad]", "discs that collide", handed(_leaning)),
     Corruption("detection", "point", "disc that bounces", handed(field("point", lambda x, s: x + 0.5 * s, "impact"))),
     Corruption("detection", "a body is not looked at, depth", "disc in flight", obstacle(in_the_way), TOUCHING),
     Corruption("detection", "a body is grazed within a step, depth", "disc in flight", obstacle(grazed), TOUCHING),
@@ -572,6 +658,7 @@ CORRUPTIONS = (
     Corruption("motion", "velocity in flight [m/s]", "disc in flight", handed(jumped("twist", 0, 1.0))),
     Corruption("motion", "spin in flight [rad/s]", "disc in flight", handed(jumped("twist", 2, 1.0))),
     Corruption("motion", "place in a slide", "box that slides", handed(jumped("pose", 0))),
+    Corruption("motion", "angle of what touches [rad]", "disc that spins up", handed(jumped("pose", 2, 1.0))),
     Corruption("motion", "place in space", "cube in flight", handed(jumped("pose", 1))),
     Corruption("motion", "orientation in space [rad]", "cube in flight", handed(_turned)),
     Corruption("motion", "length of a quaternion", "cube in flight", handed(jumped("pose", 3, 1.0))),
@@ -584,11 +671,14 @@ CORRUPTIONS = (
     Corruption(
         "bookkeeping", "moment of an impulse", "box that slides", handed(field("moment", lambda m, s: m * (1.0 + s)))
     ),
+    Corruption("bookkeeping", "moment and spin over a hill", "disc that slides off a disc", handed(_spun)),
     Corruption("bookkeeping", "a share of an impulse is lost", "stack", handed(_without_contact)),
     Corruption("bookkeeping", "a share goes to other bodies", "stack", handed(_swapped)),
     Corruption("bookkeeping", "a share goes to another point", "stack", handed(_two_points)),
     Corruption("bookkeeping", "time of a piece, of a step", "disc in flight", handed(_late)),
     Corruption("bookkeeping", "length of a piece", "disc in flight", handed(_longer)),
     Corruption("bookkeeping", "last sample", "disc in flight", _sampled),
+    Corruption("bookkeeping", "a sample in between", "disc in flight", _sampled_between("pose")),
+    Corruption("bookkeeping", "velocity of a sample", "disc in flight", _sampled_between("twist")),
     Corruption("bookkeeping", "velocity changed between pieces", "box that slides", _left_out),
 )

@@ -104,7 +104,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
-    error = _error(model, settings, record, steps, stride)
+    error = _error(model, run, record, steps, stride)
     growth, horizon = _horizon(model, settings, record, steps, stride)
     if not np.isfinite(error[record.t < horizon]).all():
         reasons.append("the run at half the step is no numbers")
@@ -116,21 +116,26 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     return Certificate(holds, tuple(reasons), tuple(findings), record.t, error, growth, horizon, light, record.pose)
 
 
-def _error(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> Array:
-    """Bound (s,) of what the record is off for its finite step [m]; the largest so far."""
+def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
+    """Bound (s,) of what the record of ``run`` is off for its finite step [m]; the largest so far."""
+    settings = run.settings
     half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
     error = 2.0 * distance(model, record.pose, half.pose)
     samples = len(record.t) - 1
     each = min(max(BLOCK // stride, 1), samples)  # samples from one comparison to the next
-    block = each * stride
-    blocks = samples // each
-    # What a block ends with may have come at any time in it; what is left over has no end to be compared at.
-    until = np.minimum((np.arange(samples + 1) + each - 1) // each, blocks)
-    for ratio in (FINER, FINEST)[: 1 + leaves_out_rebounds(model, record, settings.dt)]:
+    block, blocks = each * stride, -(-samples // each)
+    # What a block ends with may have come at any time in it. The run goes on to the end of its last one.
+    until = (np.arange(samples + 1) + each - 1) // each
+    beyond = run.record(blocks * block - samples * stride, stride).pose[1:]
+    coarse = np.concatenate([record.pose, beyond])[::each]
+    ends = leaves_out_rebounds(model, record, settings.dt)
+    for ratio in (FINER, FINEST)[: 1 + ends]:
         more = next(k for k in count(round(ratio * block)) if gcd(k, block) == 1)
         share = block / more
         other = Simulation(model, replace(settings, dt=share * settings.dt)).record(blocks * more, more)
-        off = distance(model, record.pose[: blocks * each + 1 : each], other.pose) / (1.0 - share)
+        # What rebounds leave out need not fall with the step: then the finer run may be off by half as much.
+        off = distance(model, coarse, other.pose) * max(2.0 * ends, 1.0 / (1.0 - share))
+        off[-1] = off[-1] if np.isfinite(off[-1]) or not len(beyond) else 0.0  # ended after the last sample
         error = np.maximum(error, off[until])
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
     return np.maximum.accumulate(error + noise)

@@ -104,9 +104,10 @@ def _laws(run: Run) -> Iterator[float]:
     )
     first = before - approach[:, None] * n
     last = ended - (ended * over.last_normal).sum(axis=1)[:, None] * over.last_normal
-    # Where that point is not known, the slip of the start has to do.
-    last = np.where(np.isfinite(over.stray)[:, None], last, first)
-    slip = np.where(frozen[:, None], after - leaves[:, None] * n, 0.5 * (first + last))
+    # Where that point is not known, the slip of the start has to do, and how far it turns on its lever.
+    sure, stopped_slip = np.isfinite(over.stray)[:, None], after - leaves[:, None] * n
+    last = np.where(sure, last, stopped_slip)
+    slip = np.where(frozen[:, None], stopped_slip, np.where(sure, 0.5 * (first + last), first))
     slip = slip - (slip * over.normal).sum(axis=1)[:, None] * over.normal
     wanted = along - mass[:, None] * slip
     size = np.linalg.norm(wanted, axis=1)

@@ -212,7 +212,13 @@ def _turn(run: Run) -> float:
     arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
     acting = arm * run.pushed[2][rows] + length * np.linalg.norm(run.torque[body], axis=1)
     bend = 0.5 * length * acting / run.moments[body].min(axis=1) * np.minimum(swings(run)[owner[rows]], 1.0)
-    bend = np.where(run.is_frozen[owner[rows]] | ~_touched(run)[rows], 0.0, bend)
+    if run.d == 3:
+        # Constant torques of a slide turn a ball about an axis that turns: as one rotation that is of third order.
+        turning = length**2 * np.linalg.norm(np.cross(first, last), axis=1) / 8.0
+        bend = np.where(run.is_frozen[owner[rows]], turning, bend + turning)
+    else:
+        bend = np.where(run.is_frozen[owner[rows]], 0.0, bend)
+    bend = np.where(_touched(run)[rows], bend, 0.0)
     if run.d == 2:
         mean = np.where(run.is_fixed[owner[rows]], last[:, 0], 0.5 * (first + last)[:, 0])
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
