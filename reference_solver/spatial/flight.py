@@ -1,7 +1,7 @@
 """Motion within one sub-step: where bodies are at any time of it, and how far they get (E24, E30).
 
-x(t) = x + v t + a t^2 / 2 is exact. A body whose moments are equal turns by w t + b t^2 / 2, and by how the axis drifts. One with unequal moments
-turns by the splitting E18, composed to order 8 in pieces short enough that its error is round-off.
+x(t) = x + v t + a t^2 / 2 is exact. A body with equal moments turns by w t + b t^2 / 2 and by how its axis drifts. One
+with unequal moments turns by the splitting E18, composed to order 8 in pieces short enough that its error is round-off.
 """
 
 from __future__ import annotations
