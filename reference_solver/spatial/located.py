@@ -15,7 +15,7 @@ from reference_solver.journal import keep_state
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.entries import enter_release, enter_settled, enter_sub_step
-from reference_solver.spatial.flight import begin_flight, curvature, move_along, path_bound, undo
+from reference_solver.spatial.flight import begin_flight, curvature, move_along, undo
 from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.jam import weigh_clusters
@@ -130,10 +130,10 @@ def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
         if bodies.motion[i] != FREE:
             continue
         for k in range(3):
+            way = end * (abs(bodies.twist[i, k]) + 0.5 * end * abs(curvature(bodies, i, 0)[k]))
             if bodies.curved[i]:
-                way = end * path_bound(bodies, i, 0, 1, end)
-            else:
-                way = end * (abs(bodies.twist[i, k]) + 0.5 * end * abs(curvature(bodies, i, 0)[k]))
+                c = bodies.path[i, k]
+                way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
             if not (sub.limit[i, k] <= bodies.pose[i, k] - way and bodies.pose[i, k] + way <= sub.limit[i, 3 + k]):
                 return True
     return False

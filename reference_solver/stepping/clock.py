@@ -23,7 +23,7 @@ WEIGHT = 10
 ROCKING, ROCKS = 11, 12
 #: How long contacts are held whose series of rebounds ends in the sub-step, where rows turn [s]; 0: no such one.
 SERIES = 13
-#: 1 where the next sub-step is so short that nothing but a jam happens in it.
+#: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it.
 BRIEF = 14
 #: 1 in a sub-step that holds hops of noise until they are over.
 HOPPED = 15
@@ -32,9 +32,10 @@ CLOCK_SIZE = 16
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
 
-#: Length of such a sub-step, as a share of a step: loads do more in it than residuals leave, and bodies go nowhere. And
-#: how many times what loads do in it velocities change in a jam.
-INSTANT, JUMP = 1e-8, 1e3
+#: Length of such a sub-step, as a share of a step, in which bodies go nowhere; by what longer the next one is where
+#: loads did no more in it than residuals leave, and up to which share; how many times what loads do in it velocities
+#: change in a jam.
+INSTANT, LONGER, NO_INSTANT, JUMP = 1e-8, 1e2, 1e-3, 1e3
 
 #: Soft events located in a step, and one more per body. Of 16 two discs that bounce on each other and the floor used up
 #: half in a step of 1/60 s, and the series that was held then was 1e-6 m off.
@@ -119,7 +120,7 @@ def give_up_phase(clock: Array, tally: Array) -> None:
     solve E19 for a sub-step of no length. After it a phase may be found.
     """
     if clock[BRIEF] == 0.0 and clock[JAMMED] == 0.0:
-        clock[BRIEF] = 1.0
+        clock[BRIEF] = INSTANT
     else:
         clock[BRIEF] = 0.0
         hold_rest(clock, tally)
@@ -128,7 +129,7 @@ def give_up_phase(clock: Array, tally: Array) -> None:
 @kernel
 def open_sub_step(clock: Array, dt: float) -> None:
     """No series of rebounds ends; where a jam is looked for rows are held for an instant."""
-    clock[SERIES] = INSTANT * dt if clock[BRIEF] > 0.0 else 0.0
+    clock[SERIES] = clock[BRIEF] * dt
     clock[HOPPED] = 0.0
 
 
@@ -143,9 +144,13 @@ def hold_hops(clock: Array, time: float) -> None:
 def end_instant(clock: Array, tally: Array, gained: float, loaded: float) -> None:
     """Whether a jam was found: velocities gained far more than what loads do; else the rest of the step is held."""
     if clock[BRIEF] > 0.0:
+        longer = LONGER * clock[BRIEF]
         clock[BRIEF] = 0.0
         if gained <= JUMP * loaded:
-            hold_rest(clock, tally)
+            if longer <= NO_INSTANT:
+                clock[BRIEF] = longer
+            else:
+                hold_rest(clock, tally)
 
 
 @kernel

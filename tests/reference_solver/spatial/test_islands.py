@@ -65,7 +65,12 @@ def test_a_ball_struck_out_of_its_bounds_meets_what_it_meets():
 
 
 def test_what_moves_as_prescribed_is_where_its_velocity_takes_it_for_all_islands():
-    floor = Body(HalfSpace((0.0, 0.0, 1.0)), motion="prescribed", twist=(0.0, 0.0, 0.5, 0.0, 0.0, 0.0))
+    floor = Body(
+        HalfSpace((0.0, 0.0, 1.0)),
+        motion="prescribed",
+        pose=(0.0, 0.0, 0.0, *UPRIGHT),
+        twist=(0.0, 0.0, 0.5, 0.0, 0.0, 0.0),
+    )
     turning = Body(Box((0.1, 0.1, 0.1)), motion="prescribed", pose=(0.0, 9.0, 9.0, *UPRIGHT), twist=(0.0,) * 5 + (2.0,))
     bodies = [floor, ball(0.0, 0.3, 0.0, 0.5), ball(5.0, 2.0), turning]
     simulation = Simulation(Model(3, bodies, DOWN, 0.0, 0.3), Settings.reference(DT))
