@@ -172,7 +172,7 @@ def test_corners_close_along_the_edge_along_which_they_close_last():
 def test_discs_have_one_normal(turn):
     """Along another they are nearly as far apart, by the square of the turn: the normal itself is looked at."""
     model = planar(disc(0.0, 0.0, 1.0, 0.0, 0.0), disc(1.05, 0.3), friction=0.0)
-    record = Simulation(model, Settings.reference(DT)).record(20, pieces=True)
+    record = Simulation(model, Settings.reference(DT)).record(40, pieces=True)
     n = record.pieces.normal
     other = replace(record.pieces, normal=n + turn * np.stack([-n[:, 1], n[:, 0]], axis=1))
     seen = [{f.name for f in audit(model, r, DT) if not f.holds} for r in (record, replace(record, pieces=other))]
