@@ -168,11 +168,18 @@ def test_corners_close_along_the_edge_along_which_they_close_last():
     assert "choice" not in seen[0] and "choice" in seen[1]
 
 
+def test_turns_of_what_touches_are_looked_at():
+    """A disc has no corner by which its geometry would tell of its angle."""
+    name = "angle of what touches [rad]"
+    corruption = next(each for each in self_test.CORRUPTIONS if each.name == name)
+    assert "turn" in self_test.seen_by(*corruption.plant(self_test.SCENES[corruption.scene], 1e-6))
+
+
 @pytest.mark.parametrize("turn", [1e-8, 1e-6, 1e-4])
 def test_discs_have_one_normal(turn):
     """Along another they are nearly as far apart, by the square of the turn: the normal itself is looked at."""
     model = planar(disc(0.0, 0.0, 1.0, 0.0, 0.0), disc(1.05, 0.3), friction=0.0)
-    record = Simulation(model, Settings.reference(DT)).record(20, pieces=True)
+    record = Simulation(model, Settings.reference(DT)).record(40, pieces=True)
     n = record.pieces.normal
     other = replace(record.pieces, normal=n + turn * np.stack([-n[:, 1], n[:, 0]], axis=1))
     seen = [{f.name for f in audit(model, r, DT) if not f.holds} for r in (record, replace(record, pieces=other))]
