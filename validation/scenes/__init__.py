@@ -44,4 +44,6 @@ OURS = (
     "long_rest",
     "closing_wall",
     "edge_drop",
+    "kane",
+    "domino",
 )
