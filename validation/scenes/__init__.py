@@ -46,4 +46,5 @@ OURS = (
     "edge_drop",
     "kane",
     "domino",
+    "painleve",
 )
