@@ -1,4 +1,4 @@
-"""Experiments on Bullet: rods that land, jam or lean, dominoes, and a rack that is broken."""
+"""Experiments on Bullet: rods that land or jam, dominoes, a box that shoves another, and a rack that is broken."""
 
 from __future__ import annotations
 
@@ -86,6 +86,18 @@ ON_RODS: tuple[Experiment, ...] = (
             idle=(_SOLVED,),
         )
         for metric, params in (("passing_spin", _PLAIN), ("slowed", {"ratio": 0.6}))
+    ),
+    *(
+        Experiment(
+            "shove-drag",
+            "without drag both accelerations and the force are right; solving further does nothing",
+            "default",
+            "shove",
+            metric,
+            _NO_DRAG,
+            idle=(_SOLVED,),
+        )
+        for metric in ("down", "ahead", "force")
     ),
     Experiment(
         "rack-drag",

@@ -1,4 +1,4 @@
-"""Experiments on MuJoCo: rods that land, jam or lean, dominoes, and a rack that is broken."""
+"""Experiments on MuJoCo: rods that land, jam or lean, dominoes, a box that shoves another, and a rack."""
 
 from __future__ import annotations
 
@@ -117,6 +117,23 @@ def on_rods(reflect: Mapping[str, Any], hold: Mapping[str, Any]) -> tuple[Experi
             {"margin": 0.0},
             {"ratio": 0.8},
             idle=({"impratio": 1e4},),
+        ),
+        *(
+            Experiment(
+                "shove-smooth-pyramid",
+                "without friction rows for what is smooth both boxes move as they should; a margin does nothing",
+                "default",
+                "shove",
+                metric,
+                {"smooth_condim": 1},
+                params,
+                idle=({"margin": 1e-3},),
+            )
+            for params, metrics in (
+                (dict[str, float](), ("down", "ahead", "force", "parted")),
+                ({"ratio": 20.0}, ("down", "ahead", "force")),
+            )
+            for metric in metrics
         ),
         *(
             Experiment(

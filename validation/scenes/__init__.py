@@ -41,6 +41,7 @@ OURS = (
     "overlap",
     "position_correction",
     "pressed_box",
+    "shove",
     "tilt_table",
     "long_rest",
     "closing_wall",
