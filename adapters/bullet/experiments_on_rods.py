@@ -99,6 +99,19 @@ ON_RODS: tuple[Experiment, ...] = (
         )
         for metric in ("down", "ahead", "force")
     ),
+    *(
+        Experiment(
+            "scales-clamped-speed",
+            "on the path of rigid bodies, which has no such limit, it is right; without drag it is not",
+            "default",
+            "scales",
+            metric,
+            {"useMaximalCoordinates": 1},
+            {"length": 1e3},
+            idle=(_NO_DRAG,),
+        )
+        for metric in ("stopping_distance", "braking", "apex")
+    ),
     Experiment(
         "rack-drag",
         "without drag momentum is kept",

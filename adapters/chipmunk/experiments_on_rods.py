@@ -1,4 +1,4 @@
-"""Experiments on Chipmunk: rods that land or jam, and a rack that is broken."""
+"""Experiments on Chipmunk: rods that land or jam, a rack, and one scene in several units."""
 
 from __future__ import annotations
 
@@ -31,6 +31,18 @@ ON_RODS: tuple[Experiment, ...] = (
             idle=({"collision_slop": 1e-4},),
         )
         for metric in ("passing_time", "edge_moved")
+    ),
+    *(
+        Experiment(
+            "scales-fixed-sweeps",
+            "with 1000 sweeps nothing lifts off, in millimetres and in kilometres",
+            "tuned",
+            "scales",
+            "hop",
+            _MORE,
+            params,
+        )
+        for params in (dict[str, float](), {"length": 1e3})
     ),
     *(
         Experiment(

@@ -147,6 +147,38 @@ def on_rods(reflect: Mapping[str, Any], hold: Mapping[str, Any]) -> tuple[Experi
             for metric in ("momentum_defect", "asymmetry")
         ),
         Experiment(
+            "scales-soft-contact",
+            "with the velocity reflected in the step after contact the ball rises as it should; solving does nothing",
+            "default",
+            "scales",
+            "apex",
+            {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
+            idle=(_FURTHER,),
+        ),
+        Experiment(
+            "scales-soft-contact",
+            "with rigid contacts the box does not lean; solving does nothing",
+            "default",
+            "scales",
+            "turned",
+            {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
+            idle=(_FURTHER,),
+        ),
+        *(
+            Experiment(
+                "scales-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing but the first step's fall",
+                "tuned",
+                "scales",
+                "hop",
+                _GENTLE,
+                params,
+                idle=({"impratio": 100.0},),
+                within=1.71e-4,
+            )
+            for params in (dict[str, float](), {"length": 1e3})
+        ),
+        Experiment(
             "rack-soft-contact",
             "with the velocity reflected in the step after contact 1e-4 of the energy is lost; solving does nothing",
             "default",

@@ -38,6 +38,7 @@ OURS = (
     "pyramid",
     "seam",
     "far_origin",
+    "scales",
     "overlap",
     "position_correction",
     "pressed_box",
