@@ -81,21 +81,57 @@ class Pivot:
         speeds = [self.speed(start, spin, start + (angle - start) * float(each)) for each in s]
         return 0.5 * self.arm * dt * abs(angle - start) * float(weight @ np.array(speeds))
 
+    def spin_off(self, start: float, spin: float, angle: float, dt: float, off: float = 0.0) -> float:
+        """How far steps of ``dt`` [s] may be off in the spin at ``angle`` [rad/s], from a start with ``spin``.
+
+        The spin at the start may be ``off`` [rad/s], and by 1.5 steps of acceleration: half a step by the order of a
+        step, one for a contact found late. That and the edge that is carried away are energy; the spin is told as
+        coarsely where it is read.
+        """
+        kick = off + 1.5 * dt * self.rate * math.sin(max(abs(start), abs(angle)))
+        carried = self.carried_away(start, spin, angle, dt) + self.g * dt * dt
+        energy = spin * kick + 0.5 * kick**2 + self.rate * carried / self.arm
+        there = self.speed(start, spin, angle)
+        return math.sqrt(there**2 + 2.0 * energy) - there + 1.5 * dt * self.rate * abs(math.sin(angle))
+
+    def time_off(self, start: float, spin: float, angle: float, dt: float, off: float = 0.0) -> float:
+        """How much longer or shorter the way takes [s] with a spin at the start as far off as `spin_off` says.
+
+        Infinite where a box that much slower does not get there.
+        """
+        kick = off + 1.5 * dt * self.rate * math.sin(max(abs(start), abs(angle)))
+        kick += self.rate * (self.carried_away(start, spin, angle, dt) + self.g * dt * dt) / (self.arm * spin)
+        top = 0.0 if start < 0.0 < angle else (start if abs(start) < abs(angle) else angle)
+        if self.speed(start, max(0.0, spin - kick), top) == 0.0:
+            return math.inf
+        true = self.time(start, spin, angle)
+        return max(abs(self.time(start, spin + side * kick, angle) - true) for side in (-1.0, 1.0))
+
 
 def fall_checks(
-    on: Pivot, start: float, end: float, dt: float, truth: Mapping[str, float], tilted: float = 0.0
+    on: Pivot,
+    start: float,
+    end: float,
+    dt: float,
+    truth: Mapping[str, float],
+    tilted: float = 0.0,
+    spin: float = 0.0,
 ) -> list[Check]:
-    """Checks of a box that falls from rest over an edge that stays: time and spin at ``end``, way of the edge.
+    """Checks of a box that falls over an edge that stays: time and spin at ``end``, way of the edge.
 
     Steps of first order: what they do of a fall whose contact may be found one step late. Half a step of acceleration
     is what the order of a step shows, and a whole one is missing where a contact is found late, at the start or after
     the edge was carried off the floor: 1.5 dt in time, and 1.5 steps in spin. What carries the edge away raises the
     centre or moves its arm: energy m g times that, and the torque's share of it over the arm. A start that is told to
-    ``tilted`` [rad] only takes the time of another start.
+    ``tilted`` [rad] only takes the time of another start. One that turns with ``spin`` [rad/s] already may be as far
+    off in that (`Pivot.spin_off`), and takes the time of another spin.
     """
-    g, spin = on.g, truth["passing_spin"]
-    carried = on.carried_away(start, 0.0, end, dt) + g * dt * dt
+    g, passing = on.g, truth["passing_spin"]
+    carried = on.carried_away(start, spin, end, dt) + g * dt * dt
     other = 0.0 if tilted == 0.0 else abs(on.time(max(start - tilted, 0.1 * start), 0.0, end) - truth["passing_time"])
+    sharp = 1.5 * dt * on.rate * math.sin(end) + on.rate / (on.arm * passing) * carried
+    if spin > 0.0:
+        other, sharp = on.time_off(start, spin, end, dt), on.spin_off(start, spin, end, dt)
     moved = bounds.Bound(
         carried + bounds.ROUND_OFF * on.arm,
         "a step turns the box and moves its centre along the tangent: rho (w dt)^2/2 each; g dt^2",
@@ -105,7 +141,7 @@ def fall_checks(
         "half a step by the order of a step, one for a contact found late, and the torque of an edge that moved",
     )
     speed = bounds.Bound(
-        1.5 * dt * on.rate * math.sin(end) + on.rate / (on.arm * spin) * carried,
+        sharp,
         "half a step of the acceleration by the order of a step, one for a contact found late, and an edge that moved",
     )
     source = "energy of a pendulum that is held by an edge; its integral"

@@ -6,6 +6,7 @@ from typing import Any
 
 from adapters.bullet.experiments_on_blows import on_blows
 from adapters.bullet.experiments_on_loads import ON_LOADS
+from adapters.bullet.experiments_on_rods import ON_RODS
 from adapters.experiment import Cured, Experiment
 
 #: Iterations are left alone: they cost time, and any count is better than a lower one.
@@ -410,3 +411,5 @@ EXPERIMENTS += tuple(
 EXPERIMENTS += ON_LOADS
 
 EXPERIMENTS += on_blows(_BARE)
+
+EXPERIMENTS += ON_RODS

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.chipmunk.experiments_on_loads import ON_LOADS
+from adapters.chipmunk.experiments_on_rods import ON_RODS
 from adapters.experiment import Cured, Experiment
 
 #: Iterations are left alone: they cost time, and any count is better than a lower one.
@@ -133,3 +134,5 @@ EXPERIMENTS += tuple(
 )
 
 EXPERIMENTS += ON_LOADS
+
+EXPERIMENTS += ON_RODS

@@ -7,6 +7,7 @@ from typing import Any
 from adapters.experiment import Cured, Experiment
 from adapters.mujoco.experiments_on_blows import on_blows
 from adapters.mujoco.experiments_on_loads import on_loads
+from adapters.mujoco.experiments_on_rods import on_rods
 
 #: Iterations are left alone: Newton's count is a limit that is not reached.
 CANDIDATES: dict[str, tuple[Any, ...]] = {
@@ -302,3 +303,5 @@ EXPERIMENTS += tuple(
 EXPERIMENTS += on_loads(_HOLD)
 
 EXPERIMENTS += on_blows(_REFLECT)
+
+EXPERIMENTS += on_rods(_REFLECT, _HOLD)

@@ -24,7 +24,7 @@ from adapters.needs import Needs
 from adapters.reference.profiles import PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
-from adapters.reference.start import overlap_at_the_start
+from adapters.reference.start import jam_at_the_start, overlap_at_the_start
 from adapters.scene import Scene
 
 #: Steps cut at events, with constant accelerations between them.
@@ -80,13 +80,15 @@ class ReferenceEngine(Engine):
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Whatever the solver's own validation says about the model.
 
-        And bodies that overlap at the start, where a profile promises a solution: rigid bodies have none there.
+        And bodies that overlap or jam at the start, where a profile promises a solution.
         """
         try:
             solver_model(scene)
         except ValueError as error:
             return str(error).splitlines()[0]
-        return overlap_at_the_start(scene) if self.facts.roles[profile] == "solution" else None
+        if self.facts.roles[profile] != "solution":
+            return None
+        return overlap_at_the_start(scene) or jam_at_the_start(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.

@@ -6,6 +6,7 @@ from typing import Any
 
 from adapters.experiment import Experiment
 from adapters.reference.experiments_on_loads import ON_LOADS
+from adapters.reference.experiments_on_rods import ON_RODS
 
 #: Profile `classical` is the textbook's and `reference` solves to the end: neither is tuned.
 CANDIDATES: dict[str, tuple[Any, ...]] = {}
@@ -82,3 +83,5 @@ EXPERIMENTS += tuple(
 )
 
 EXPERIMENTS += ON_LOADS
+
+EXPERIMENTS += ON_RODS

@@ -123,16 +123,14 @@ def clearance(e: float, height: float, g: float, t: float) -> float:
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """What a bounce that is found within a step, and not at its time, may be off by.
 
-    A fixed-step method finds the ball at a depth within (0, v dt], which costs (1 - e^2) v dt of height, and knows
-    speeds to half a step of gravity, which costs e (1 + e) v dt / 2; errors shrink by e^2 with each later bounce.
+    That is `bounds.rebound_late` for each; errors shrink by e^2 with each later bounce.
     """
     e, height, g = scene.params["e"], scene.params["height"], scene.params["g"]
-    per_bounce = 1.0 - e * e + 0.5 * e * (1.0 + e)
     speed, bound = math.sqrt(2.0 * g * height), 0.0
     found, velocity_error = [], []
     because = "impact located within a step: per bounce (1 - e^2 + e (1+e)/2) v dt, shrinking by e^2; + g dt^2/8"
     for n in range(1, APEXES + 1):
-        bound = e * e * bound + per_bounce * speed * dt
+        bound = e * e * bound + bounds.rebound_late(e, speed, dt)
         speed *= e
         if speed <= RESOLVED * g * dt:
             break

@@ -23,18 +23,15 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.corners import AFTERMATH, landing_corner, lands_again
 from validation.scenes.parts import PHASES, block, delay, floor, mass_of, phases, states_and_impulses, tilted, upward
 
 HEIGHT = 1.0
-#: Runs for this long after the ideal contact [s]: less than until the other edge lands, checked in `make`.
-AFTERMATH = 0.1
 
 
 def _corner(p: Params) -> tuple[float, float]:
     """The lower edge against the centre: along the floor (towards +x), and below it [m]."""
-    angle, half = math.radians(p["tilt"]), 0.5 * p["aspect"] * HEIGHT
-    c, s = math.cos(angle), math.sin(angle)
-    return half * c - 0.5 * HEIGHT * s, half * s + 0.5 * HEIGHT * c
+    return landing_corner(p["aspect"] * HEIGHT, HEIGHT, math.radians(p["tilt"]))
 
 
 def _after(p: Params) -> tuple[float, float, float]:
@@ -63,21 +60,11 @@ def make(dimension: int, params: Params) -> Scene:
     )
     down = (*(0.0,) * (dimension - 1), -p["v"], *(0.0,) * (1 if dimension == 2 else 3))
     pairs = (Pair(restitution=p["e"], friction=0.0),)
-    if _lands_again(p):
+    _, rise, spin = _after(p)
+    if lands_again(p["aspect"] * HEIGHT, HEIGHT, math.radians(p["tilt"]), rise, spin):
         raise SceneError(f"edge_drop.tilt: at {p['tilt']:g} degrees another edge lands within {AFTERMATH:g} s")
     gravity, duration = upward(dimension, 0.0), p["delay"] + AFTERMATH
     return Scene("edge_drop", 1, dimension, (floor(dimension), replace(box, twist=down)), pairs, gravity, duration, p)
-
-
-def _lands_again(p: Params) -> bool:
-    """Whether a corner is below the floor within half as long again as the run, by the motion after the blow."""
-    _, rise, spin = _after(p)
-    _, below = _corner(p)
-    t = np.linspace(0.0, 1.5 * AFTERMATH, 151)[1:]
-    angle = -math.radians(p["tilt"]) + spin * t
-    half = 0.5 * p["aspect"] * HEIGHT
-    lowest = below + rise * t - np.abs(np.sin(angle)) * half - np.abs(np.cos(angle)) * 0.5 * HEIGHT
-    return bool((lowest < -1e-9).any())
 
 
 def exact(scene: Scene) -> dict[str, float]:

@@ -177,6 +177,22 @@ def test_friction_that_an_edge_needs_is_what_moves_the_centre():
         )
 
 
+@pytest.mark.parametrize("off", [0.0, 0.01])
+@pytest.mark.parametrize(("start", "angle"), [(-0.4, 0.2), (-0.4, -0.1), (0.1, 0.5)])
+def test_what_a_spin_at_the_start_owes_is_that_of_a_start_as_far_off(start, angle, off):
+    """Another spin at the start by 1.5 steps of acceleration, an edge that sinks, and 1.5 steps where it is read."""
+    on, spin, dt = Pivot(0.5, 1.0, 9.81), 1.5, DT
+    kick = off + 1.5 * dt * on.rate * math.sin(max(abs(start), abs(angle)))
+    sinks = on.carried_away(start, spin, angle, dt) + 9.81 * dt * dt
+    true = on.speed(start, spin, angle)
+    faster = math.sqrt(on.speed(start, spin + kick, angle) ** 2 + 2.0 * on.rate * sinks / on.arm)
+    read = 1.5 * dt * on.rate * abs(math.sin(angle))
+    assert on.spin_off(start, spin, angle, dt, off) == pytest.approx(faster - true + read)
+    slower = on.time(start, spin - kick, angle) - on.time(start, spin, angle)
+    assert slower < on.time_off(start, spin, angle, dt, off) < 2.0 * slower
+    assert math.isinf(on.time_off(-0.4, 0.01, 0.2, dt)), "one that slow does not get there"
+
+
 # ---- a block that rocks ----
 
 

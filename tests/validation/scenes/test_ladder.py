@@ -1,0 +1,171 @@
+"""A ladder: loads and fall against forces at its two ends, differenced from where they are; faults of sizes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from adapters.engine import Contacts
+from adapters.scene import SceneError
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes.ladder import friction
+
+DT = 1 / 240
+SIZES = [0.1, 0.01, 0.001]
+
+
+def made(**params):
+    canonical = CATALOGUE["ladder"]
+    return canonical, canonical.scene(2, params)
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, trajectory.dt)
+        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+def centre_of(scene, tilt):
+    """Centre of the box turned by ``tilt``, its lowest corner on the floor and its outermost at the wall."""
+    half = np.array(scene.bodies[2].shape.half_extents)
+    c, s = math.cos(tilt), math.sin(tilt)
+    corners = np.array([[x, y] for x in (-1, 1) for y in (-1, 1)]) * half @ np.array([[c, s], [-s, c]])
+    return np.array([-corners[:, 0].max(), -corners[:, 1].min()])
+
+
+def forces(scene, tilt, spin, mu, g, heavy=1.0):
+    """Angular acceleration, and forces of floor and wall: Newton and Euler, the constraint differenced from places."""
+    h, body = 1e-4, scene.bodies[2]
+    before, here, after = (centre_of(scene, tilt + k * h) for k in (-1, 0, 1))
+    first, second = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    half = np.array(body.shape.half_extents)
+    c, s = math.cos(tilt), math.sin(tilt)
+    arms = np.array([[x, y] for x in (-1, 1) for y in (-1, 1)]) * half @ np.array([[c, s], [-s, c]])
+    foot, head = arms[arms[:, 1].argmin()], arms[arms[:, 0].argmax()]
+    m = body.mass
+    system = np.array(
+        [
+            [m * first[0], -mu, 1.0],
+            [m * first[1], -1.0, 0.0],
+            [heavy * body.inertia, -(foot[0] - foot[1] * mu), -head[1]],
+        ]
+    )
+    return np.linalg.solve(system, [-m * second[0] * spin**2, -m * g - m * second[1] * spin**2, 0.0])
+
+
+def sliding(scene, dt=DT, mu=None, g=None, heavy=1.0, offset=0.0, late=0.0):
+    """The fall by DOP853; ``offset`` of a step order and ``late`` of the contacts, in steps."""
+    p, start = scene.params, scene.bodies[2].pose[2]
+    mu, g = friction(p) if mu is None else mu, p["g"] if g is None else g
+    times = np.arange(round(scene.duration / dt) + 1) * dt
+    found = solve_ivp(
+        lambda t, y: [y[1], forces(scene, y[0], y[1], mu, g, heavy)[0]], (0.0, times[-1] + dt), [start, 0.0], "DOP853",
+        dense_output=True, rtol=1e-9, atol=1e-10,
+    )  # fmt: skip
+    tilt, spin = found.sol(np.maximum(0.0, times - late * dt))
+    spin[times < late * dt] = 0.0
+    return recorded(scene, dt, tilt + offset * dt * spin, spin)
+
+
+def recorded(scene, dt, tilt, spin, wall=None, foot=1.0):
+    """A record with these angles; ``wall`` and ``foot`` are loads over the weight, at every step."""
+    n = len(tilt)
+    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 3, 3))
+    pose[:, 2] = [(*centre_of(scene, each), each) for each in tilt]
+    twist[:, 2, 2] = spin
+    contacts = None
+    if wall is not None:
+        weight = scene.params["mass"] * scene.params["g"] * dt
+        each = np.array([[wall, foot], [-wall, 0.0]]) * weight
+        rows = Contacts(
+            np.tile([0, 1], n), np.full(2 * n, 2), np.zeros((2 * n, 2)), np.zeros((2 * n, 2)), np.tile(each, (n, 1)),
+            np.zeros(2 * n),
+        )  # fmt: skip
+        contacts = ContactRecord(np.arange(n), 2 * np.arange(n + 1), rows)
+    return Trajectory(np.arange(n) * dt, pose, twist, contacts, dt, "completed")
+
+
+def standing(scene, dt=DT, wall=None, foot=1.0):
+    """A ladder at rest, with the loads that hold it: no friction is known, but no acceleration."""
+    body = scene.bodies[2]
+    if wall is None:
+        c, s = math.cos(body.pose[2]), math.sin(body.pose[2])
+        foot_at = np.array([[c, -s], [s, c]]) @ (np.array(body.shape.half_extents) * [1.0, -1.0])
+        head_at = np.array([[c, -s], [s, c]]) @ np.array(body.shape.half_extents)
+        # Unknown: friction, floor, wall, over the weight.
+        system = [[1.0, 0.0, -1.0], [0.0, 1.0, 0.0], [-foot_at[1], foot_at[0], head_at[1]]]
+        _, foot, wall = np.linalg.solve(system, [0.0, 1.0, 0.0])
+    n = round(scene.duration / dt) + 1
+    return recorded(scene, dt, np.full(n, body.pose[2]), np.zeros(n), wall, foot)
+
+
+LEANS = [{}, {"lean": 45.0}, {"lean": 75.0}, {"aspect": 0.2}]
+
+
+@pytest.mark.parametrize("params", LEANS)
+def test_a_ladder_stands_with_the_loads_of_its_balance_and_just_where_friction_is_as_large(params):
+    canonical, scene = made(**params)
+    assert failing(canonical, scene, standing(scene)) == set()
+    start = scene.bodies[2].pose[2]
+    least = canonical.exact(scene)["wall_load"]
+    assert forces(scene, start, 0.0, 0.999 * least, 9.81)[0] < 0.0 < forces(scene, start, 0.0, 1.001 * least, 9.81)[0]
+
+
+@pytest.mark.parametrize("params", LEANS)
+@pytest.mark.parametrize("ratio", [0.5, 0.8])
+def test_a_ladder_slides_as_forces_at_its_ends_move_it(params, ratio):
+    canonical, scene = made(ratio=ratio, **params)
+    measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
+    assert measured["passing_time"][0] == pytest.approx(truth["passing_time"], rel=1e-5)
+    assert measured["passing_spin"][0] == pytest.approx(truth["passing_spin"], rel=1e-5)
+    assert measured["let_go"][0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
+@pytest.mark.parametrize("late", [0.0, 1.0])
+@pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
+def test_step_orders_and_late_contacts_pass(dt, late, offset):
+    canonical, scene = made(ratio=0.8)
+    assert failing(canonical, scene, sliding(scene, dt, offset=offset, late=late)) == set()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_wrong_friction_gravity_inertia_and_loads_fail(size):
+    canonical, slides = made(ratio=0.8)
+    dt = DT if size > 0.05 else 1 / 1920
+    mu = friction(slides.params)
+    assert size < 0.005 or failing(canonical, slides, sliding(slides, dt, mu * (1.0 - size))) >= {"passing_time"}
+    assert size < 0.05 or "passing_time" in failing(canonical, slides, sliding(slides, dt, g=9.81 * (1.0 - size)))
+    assert size < 0.005 or "passing_time" in failing(canonical, slides, sliding(slides, dt, heavy=1.0 + 5.0 * size))
+    gone = sliding(slides)
+    gone.pose[40:, 2, 0] -= 10.0 * size
+    assert failing(canonical, slides, gone) == {"let_go"}
+    canonical, stands = made()
+    for loads, metric in (((1.0 + size, 1.0), "wall_load"), ((1.0, 1.0 - size), "floor_load")):
+        found = standing(stands, wall=canonical.exact(stands)["wall_load"] * loads[0], foot=loads[1])
+        assert failing(canonical, stands, found) == {metric}
+    crept = standing(stands)
+    crept.pose[-1, 2, :2] += [-2.0 * size, 0.0]
+    assert failing(canonical, stands, crept) == {"moved"}
+
+
+def test_a_ladder_that_stands_where_it_slides_or_slides_where_it_stands_fails():
+    canonical, slides = made(ratio=0.8)
+    assert failing(canonical, slides, standing(slides)) == {"passing_time", "passing_spin"}
+    canonical, stands = made()
+    fallen = sliding(replace(made(ratio=0.95)[1], duration=1.0))
+    assert failing(canonical, stands, fallen) == {"moved", "wall_load", "floor_load"}
+
+
+@pytest.mark.parametrize(
+    ("params", "named"), [({"lean": 80.0, "aspect": 0.3}, "lean"), ({"ratio": 0.01, "lean": 20.0}, "ratio")]
+)
+def test_what_needs_no_wall_or_lets_it_go_is_refused_by_name(params, named):
+    with pytest.raises(SceneError, match=rf"ladder\.{named}"):
+        made(**params)

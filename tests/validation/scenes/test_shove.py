@@ -1,0 +1,121 @@
+"""A box on a slope that shoves another: accelerations from all contacts as constraints; planted faults of sizes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.engine import Contacts
+from adapters.scene import SceneError
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.catalogue import CATALOGUE
+
+DT = 1 / 240
+SIZES = [0.1, 0.01, 0.001]
+
+
+def made(**params):
+    canonical = CATALOGUE["shove"]
+    return canonical, canonical.scene(2, params)
+
+
+def failing(canonical, scene, trajectory):
+    measured = canonical.measure(scene, trajectory)
+    return {
+        check.metric
+        for check in canonical.checks(scene, trajectory.dt)
+        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
+    }
+
+
+def corners(body):
+    c, s = math.cos(body.pose[2]), math.sin(body.pose[2])
+    signs = np.array([[x, y] for x in (-1, 1) for y in (-1, 1)])
+    return signs * body.shape.half_extents @ np.array([[c, s], [-s, c]])
+
+
+def held(scene):
+    """Accelerations (3 per box) and force of the corner: five contacts that keep their distance, none known to push.
+
+    Two corners on the slope, two on the floor, one on the face; the forces of four are redundant by nothing.
+    """
+    upper, lower = scene.bodies[2:]
+    normal = np.array(scene.bodies[1].shape.normal)
+    rows = []
+    for body, way, offset in ((upper, normal, 0), (lower, np.array([0.0, 1.0]), 3)):
+        arms = corners(body)
+        for arm in arms[np.argsort((arms + body.pose[:2]) @ way)[:2]]:
+            assert abs((arm + body.pose[:2]) @ way) < 1e-12
+            row = np.zeros(6)
+            row[offset : offset + 3] = *way, arm[0] * way[1] - arm[1] * way[0]
+            rows.append(row)
+    arms = corners(upper)
+    arm = arms[arms[:, 0].argmax()]
+    on_face = arm + upper.pose[:2] - np.array(lower.pose[:2])
+    assert on_face[0] == pytest.approx(-lower.shape.half_extents[0], abs=1e-12)
+    rows.append(np.array([-1.0, 0.0, arm[1], 1.0, 0.0, -on_face[1]]))
+    contacts = np.array(rows)
+    masses = np.diag([upper.mass, upper.mass, upper.inertia, lower.mass, lower.mass, lower.inertia])
+    loads = masses @ np.array([0.0, -scene.params["g"], 0.0] * 2)
+    system = np.block([[masses, -contacts.T], [contacts, np.zeros((5, 5))]])
+    found = np.linalg.solve(system, [*loads, *(0.0,) * 5])
+    return found[:6], found[6:]
+
+
+def moving(scene, dt=DT, heavy=1.0, offset=0.0):
+    """Both boxes under these accelerations from rest; ``offset`` of a step order, in steps."""
+    rates, forces = held(scene)
+    n = round(scene.duration / dt) + 1
+    t = np.arange(n) * dt
+    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 4, 3))
+    twist[:, 2:] = t[:, None, None] * rates.reshape(2, 3) / heavy
+    pose[:, 2:] += (0.5 * t**2 + offset * dt * t)[:, None, None] * rates.reshape(2, 3) / heavy
+    rows = Contacts(
+        np.full(n, 2), np.full(n, 3), np.zeros((n, 2)), np.zeros((n, 2)), np.tile([forces[4] * dt, 0.0], (n, 1)),
+        np.zeros(n),
+    )  # fmt: skip
+    return Trajectory(t, pose, twist, ContactRecord(np.arange(n), np.arange(n + 1), rows), dt, "completed")
+
+
+CELLS = [{}, {"ratio": 20.0}, {"ratio": 0.5}, {"angle": 60.0}, {"mass": 5.0, "g": 3.0}]
+
+
+@pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
+@pytest.mark.parametrize("params", CELLS)
+def test_boxes_move_as_five_contacts_that_hold_make_them(params, offset):
+    canonical, scene = made(**params)
+    _, forces = held(scene)
+    assert (forces > 0.0).all(), "nothing tips: every corner pushes"
+    trajectory = moving(scene, offset=offset)
+    measured = canonical.measure(scene, trajectory)
+    for name, truth in canonical.exact(scene).items():
+        assert measured[name][0] == pytest.approx(truth, abs=1e-9), name
+    assert failing(canonical, scene, trajectory) == set()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_wrong_accelerations_and_forces_gaps_and_turns_fail(size):
+    canonical, scene = made()
+    assert failing(canonical, scene, moving(scene, heavy=1.0 + size)) >= {"down", "ahead"}
+    weak = moving(scene)
+    weak.contacts.rows.impulse[:] *= 1.0 - size
+    assert failing(canonical, scene, weak) == {"force"}
+    apart = moving(scene)
+    apart.pose[60:, 3, 0] += size
+    assert failing(canonical, scene, apart) == {"parted"}
+    leaning = moving(scene)
+    leaning.pose[60:, 3, 2] += size
+    assert failing(canonical, scene, leaning) == {"turned"}
+
+
+def test_boxes_that_stay_fail():
+    canonical, scene = made()
+    still = moving(scene, heavy=1e12)
+    still.contacts.rows.impulse[:] = 0.0
+    assert failing(canonical, scene, still) == {"down", "ahead", "force"}
+
+
+@pytest.mark.parametrize(("params", "named"), [({"angle": 30.0}, "angle"), ({"ratio": 1e-2, "angle": 65.0}, "angle")])
+def test_boxes_that_do_not_meet_for_all_of_the_run_are_refused(params, named):
+    with pytest.raises(SceneError, match=rf"shove\.{named}"):
+        made(**params)

@@ -1,0 +1,240 @@
+r"""A ladder leans on a smooth wall, and friction of the floor alone holds it: it stands, or it slides down.
+
+              /|         moments about the foot:   N_w = W/2 (cot(lean) - w/L),  w: thickness
+             / |  <- N_w   stands    if  mu >= N_w/W
+            /  |           slides    else:  the foot goes out, the head goes down,
+     mu W->/___|           one angle, by Newton's and Euler's laws with mu N at the foot
+    ==============         W: weight, L: length
+
+``ratio`` is mu over what it takes. The load on the wall is told as well: nothing else than the moments decides it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from adapters.scene import Body, HalfSpace, Pair, Scene, SceneError
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.leaning import Turn, turn
+from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, tilted, upward
+
+#: Turn at which a ladder that slides is told [rad], and how long it goes on [s]: whoever is late by what a step of
+#: 1/60 s may cost is told as well.
+TOLD, AFTERMATH = math.radians(8.0), 0.2
+#: Duration of a run in which it stands [s].
+DURATION = 2.0
+
+
+def needed(p: Params) -> float:
+    """Friction of the floor that just holds the ladder; the load on the wall over the weight."""
+    return 0.5 * (1.0 / math.tan(math.radians(p["lean"])) - p["aspect"])
+
+
+def friction(p: Params) -> float:
+    """Friction of the floor."""
+    return p["ratio"] * needed(p)
+
+
+def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -> tuple[float, float, float]:
+    """Acceleration of the lean [rad/s^2], and loads of floor and wall over the weight.
+
+    The foot is at (-L cos(lean), 0), the head L along from there at the wall, the centre half of it along and w/2 off.
+    """
+    length, half, thick = p["length"], 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
+    c, s = math.cos(lean), math.sin(lean)
+    mu = needed(p) * (p["ratio"] if ratio is None else ratio)
+    # Centre (-half c - thick s, half s + thick c): first and second derivative by the lean.
+    by = np.array([half * s - thick * c, half * c - thick * s])
+    twice = np.array([half * c + thick * s, -half * s - thick * c])
+    foot = np.array([-half * c + thick * s, -half * s - thick * c])
+    head = np.array([half * c + thick * s, half * s - thick * c])
+    own = length * length * (1.0 + p["aspect"] ** 2) / 12.0
+    # Unknown: lean'', and forces of floor and wall over the mass: (mu, 1), against a foot that goes out, and (-1, 0).
+    system = np.array(
+        [
+            [by[0], -mu, 1.0],
+            [by[1], -1.0, 0.0],
+            [own, -(foot[0] - foot[1] * mu), -head[1]],
+        ]
+    )
+    found = np.linalg.solve(system, [-twice[0] * square, -p["g"] - twice[1] * square, 0.0])
+    return float(found[0]), float(found[1]) / p["g"], float(found[2]) / p["g"]
+
+
+@lru_cache(maxsize=64)
+def _slides(key: tuple[tuple[str, float], ...], off: float = 0.0) -> Turn | None:
+    """The fall of a ladder from a lean that is ``off`` [rad]; None if it stays."""
+    p = dict(key)
+    start = math.radians(p["lean"]) + off
+    return turn(lambda lean, square: (_forces(p, lean, square)[0], 0.0), start, start - TOLD)
+
+
+def _key(p: Params) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(p.items()))
+
+
+def _fall(p: Params) -> Turn:
+    found = _slides(_key(p))
+    assert found is not None  # `make` has refused it
+    return found
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the wall is at 0, the ladder to the left of it touches floor and wall.
+
+    Raises
+    ------
+    SceneError
+        For a ladder so upright that it needs no wall, and one that lets go of a wall on its way.
+    """
+    p, lean = params, math.radians(params["lean"])
+    if needed(p) <= 0.0:
+        raise SceneError(f"ladder.lean: a ladder as thick as {p['aspect']:g} stands by itself at {p['lean']:g} degrees")
+    duration = DURATION
+    if p["ratio"] < 1.0:
+        found = _slides(_key(p))
+        loads = [] if found is None else _forces(p, lean - TOLD, found.spin**2)[1:]
+        if found is None or min(loads) <= 0.0:
+            raise SceneError(f"ladder.ratio: at {p['ratio']:g} the ladder does not slide down along the wall")
+        duration = found.time + AFTERMATH
+    half, thick = 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
+    place = -half * math.cos(lean) - thick * math.sin(lean), half * math.sin(lean) + thick * math.cos(lean)
+    body = block("ladder", dimension, p["mass"], 2.0 * thick, p["length"])
+    body = tilted(body, dimension, place, lean - 0.5 * math.pi)
+    wall = Body("wall", HalfSpace(along(dimension, -1.0), 0.0), motion="fixed")
+    pairs = (Pair("floor", "ladder", 0.0, friction(p)), Pair("wall", "ladder", 0.0, 0.0))
+    bodies = (floor(dimension), wall, body)
+    return Scene("ladder", 1, dimension, bodies, pairs, upward(dimension, -p["g"]), duration, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Moments about the foot, or a fall with friction at the foot."""
+    p = scene.params
+    if p["ratio"] >= 1.0:
+        return {"moved": 0.0, "wall_load": needed(p), "floor_load": 1.0}
+    found = _fall(p)
+    return {"passing_time": found.time, "passing_spin": found.spin, "let_go": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Largest way of a point of the ladder, loads at the end, its passage through a turn, and gaps of its two ends."""
+    p, d, t = scene.params, scene.dimension, trajectory.t
+    pose = trajectory.pose[:, 2]
+    turned, rate = metrics.tilt(trajectory, 2), metrics.tilt_rate(trajectory, 2)
+    time, spin = metrics.crossing(t, turned[0] - turned, -rate, TOLD)
+    half, thick = 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
+    foot = metrics.point(trajectory, 2, along(d, thick, -half))[:, d - 1]
+    head = metrics.point(trajectory, 2, along(d, thick, half))[:, 0]
+    until = t <= (t[-1] if time[0] is None else time[0])
+    way = float(np.linalg.norm(pose[:, :d] - pose[0, :d], axis=1).max())
+    weight = p["mass"] * p["g"] * trajectory.dt
+    loads: dict[str, Measured] = {}
+    for name, body, axis, sign in (("floor_load", 0, d - 1, 1.0), ("wall_load", 1, 0, -1.0)):
+        late = metrics.late_impulses(trajectory, body, 2, bounds.WINDOW)
+        loads[name] = (None, metrics.UNAVAILABLE) if late is None else (sign * float(late[:, axis].mean()) / weight, "")
+    return loads | {
+        "moved": (way + metrics.turned(pose) * metrics.reach(scene.bodies[2].shape), ""),
+        "passing_time": time,
+        "passing_spin": spin,
+        "let_go": (float(max(np.abs(foot[until]).max(), np.abs(head[until]).max())), ""),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """What stands may be found one step late at either end; a fall owes what steps of first order leave out.
+
+    An end that nothing holds accelerates by at most 3/2 g, as that of a rod which falls about its other end; the way of
+    the centre and that of a corner by the turn are added, so that each end counts twice.
+    """
+    p, g = scene.params, scene.params["g"]
+    place = bounds.ROUND_OFF * p["length"]
+    if p["ratio"] >= 1.0:
+        source = "forces and moments in balance: N_w = W/2 (cot(lean) - w/L)"
+        still = bounds.Bound(
+            6.0 * g * dt * dt + place, "both ends found one step late, 3/2 g dt^2 each, at the centre and by the turn"
+        )
+        carried = bounds.carried(dt)
+        lever = bounds.Bound(
+            carried.value / math.sin(math.radians(p["lean"])), f"{carried.because}, over the height of the head"
+        )
+        return [
+            still.check("moved", "m", truth["moved"], "friction of the floor holds"),
+            lever.check("wall_load", "weights", truth["wall_load"], source),
+            carried.check("floor_load", "weights", truth["floor_load"], source),
+        ]
+    lean, found = math.radians(p["lean"]), _fall(p)
+    # Both ends turn about a point at most L from either: steps carry them off by L (w dt)^2/2 each.
+    carried_away = 0.5 * p["length"] * dt * found.path + 1.5 * g * dt * dt
+    others = [_slides(_key(p), side * carried_away / p["length"]) for side in (-1.0, 1.0)]
+    fast = max(abs(_forces(p, lean - TOLD, found.spin**2)[0]), abs(_forces(p, lean, 0.0)[0]))
+    because = "half a step by the order of a step, one for a contact found late, and ends that steps carry away"
+    time = 1.5 * dt + max(math.inf if other is None else abs(other.time - found.time) for other in others)
+    spin = 1.5 * dt * fast + max(math.inf if other is None else abs(other.spin - found.spin) for other in others)
+    source = "Newton's and Euler's laws with Coulomb's friction at the foot, integrated"
+    stays = bounds.Bound(carried_away + place, "steps carry the ends away, L (w dt)^2/2 each; one found a step late")
+    return [
+        bounds.Bound(time, because).check("passing_time", "s", truth["passing_time"], source),
+        bounds.Bound(spin, because).check("passing_spin", "rad/s", truth["passing_spin"], source),
+        stays.check("let_go", "m", truth["let_go"], "both ends push until it is told"),
+    ]
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Way of a ladder that should stand, in lengths; error of the time of one that slides, relative to it."""
+    metric = "moved" if scene.params["ratio"] >= 1.0 else "passing_time"
+    value, reason = found[metric]
+    if value is None:
+        return None, reason
+    return (value / scene.params["length"] if metric == "moved" else abs(value / exact(scene)[metric] - 1.0)), ""
+
+
+SCENE = CanonicalScene(
+    name="ladder",
+    family="stacks and statics",
+    version=1,
+    title="Ladder on a smooth wall: it stands or slides down",
+    figure=__doc__ or "",
+    law="stands if mu >= (cot(lean) - w/L)/2, which is the load on the wall over the weight; else slides down",
+    dimensions=(2,),
+    parameters=(
+        Parameter("ratio", 1.05, "1", "friction of the floor over what it takes", 0.01, 100.0),
+        Parameter("lean", 60.0, "degrees", "of the ladder over the floor", 20.0, 85.0),
+        Parameter("length", 4.0, "m", "of the ladder", 0.0, 1e3, positive=True),
+        Parameter("aspect", 0.02, "1", "thickness over length", 0.0, 0.3, positive=True),
+        standard_gravity(),
+        mass_of("the ladder"),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=lambda scene: Sampling(1, max(0.0, scene.duration - bounds.WINDOW)),
+    quick=(Variation({}), Variation({"ratio": 0.8})),
+    full=tuple(
+        Variation({"ratio": r, "lean": lean}) for r in (0.5, 0.8, 1.02, 1.05, 2.0) for lean in (45.0, 60.0, 75.0)
+    ),
+    planted=({}, {"ratio": 0.8}),
+    primary=Primary(
+        "outcome error",
+        "1",
+        "way of the ladder that should stand, in lengths; error of the time of the one that slides, relative to it",
+        "whether it stands, and how fast it goes if it does not",
+        lambda dt: [{}, {"ratio": 0.8}],
+        error,
+        "the whole scene: the ladder stands",
+    ),
+    words={
+        "moved": "moves by {value} where it should stand",
+        "wall_load": "presses on the wall with {value}",
+        "floor_load": "presses on the floor with {value}",
+        "passing_time": "has slid down after {value}",
+        "passing_spin": "turns with {value} there",
+        "let_go": "an end leaves floor or wall, out or in, by {value}",
+    },
+)

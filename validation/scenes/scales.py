@@ -1,0 +1,147 @@
+r"""The same scene in millimetres and in kilometres, in grams and in tons: lengths and masses carry no physics here.
+
+       o  h = 2 L               the ball rises to  e^2  of its fall
+       |        _____
+       v       |_____| v ->     the box stops after  v^2/(2 mu g)
+    ==========================  every length times L, gravity too: times stay what they are, and so does the step
+
+All numbers are told in units of L, and all answers must be the same. What differs is what an engine measures in metres
+of its own: slops, margins and thresholds of speed that suit bodies of about one metre. A threshold of 1 cm is nothing
+for a ship and all of a pebble.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from adapters.scene import Pair, Scene
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics, sliding
+from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.scenes.parts import along, at, ball, floor, states, upward
+
+#: In units of L: radius and drop of the ball, size of the box, and how far apart they are.
+RADIUS, DROP, SIDE, APART = 0.5, 2.0, 1.0, 5.0
+#: Restitution of the ball; friction, speed of the box in L/s, and gravity in L/s^2.
+E, MU, SPEED = 0.5, 0.3, 2.0
+
+
+def _sliding(p: Params) -> dict[str, float]:
+    """What `validation.sliding` asks of a scene, in metres."""
+    return {"v": SPEED * p["length"], "mu": MU, "g": GRAVITY * p["length"], "mass": p["mass"]}
+
+
+def _impact(p: Params) -> float:
+    """Speed at which the ball lands [m/s]."""
+    return p["length"] * math.sqrt(2.0 * GRAVITY * DROP)
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the scene: the ball is let go ``APART`` behind the box, which slides away from it."""
+    p, length = params, params["length"]
+    dropped = ball("ball", dimension, p["mass"], RADIUS * length, 0.0)
+    dropped = at(dropped, dimension, along(dimension, -APART * length, (RADIUS + DROP) * length))
+    box = sliding.launched(dimension, _sliding(p), SIDE * length, SIDE * length)
+    pairs = (Pair(restitution=0.0, friction=MU), Pair("floor", "ball", E, MU))
+    # Long enough for the box to stop and for the ball to rise and land again.
+    duration = max(sliding.lasts(_sliding(p)), (1.0 + 2.0 * E) * math.sqrt(2.0 * DROP / GRAVITY))
+    gravity = upward(dimension, -GRAVITY * length)
+    return Scene("scales", 1, dimension, (floor(dimension), dropped, box), pairs, gravity, duration, p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Coulomb's and Newton's laws, over L."""
+    length, way = scene.params["length"], sliding.exact(_slide(scene))
+    kept = ("stopping_distance", "braking", "end_speed", "hop", "turned", "astray")
+    return {name: way[name] / length for name in kept if name in way} | {"apex": E**2 * DROP}
+
+
+def _slide(scene: Scene) -> Scene:
+    """The same scene, with the parameters of what slides."""
+    return replace(scene, params=_sliding(scene.params))
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Way and braking of the box, and the first apex of the ball, over L."""
+    length, d = scene.params["length"], scene.dimension
+    found = sliding.measure(_slide(scene), trajectory)
+    measured = {name: (None if value is None else value / length, why) for name, (value, why) in found.items()}
+    height, speed = trajectory.pose[:, 1, d - 1] - RADIUS * length, trajectory.twist[:, 1, d - 1]
+    _, tops = metrics.apexes(trajectory.t, height, speed, 2.0 * GRAVITY * length * trajectory.dt)
+    return measured | {"apex": (float(tops[0]) / length, "") if len(tops) else (0.0, "the ball does not rise again")}
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """What a slide and a rebound owe in metres, over L: the same at every length."""
+    p, length = scene.params, scene.params["length"]
+    metres = {name: value * length for name, value in truth.items()}
+    found = [
+        Check(
+            c.metric,
+            "L" if c.unit == "m" else c.unit.replace("m/", "L/"),
+            truth[c.metric],
+            c.bound / length,
+            c.because,
+            c.source,
+        )
+        for c in sliding.checks(_slide(scene), dt, metres, (APART + RADIUS + DROP) * length)
+        if c.bound is not None
+    ]
+    speed, gravity = _impact(p), GRAVITY * length
+    apex = bounds.Bound(
+        (bounds.rebound_late(E, speed, dt) + gravity * dt * dt / 8.0) / length,
+        "impact located within a step: (1 - e^2 + e (1+e)/2) v dt; + g dt^2/8",
+    )
+    return [*found, apex.check("apex", "L", truth["apex"], "Newton's law of restitution; energy in between")]
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Larger of the relative errors of the way of the box and of the apex of the ball."""
+    truth, off = exact(scene), []
+    for metric in ("stopping_distance", "apex"):
+        value, reason = found[metric]
+        if value is None:
+            return None, reason
+        off.append(abs(value / truth[metric] - 1.0))
+    return max(off), ""
+
+
+SCENE = CanonicalScene(
+    name="scales",
+    family="hard",
+    version=1,
+    title="The same scene in millimetres and in kilometres",
+    figure=__doc__ or "",
+    law="stops after v^2/(2 mu g), rises to e^2 of its fall: in units of L the same whatever L and the mass are",
+    dimensions=(2,),
+    parameters=(
+        Parameter("length", 1e-3, "m", "the unit L of all lengths: 1e-3 is a pebble, 1e3 a mountain", 1e-6, 1e6),
+        Parameter("mass", 1.0, "kg", "of either body: a gram is 1e-3, a ton 1e3", 1e-9, 1e9),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=states,
+    quick=(Variation({}), Variation({"length": 1e3})),
+    full=tuple(Variation({"length": length, "mass": mass}) for length in (1e-3, 1.0, 1e3) for mass in (1e-3, 1.0, 1e3)),
+    planted=({}, {"length": 1e3}),
+    primary=Primary(
+        "unit error",
+        "1",
+        "larger of the relative errors of the way of the box and the rise of the ball, in millimetres and kilometres",
+        "a unit is no physics: what depends on it is a number of the engine's own",
+        lambda dt: [{}, {"length": 1e3}],
+        error,
+        "the whole scene: the ball bounces and the box slides",
+    ),
+    words={
+        "stopping_distance": "stops after {value}",
+        "braking": "brakes with {value}",
+        "end_speed": "still moves with {value}",
+        "turned": "turns: its corners move by {value}",
+        "apex": "rises to {value}",
+    },
+)
