@@ -24,7 +24,7 @@ from adapters.needs import Needs
 from adapters.reference.profiles import PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
-from adapters.reference.start import jam_at_the_start, overlap_at_the_start
+from adapters.reference.start import overlap_at_the_start
 from adapters.scene import Scene
 
 #: Steps cut at events, with constant accelerations between them.
@@ -88,7 +88,7 @@ class ReferenceEngine(Engine):
             return str(error).splitlines()[0]
         if self.facts.roles[profile] != "solution":
             return None
-        return overlap_at_the_start(scene) or jam_at_the_start(scene)
+        return overlap_at_the_start(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Disc, Scene, Sphere
 
 
 def overlap_at_the_start(scene: Scene) -> str | None:
@@ -41,39 +41,3 @@ def _reach(body: Body) -> float:
     if isinstance(body.shape, Box):
         return float(np.linalg.norm(body.shape.half_extents))
     return body.shape.radius if isinstance(body.shape, Disc | Sphere) else np.inf
-
-
-def jam_at_the_start(scene: Scene) -> str | None:
-    """Say which body starts on one corner that slides and cannot go on sliding; None if there is none. Planar only.
-
-    Painleve: with friction beyond ``W_nn/W_nt`` no force of a slide keeps the corner up, and it has to stop at
-    once, by an impact without a collision. The solver's steps are cut at collisions; this one it would find by a step
-    of its fixed scheme, which its certificate refuses.
-    """
-    if scene.dimension != 2:
-        return None
-    for floor, body in product(scene.bodies, scene.bodies):
-        if not isinstance(floor.shape, HalfSpace) or not isinstance(body.shape, Box) or body.motion != "free":
-            continue
-        normal = np.array(floor.shape.normal) / np.linalg.norm(floor.shape.normal)
-        tangent = np.array([normal[1], -normal[0]])
-        c, s = np.cos(body.pose[2]), np.sin(body.pose[2])
-        arms = np.array(list(product((-1.0, 1.0), repeat=2))) * body.shape.half_extents @ np.array([[c, s], [-s, c]])
-        gaps = (arms + body.pose[:2]) @ normal - floor.shape.offset
-        touching = np.flatnonzero(np.abs(gaps) <= 1e-9 * body.shape.smallest_size)
-        if len(touching) != 1:
-            continue
-        arm = arms[touching[0]]
-        velocity = np.array(body.twist[:2]) + body.twist[2] * np.array([-arm[1], arm[0]])
-        slip, turning = (
-            float(velocity @ tangent),
-            [float(arm[0] * way[1] - arm[1] * way[0]) for way in (normal, tangent)],
-        )
-        own = 1.0 / body.mass + turning[0] ** 2 / float(np.sum(body.inertia))
-        coupled = turning[0] * turning[1] / float(np.sum(body.inertia))
-        friction = scene.material(floor.name, body.name).friction
-        if slip != 0.0 and own - friction * np.sign(slip) * coupled <= 0.0:
-            return (
-                f"{body.name} jams on {floor.name} at the start: an impact without a collision, which is no event here"
-            )
-    return None

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from adapters.reference.start import jam_at_the_start
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -196,16 +195,6 @@ def test_a_rod_that_slides_where_it_jams_or_stops_where_it_slides_fails():
 def test_what_neither_slides_nor_stays_jammed_is_refused_by_name(params, named):
     with pytest.raises(SceneError, match=rf"painleve\.{named}"):
         made(**params)
-
-
-def test_a_solver_that_promises_a_solution_is_asked_for_no_jam():
-    assert "rod jams on floor" in jam_at_the_start(made()[1])
-    assert jam_at_the_start(made(ratio=0.99, v=60.0)[1]) is None
-    mirrored = made()[1]
-    rod = mirrored.bodies[1]
-    rod = replace(rod, pose=(rod.pose[0], rod.pose[1], -rod.pose[2]), twist=(-rod.twist[0], 0.0, 0.0))
-    assert "rod jams" in jam_at_the_start(replace(mirrored, bodies=(mirrored.bodies[0], rod)))
-    assert jam_at_the_start(replace(mirrored, bodies=(mirrored.bodies[0], replace(rod, twist=(6.0, 0.0, 0.0))))) is None
 
 
 def test_a_turn_that_does_not_get_there_is_none_and_others_are_integrated():
