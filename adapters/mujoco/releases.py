@@ -18,8 +18,8 @@ RELEASES = Releases(
     distributions=(Distribution("mujoco", "<4.0.0"), Distribution("mujoco-core", ">=4.0.0")),
     known=">=3.0.0,<5",
     requirements=(
-        Requirement("<3.1.3", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
-                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.2)"),
+        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
+                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.3)"),
     ),
     differences=(
         Difference("<3.2.4", "MjSpec is missing, or takes no attributes where a body, geom or pair is added",

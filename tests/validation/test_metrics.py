@@ -448,7 +448,7 @@ def test_a_crossing_lies_between_its_samples_though_its_cubic_crosses_elsewhere_
 def test_what_only_just_gets_to_its_level_crosses_it_there(rate, level):
     """A double root, which round-off makes complex or moves beyond the sample."""
     (time, _), (speed, _) = metrics.crossing(
-        np.array([3.0, 5.0]), level + np.array([-1.0, 0.0]), np.array([0.5 * rate, 0.0]), level
+        np.array([3.0, 5.0]), level + np.array([-4.0, 0.0]), np.array([2.0 * rate, 0.0]), level
     )
     assert (time, speed) == (pytest.approx(5.0, abs=1e-4), pytest.approx(0.0, abs=1e-4))
 
@@ -505,6 +505,7 @@ def test_what_has_turned_is_the_largest_angle_against_the_first_pose(angles):
         assert metrics.turned(pose) == pytest.approx(largest, abs=1e-7)
 
 
-def test_half_a_turn_in_space_is_the_largest_there_is():
+def test_half_a_turn_in_space_is_the_largest_there_is_and_in_the_plane_whole_turns_count():
+    assert metrics.turned(np.array([(0.0, 0.0, 0.5), (0.0, 0.0, 10.5)])) == 10.0
     pose = np.array([(0.0, 0.0, 0.0, *q) for q in turned((0.6, 0.0, 0.8), (0.0, math.pi, 5.0))])
     assert metrics.turned(pose) == pytest.approx(math.pi)

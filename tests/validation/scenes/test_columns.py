@@ -167,6 +167,13 @@ def test_a_side_is_the_height_of_the_lowest_body(half, side):
     assert columns.fate(flat, found(energy=0.99 * 48.0 * side)) == ""
 
 
+def test_in_space_a_side_is_the_height_as_well():
+    scene = column(3)
+    flat = replace(scene.bodies[1], shape=Box((0.5, 0.5, 0.25)))
+    lower = replace(scene, bodies=(scene.bodies[0], flat, *scene.bodies[2:]))
+    assert columns.fate(lower, found(0.26)) == "toppled" and columns.fate(lower, found(0.24)) == ""
+
+
 def test_what_is_not_made_of_boxes_has_no_side_and_no_fate():
     for dimension, shape in ((2, Disc(0.5)), (3, Sphere(0.5))):
         scene = column(dimension)
