@@ -99,7 +99,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
 
 def as_junit(rows: Sequence[Plain]) -> str:
     """JUnit XML: a suite per engine and profile; only what makes the command fail is a failure."""
-    suites: dict[str, TestSuite] = {}
+    cases: dict[str, list[TestCase]] = {}
     for row in rows:
         name = f"{row['engine']}/{row['profile']}"
         params = _flat(row["slot"]["params"])
@@ -108,9 +108,11 @@ def as_junit(rows: Sequence[Plain]) -> str:
             f"{name}.{row['scene']}{row['dimension']}d",
         )
         _mark_case(case, row)
-        suites.setdefault(name, TestSuite(name)).add_testcase(case)
+        cases.setdefault(name, []).append(case)
     document = JUnitXml("contact-crosscheck")
-    for suite in suites.values():
+    for name, own in cases.items():
+        suite = TestSuite(name)
+        suite.add_testcases(own)  # in one go: a suite counts all that it holds each time something is added
         document.add_testsuite(suite)
     document.update_statistics()
     return bytes(document.tostring()).decode()

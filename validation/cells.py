@@ -28,6 +28,9 @@ from validation.posed import is_known, resolve
 MOST_ITERATIONS, MOST_ULPS = 10**6, 10**4
 #: Most steps of a cell, and most samples (steps times bodies): a state of a body takes up to 104 bytes.
 MOST_STEPS, MOST_SAMPLES = 10**7, 5 * 10**7
+#: Longest step [s]: the probes that measure an adapter resolve nothing coarser. At 0.15 s they do not tell friction any
+#: more, at 0.25 s their boxes turn over between two samples; a receipt would speak of the step, not of the engine.
+LONGEST_DT = 0.1
 
 
 class Outcome(Enum):
@@ -306,8 +309,10 @@ def check_size(scene: Scene, dt: float) -> None:
     Raises
     ------
     SceneError
-        Naming the step, if it needs too many steps or samples.
+        Naming the step, if it is longer than what probes resolve, or needs too many steps or samples.
     """
+    if dt > LONGEST_DT:
+        raise SceneError(f"dt: {format_dt(dt)} s is longer than {LONGEST_DT:g} s: nothing can be measured at it")
     steps = scene.duration / dt
     if not steps <= MOST_STEPS:
         raise SceneError(f"dt: {format_dt(dt)} makes {steps:.3g} steps of {scene.duration:g} s, at most {MOST_STEPS:g}")

@@ -18,13 +18,14 @@ RELEASES = Releases(
     distributions=(Distribution("mujoco", "<4.0.0"), Distribution("mujoco-core", ">=4.0.0")),
     known=">=3.0.0,<5",
     requirements=(
-        Requirement("<3.1.3", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
-                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.2)"),
+        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
+                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.3)"),
     ),
     differences=(
         Difference("<3.2.4", "MjSpec is missing, or takes no attributes where a body, geom or pair is added",
                    "the model is written as MJCF by `Mjcf`, which is the same model to the last bit",
-                   "measured: 3.1.6 has none, 3.2.0 to 3.2.3 refuse attributes, 3.2.4 takes them"),
+                   "measured: 3.1.6 has none, 3.2.0 to 3.2.2 refuse attributes, 3.2.3 its own options, 3.2.4 "
+                   "gives and takes all of them"),
         Difference("<3.2.4", "there is no flag that disables autoreset: a state that is not finite starts anew",
                    "the counters of bad states are read after every advance; one that counts ends the run",
                    "measured: mjtDisableBit.mjDSBL_AUTORESET is there from 3.2.4 on"),
@@ -53,6 +54,7 @@ def empty_spec(mujoco: Any) -> Any:
     try:
         spec = mujoco.MjSpec()
         spec.worldbody.add_body(name="asked")
+        spec.option  # noqa: B018 - 3.2.3 has it and cannot give it away
     except (AttributeError, TypeError):
         return Mjcf(mujoco)
     return mujoco.MjSpec()

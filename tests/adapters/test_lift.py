@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, lowered
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 
 
@@ -107,3 +108,71 @@ def test_contacts_lose_only_what_is_out_of_the_plane() -> None:
     assert flat.normal.tolist() == [[0.6, 0.8]]
     assert flat.impulse.tolist() == [[4.0, 6.0]]
     assert (flat.a[0], flat.b[0], flat.gap[0]) == (0, 1, -0.1)
+
+
+def test_a_lifted_scene_lowers_to_itself() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        pose = (*rng.normal(size=2), rng.uniform(-math.pi, math.pi))
+        flat = planar_scene(pose, tuple(rng.normal(size=3)))
+        back = lowered(lift(flat))
+        assert back is not None
+        # The angle goes through a half-angle's sine and cosine: a few units of round-off of pi.
+        assert back.bodies[1].pose == pytest.approx(pose, rel=0.0, abs=2e-15)
+        own = [replace(body, pose=body.pose[:2]) for body in flat.bodies]
+        assert [replace(body, pose=body.pose[:2]) for body in back.bodies] == own
+        assert replace(back, bodies=flat.bodies) == flat
+
+
+def spatial_scene(**changes: object) -> Scene:
+    """A box in the plane whose three sides and moments all differ."""
+    values = {
+        "pose": (1.0, 0.0, 2.0, math.cos(0.2), 0.0, -math.sin(0.2), 0.0), "twist": (3.0, 0.0, 4.0, 0.0, 5.0, 0.0),
+        "force": (6.0, 0.0, 7.0), "torque": (0.0, 8.0, 0.0),
+    } | changes  # fmt: skip
+    floor = Body("floor", HalfSpace((0.6, 0.0, 0.8), 0.25), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    box = Body("box", Box((0.5, 0.3, 0.2)), 2.0, (0.1, 0.2, 0.3), **values)  # type: ignore[arg-type]
+    return Scene("solid", 1, 3, (floor, box), (Pair(),), (1.0, 0.0, -9.0), 1.0)
+
+
+def test_a_spatial_scene_in_the_plane_is_planar() -> None:
+    flat = lowered(spatial_scene())
+    assert flat is not None
+    floor, box = flat.bodies
+    assert (flat.dimension, flat.gravity) == (2, (1.0, -9.0))
+    assert floor.shape == HalfSpace((0.6, 0.8), 0.25)
+    assert (box.shape, box.mass, box.inertia) == (Box((0.5, 0.2)), 2.0, 0.2)
+    assert box.pose == pytest.approx((1.0, 2.0, 0.4), abs=1e-15)
+    assert (box.twist, box.force, box.torque) == ((3.0, 4.0, -5.0), (6.0, 7.0), (-8.0,))
+
+
+def test_what_does_not_move_freely_may_have_one_moment_and_keeps_it() -> None:
+    scene = spatial_scene()
+    fixed = replace(scene.bodies[1], inertia=0.7, motion="fixed", twist=(0.0,) * 6)
+    flat = lowered(replace(scene, bodies=(scene.bodies[0], fixed)))
+    assert flat is not None and flat.bodies[1].inertia == 0.7
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pose": (1.0, 1e-300, 2.0, 1.0, 0.0, 0.0, 0.0)},
+        {"pose": (1.0, 0.0, 2.0, math.cos(0.2), math.sin(0.2), 0.0, 0.0)},
+        {"pose": (1.0, 0.0, 2.0, math.cos(0.2), 0.0, 0.0, math.sin(0.2))},
+        {"twist": (3.0, 1.0, 4.0, 0.0, 5.0, 0.0)},
+        {"twist": (3.0, 0.0, 4.0, 1.0, 5.0, 0.0)},
+        {"twist": (3.0, 0.0, 4.0, 0.0, 5.0, 1.0)},
+        {"force": (6.0, 1.0, 7.0)},
+        {"torque": (1.0, 8.0, 0.0)},
+        {"torque": (0.0, 8.0, 1.0)},
+    ],
+)
+def test_what_lies_moves_or_is_pulled_out_of_the_plane_is_not_planar(changes: dict[str, object]) -> None:
+    assert lowered(spatial_scene(**changes)) is None
+
+
+def test_gravity_or_a_face_across_the_plane_makes_a_scene_spatial() -> None:
+    scene = spatial_scene()
+    assert lowered(replace(scene, gravity=(1.0, 0.5, -9.0))) is None
+    across = replace(scene.bodies[0], shape=HalfSpace((0.0, 0.6, 0.8), 0.25))
+    assert lowered(replace(scene, bodies=(across, scene.bodies[1]))) is None

@@ -89,6 +89,29 @@ def test_load_straight_into_a_tilted_face_is_no_slide_however_its_normal_is_roun
             assert needs(scene(tilted, ball(), pair=Pair(friction=0.5), gravity=gravity)).slide is slides
 
 
+@pytest.mark.parametrize(
+    ("platform", "twist", "gravity", "slides"),
+    [
+        ({"shape": Box((2.0, 0.5))}, (0.5, 0.0, 0.0), (0.0, -8.0), True),
+        ({"shape": Box((2.0, 0.5))}, (0.5, 0.0, 0.0), (0.0, -1.0), True),
+        ({"shape": Box((2.0, 0.5))}, (0.0, -0.5, 0.0), (0.0, -8.0), False),  # it falls
+        ({"shape": Box((2.0, 0.5))}, (0.5, 0.0, 0.0), (0.0, 0.0), False),  # nothing presses it down
+        ({"shape": Box((2.0, 0.5))}, (0.3, -0.4, 0.0), (6.0, -8.0), False),  # it falls, aslant
+        ({"shape": Box((2.0, 0.5))}, (0.5, 0.0, 0.0), (6.0, -8.0), True),
+        ({"shape": Box((2.0, 0.5)), "motion": "free", "mass": 1.0}, (0.5, 0.0, 0.0), (0.0, -8.0), False),
+        ({"shape": Disc(0.5)}, (0.5, 0.0, 0.0), (0.0, -8.0), False),
+    ],
+)
+def test_what_moves_level_over_a_fixed_box_slides(platform, twist, gravity, slides):
+    under = Body("platform", **{"motion": "fixed", **platform})
+    assert needs(scene(under, ball(twist=twist), pair=Pair(friction=0.25), gravity=gravity)).slide is slides
+
+
+@pytest.mark.parametrize(("speed", "slides"), [(1e-12, False), (1.5e-12, True)])
+def test_round_off_of_a_body_that_hardly_moves_is_that_of_one_metre_a_second(speed, slides):
+    assert needs(scene(FLOOR, ball(twist=(speed, 0.0, 0.0)), pair=Pair(friction=0.25))).slide is slides
+
+
 # ---- materials -----------------------------------------------------------------------------------------------------
 
 

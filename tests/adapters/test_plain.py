@@ -78,3 +78,93 @@ def test_what_is_plain_stays_as_it_is():
     data = {"mass": 1.5, "n": 3, "on": True, "off": None, "names": ["a", "b"], "deep": {"x": [1.0, {"y": "z"}]}}
     assert plain(data) == data
     assert len(one_line("n" * 200, NAME)) == NAME
+
+
+@pytest.mark.parametrize(
+    ("value", "made"),
+    [
+        (2**63 - 1, 2**63 - 1),
+        (-(2**63) + 1, -(2**63) + 1),
+        (2**63, "0x8000000000000000"),
+        (10**18, 10**18),
+        (-(2**63), "-0x8000000000000000"),
+        (math.nan, "nan"),
+        (-math.inf, "-inf"),
+        (np.float64(math.inf), "inf"),
+    ],
+)
+def test_a_number_that_json_readers_cannot_hold_is_its_text(value, made):
+    assert plain(value) == made and type(plain(value)) is type(made)
+
+
+class Listed:
+    """Behaves like an array of numpy: it can be listed, and says how large it is."""
+
+    def __init__(self, size):
+        self.size = size
+
+    def tolist(self):
+        return [1.5, 2.5]
+
+    def __str__(self):
+        return "too large"
+
+
+class Sizeless:
+    def tolist(self):
+        return [1.5]
+
+    def __str__(self):
+        return "of no known size"
+
+
+def test_what_can_be_listed_is_a_list_unless_it_is_too_large_or_does_not_say_how_large_it_is():
+    assert plain(Listed(2)) == [1.5, 2.5]
+    assert plain(Listed(SIZE - 1)) == [1.5, 2.5]
+    assert plain(Listed(SIZE)) == "too large"
+    assert plain(Sizeless()) == "of no known size"
+
+
+@pytest.mark.parametrize("nest", [lambda inner: [inner], lambda inner: {"a": inner}])
+def test_levels_are_counted_one_by_one_from_the_outermost(nest):
+    value = 1.5
+    for _ in range(LEVELS):
+        value = nest(value)
+    assert plain(value) == value  # as deep as may be
+    deeper = plain(nest(value))
+    for _ in range(LEVELS):
+        deeper = deeper["a"] if isinstance(deeper, dict) else deeper[0]
+    assert isinstance(deeper, str)  # what is deeper is its text
+    numbers = np.array([1.5])
+    for _ in range(LEVELS - 1):
+        numbers = nest(numbers)
+    assert isinstance(plain(nest(numbers)), dict | list)
+    bottom = plain(numbers)
+    for _ in range(LEVELS - 1):
+        bottom = bottom["a"] if isinstance(bottom, dict) else bottom[0]
+    assert bottom == [1.5]
+
+
+def test_of_what_is_too_large_the_beginning_is_kept_to_the_last_item_that_begins_within_it():
+    # A word of n characters counts for n + 1, a number for 20.
+    half = "x" * 400
+    many = [half] * (2 * SIZE // 401)
+    assert len(plain(many)) == math.ceil(SIZE / 401)
+    exactly = ["x" * 63] * (SIZE // 64)
+    assert len(plain([*exactly, "one more"])) == len(exactly)
+    assert len(plain([*exactly[1:], "x" * 62, "one more"])) == len(exactly) + 1
+    table = plain({f"{k:063d}"[-63:]: "y" * 63 for k in range(SIZE)})
+    assert len(table) == SIZE // 128
+    both = plain({"first": many, "second": [1.0]})
+    assert list(both) == ["first"]
+
+
+def test_a_long_text_is_not_read_to_its_end_before_its_first_line_is_known():
+    assert one_line("\n" * (8 * REASON) + "late") == ""
+    assert one_line("\n" * (8 * REASON - 4) + "late") == "late"
+
+
+def test_text_of_the_longest_length_is_whole_and_keys_are_names():
+    assert one_line("x" * REASON) == "x" * REASON
+    assert one_line("x" * (REASON + 1)) == "x" * (REASON - 4) + " ..."
+    assert list(plain({"k" * (NAME + 1): 1})) == ["k" * (NAME - 4) + " ..."]

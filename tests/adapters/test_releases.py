@@ -127,6 +127,17 @@ def test_an_mjspec_that_takes_no_attributes_is_replaced():
     assert isinstance(empty_spec(older_mujoco(MjSpec=lambda: SimpleNamespace(worldbody=body))), Mjcf)
     assert isinstance(empty_spec(older_mujoco()), Mjcf)
 
+    class Keeping:
+        """Takes attributes, as 3.2.3 does, and cannot hand out its options."""
+
+        worldbody = SimpleNamespace(add_body=lambda **attributes: None)
+
+        @property
+        def option(self):
+            raise TypeError("Unable to convert function return value to a Python type!")
+
+    assert isinstance(empty_spec(older_mujoco(MjSpec=Keeping)), Mjcf)
+
 
 def test_impulses_of_an_opaque_arbiter_are_equal_parts_of_its_total():
     pymunk = pytest.importorskip("pymunk")

@@ -129,3 +129,173 @@ def test_a_smooth_metric_is_extrapolated_and_compared_with_its_truth():
     assert off.limit is Limit.ELSEWHERE and off.value == pytest.approx(truth - 0.1, abs=1e-9)
     (same,) = extrapolations([slide(dt, truth) for dt in DTS])
     assert same.limit is Limit.TRUTH and same.order is None
+
+
+# ---- every word and limit of a verdict -----------------------------------------------------------------------------
+
+
+def said(errors, dts=None, **options):
+    return limit_of(dts or DTS[: len(errors)], errors, **options)[1:]
+
+
+def test_what_has_too_few_errors_says_so():
+    assert limit_of([], []) == (None, Limit.NOISY, "no step has a measured error")
+    assert limit_of(DTS[:2], [0.1, 0.05]) == (None, Limit.NOISY, "2 steps are too few: an order needs three")
+    exact = (None, Limit.TRUTH, "exact to round-off at every step")
+    assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:1], [0.25], 0.25) == exact
+
+
+def test_a_level_is_three_errors_that_hardly_differ_over_a_factor_of_four():
+    assert said([9.0, 0.54, 0.45, 0.4]) == (Limit.ELSEWHERE, "levels off at an error of 0.4")
+    assert said([9.0, 0.541, 0.45, 0.4])[0] is not Limit.ELSEWHERE
+    assert said([0.5, 0.45, 0.4], [0.1, 0.05, 0.0251])[0] is not Limit.ELSEWHERE
+    assert said([0.5, 0.45, 0.4], [0.1, 0.05, 0.025])[0] is Limit.ELSEWHERE
+    assert said([9.0, 0.5, 0.45, 0.4], [0.2, 0.05, 0.04, 0.03])[0] is not Limit.ELSEWHERE  # .05 to .03 s
+
+
+def test_an_order_is_told_with_its_error_and_judged_at_two_of_them():
+    truth = said([0.4, 0.1, 0.025])
+    assert truth == (Limit.TRUTH, "order 2.00 +- 0.00 over 3 steps")
+    assert said([0.025, 0.1, 0.4]) == (Limit.NOT, "the error grows as the step shrinks, order -2.00 +- 0.00")
+    fit, limit, because = limit_of(DTS[:4], [0.1, 0.9, 0.05, 0.8])
+    assert (limit, because) == (
+        Limit.NOISY, f"order {fit.order:.2f} +- {fit.standard_error:.2f}: neither falling nor level")  # fmt: skip
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("slope", "clear"), [(2.1, True), (1.9, False), (2.9, True)])
+def test_an_order_counts_from_two_standard_errors_on(sign, slope, clear):
+    """Four steps whose logarithms scatter so that the standard error is known: of + - - + it is sqrt(2/5)/log 2 a."""
+    a = 0.1
+    scatter = np.array([a, -a, -a, a])
+    error = math.sqrt(float(scatter @ scatter) / 2.0 / (5.0 * math.log(2.0) ** 2))
+    errors = np.exp(scatter + sign * slope * error * np.log(DTS[:4]))
+    fit, limit, _ = limit_of(DTS[:4], list(errors))
+    assert fit.standard_error == pytest.approx(error) and fit.order == pytest.approx(sign * slope * error)
+    told = Limit.TRUTH if sign > 0.0 else Limit.NOT
+    level = max(errors[-3:]) <= 1.35 * min(errors[-3:])
+    assert limit is (Limit.ELSEWHERE if level else told if clear else Limit.NOISY)
+
+
+def test_errors_at_the_floor_carry_no_order():
+    fit, limit, because = limit_of(DTS[:5], [0.4, 1e-3, 0.1, 1e-3, 0.025], 1e-3)
+    assert (limit, because) == (Limit.TRUTH, "order 1.00 +- 0.00 over 3 steps") and fit.order == pytest.approx(1.0)
+    _, limit, because = limit_of(DTS[:4], [1e-3, 0.4, 1e-3, 0.1], 1e-3)
+    assert (limit, because) == (Limit.NOISY, "too few errors above round-off for an order")
+
+
+def test_a_fall_to_round_off_is_told_with_its_step():
+    assert said([1e-3, 1e-9, 1e-15]) == (
+        Limit.NOISY, "round-off at dt = 0.00417 s only, from 1e-09 one step coarser")  # fmt: skip
+    assert said([1e-3, 1e-11, 1e-15]) == (Limit.TRUTH, "falls to round-off at dt = 0.00417 s ")
+    assert said([1e-3, 1e-2, 1e-15]) == (Limit.NOISY, "round-off at dt = 0.00417 s, but errors rise on the way")
+    # 64 times the floor in one halving is the sixth order, which may be; and a rise within a level is none.
+    assert said([1.0, 0.064, 0.001], floor=0.001)[0] is Limit.TRUTH
+    assert said([1.0, 0.0641, 0.001], floor=0.001)[0] is Limit.NOISY
+    assert said([0.001, 0.00135, 1e-15])[0] is Limit.NOISY  # from 1.35e-3 in one step: no method does that
+    assert said([1e-11, 1.34e-11, 1e-15])[0] is Limit.TRUTH
+    assert said([1e-11, 1.36e-11, 1e-15])[0] is Limit.NOISY
+    assert said([1e-3, 1e-12, 1e-15])[0] is Limit.TRUTH  # at the floor is round-off, two steps before the end
+
+
+def test_two_positive_errors_have_a_slope_and_no_standard_error():
+    assert observed_order(DTS[:1], [0.5]) is None
+    fit = observed_order(DTS[:2], [0.5, 0.25])
+    assert (fit.order, fit.standard_error) == (pytest.approx(1.0), math.inf)
+    assert observed_order(DTS[:3], [0.5, 0.0, 0.25]) is None
+    assert observed_order(DTS[:3], [0.5, 1e-290, 0.25]) is not None
+
+
+def test_differences_that_are_equal_or_steps_that_are_nearly_in_proportion():
+    assert richardson(DTS[:3], [3.0, 2.0, 1.0]) is None  # they do not shrink
+    assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-7)], [1.4, 1.2, 1.1]) is not None
+    assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-5)], [1.4, 1.2, 1.1]) is None
+    order, limit, band = richardson([4.0, 2.0, 1.0], [9.0, 5.0, 3.0])
+    assert (order, limit, band) == (1.0, 1.0, 2.5)  # the band is a quarter wider than the correction of 2
+    assert richardson([4.0, 2.0, 1.0], [1e9, 1.0, 0.0])[0] == 6.0  # beyond, it is round-off's
+
+
+# ---- what is extrapolated of cells ---------------------------------------------------------------------------------
+
+TRUTH = 9.81 * (math.sin(math.atan(0.55)) - 0.5 * math.cos(math.atan(0.55)))
+
+
+def extrapolated(*values, dts=None):
+    (found,) = extrapolations([slide(dt, value) for dt, value in zip(dts or DTS, values, strict=False)])
+    return found
+
+
+def test_an_extrapolation_says_of_which_cell_and_number_it_is():
+    found = extrapolated(TRUTH + 0.8, TRUTH + 0.4, TRUTH + 0.2)
+    assert (found.scene, found.dimension, found.engine, found.profile) == ("incline", 2, "toy", "default")
+    assert (found.metric, found.unit, found.params) == ("acceleration", "m/s^2", "ratio=1.1")
+    assert found.truth == pytest.approx(TRUTH) and found.dts == DTS[:3]
+    assert found.values == pytest.approx((TRUTH + 0.8, TRUTH + 0.4, TRUTH + 0.2))
+    assert (found.order, found.value, found.band) == (
+        pytest.approx(1.0), pytest.approx(TRUTH), pytest.approx(0.25))  # fmt: skip
+    assert found.limit is Limit.TRUTH
+    assert found.because == f"order 1.00, limit {TRUTH:.6g} +- 0.3, truth {TRUTH:.6g}"
+
+
+@pytest.mark.parametrize(
+    ("offsets", "limit", "because"),
+    [
+        ((0.5, 0.2, 0.2, 0.2), Limit.ELSEWHERE, f"the same value at every step, {TRUTH + 0.2:.6g}"),
+        ((0.5, 0.0, 0.0, 0.0), Limit.TRUTH, "the same value at every step, the truth"),
+        # Four kinds of differences that do not shrink: growing away from the truth, towards it, and to and fro.
+        ((0.0, 0.1, 0.3), Limit.NOT, "differences grow"),
+        ((0.0, 0.1, -0.2), Limit.NOT, "differences grow"),
+        ((0.6, 0.5, 0.3), Limit.NOISY, "differences do not shrink with one sign"),
+        ((0.1, 0.4, 0.3), Limit.NOISY, "differences do not shrink with one sign"),
+        ((9.0, 0.0, 0.1, 0.3), Limit.NOT, "differences grow"),
+    ],
+)
+def test_values_that_cannot_be_extrapolated_have_a_reason(offsets, limit, because):
+    found = extrapolated(*(TRUTH + offset for offset in offsets))
+    assert (found.limit, found.because) == (limit, because)
+    if "same value" in because:
+        assert found.value == pytest.approx(TRUTH + offsets[-1]) and found.order is None
+        assert found.band == pytest.approx(1e-12 * (TRUTH + max(offsets)), rel=1e-3) or found.band == 1e-12
+    else:
+        assert (found.order, found.value, found.band) == (None, None, None)
+
+
+def test_round_off_is_that_of_the_largest_value_and_of_one_at_least():
+    for off, limit in ((1.9e-12, Limit.TRUTH), (2.1e-12, Limit.ELSEWHERE)):
+        assert extrapolated(*[TRUTH + off] * 3).limit is limit  # the truth is below 1 m/s^2: one counts
+    large = [TRUTH + 1e6, *[TRUTH + 1.9e-6] * 3]
+    assert extrapolated(*large).limit is Limit.TRUTH
+    assert extrapolated(*large).band == pytest.approx(1e-6, rel=1e-5)
+    assert extrapolated(TRUTH + 1e6, *[TRUTH + 2.1e-6] * 3).limit is Limit.ELSEWHERE
+
+
+def test_cells_that_are_moved_starved_or_without_an_answer_are_no_part_of_a_series():
+    def cell(dt, **changes):
+        own = slide(dt, 1.0 + dt)
+        return replace(own, slot=replace(own.slot, **changes))
+
+    assert extrapolations([cell(dt) for dt in DTS[:2]]) == []
+    assert len(extrapolations([cell(dt) for dt in DTS[:3]])) == 1
+    for changes in ({"ulp": 1}, {"iterations": 4}):
+        assert extrapolations([cell(DTS[0]), cell(DTS[1]), cell(DTS[2], **changes)]) == []
+    crashed = replace(cell(DTS[2]), outcome=Outcome.CRASHED)
+    assert extrapolations([cell(DTS[0]), cell(DTS[1]), crashed]) == []
+    two = [cell(dt, profile=profile) for dt in DTS[:3] for profile in ("default", "tuned")]
+    two += [cell(dt, engine="other", dimension=3) for dt in DTS[:3]]
+    assert [(e.engine, e.profile, e.dimension) for e in extrapolations(two)] == [
+        ("toy", "default", 2), ("toy", "tuned", 2), ("other", "default", 3)]  # fmt: skip
+
+
+def test_a_value_that_is_missing_at_one_step_or_has_no_truth_is_not_extrapolated():
+    cells = [slide(dt, 1.0 + dt) for dt in DTS[:3]]
+    assert extrapolations([*cells[:2], observed(cells[2].slot, {"creep": 0.0})]) == []
+    assert extrapolations([*cells[:2], observed(cells[2].slot, {"acceleration": None})]) == []
+
+
+def test_cells_beside_the_declared_ones_and_moved_ones_have_no_part_in_an_error():
+    cells = [observed(impact_slot(dt, k), {"rebound_ratio": 0.8 + dt}) for dt in DTS[:2] for k in range(PHASES)]
+    other = observed(Slot("impact", (("e", 0.25),), 2, "toy", "default", DTS[0]), {"rebound_ratio": 9.0})
+    moved = [replace(cell, slot=replace(cell.slot, ulp=1)) for cell in cells]
+    wrong = [replace(cell, metrics={"rebound_ratio": (9.0, "")}) for cell in moved]
+    (whole,) = convergence([*wrong, other, *cells])
+    assert whole.errors == pytest.approx(DTS[:2], rel=1e-9)

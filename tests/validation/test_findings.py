@@ -1,6 +1,7 @@
 """Findings: every member has a value, a band and a family with a reason; nothing wider is read from a file."""
 
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 
 import pytest
 from packaging.specifiers import SpecifierSet
@@ -372,3 +373,14 @@ def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
 )
 def test_what_an_unsupported_entry_speaks_about(entry, covered):
     assert entry.covers(SLOT) is covered
+
+
+def test_whose_findings_they_are_is_told_from_who_registered_the_engine(monkeypatch):
+    ours, theirs = EntryPoint("a", "adapters.a:A", "g"), EntryPoint("b", "elsewhere.b:B", "g")
+    monkeypatch.setattr(registry, "_entries", lambda: {"a": ours, "b": theirs})
+    assert [files.brought_by_ours(name) for name in ("a", "b", "nobody")] == [True, False, False]
+
+
+def test_an_engine_that_is_no_folder_has_nowhere_to_keep_findings(monkeypatch):
+    monkeypatch.setattr(files, "folder_of", lambda engine: None)
+    assert files.findings_folder("nameless") is None

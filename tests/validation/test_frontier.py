@@ -5,7 +5,7 @@ import math
 import pytest
 
 from validation.canonical import Frontier
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import LONGEST_DT, Observation, Outcome, Slot
 from validation.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, fate_of, search, slot_at
 from validation.posed import resolve
 
@@ -125,6 +125,11 @@ def test_every_axis_that_is_declared_can_be_asked_from_end_to_end(scene, own):
         slot = slot_at(Bracket(Slot(scene, (), resolve(scene).dimensions[0], "toy", "tuned", 1 / 240), own), number)
         assert value(slot, own) == number
         resolve(scene).scene(slot.dimension, dict(slot.params))
+
+
+def test_no_axis_leads_to_steps_that_cannot_be_run():
+    ends = [end for _, own in axes() if own.axis == "dt" for end in (own.easy, own.hard, own.hardest)]
+    assert ends and max(ends) <= LONGEST_DT
 
 
 def test_a_real_engine_is_bracketed_and_its_cells_prove_it():

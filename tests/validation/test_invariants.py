@@ -216,3 +216,198 @@ def test_numbers_beyond_all_others_give_a_bound_that_judges_nothing_and_no_warni
     assert invariants.energy_bound(scene, DT) == math.inf
     (energy, *_) = invariants.checks(scene, DT)
     assert energy.metric == "energy_growth" and not energy.is_finite
+
+
+# ---- each number once more, by hand --------------------------------------------------------------------------------
+
+STEP = 1 / 64
+
+
+def test_both_checks_say_what_they_judge_in_which_unit_and_why():
+    scene = over_floor(ball())
+    energy, depth = invariants.checks(scene, STEP)
+    assert (energy.metric, energy.unit, energy.truth, energy.bound) == (
+        "energy_growth", "J", 0.0, invariants.energy_bound(scene, STEP))  # fmt: skip
+    assert (depth.metric, depth.unit, depth.truth, depth.bound) == (
+        "penetration", "m", 0.0, invariants.overlap_bound(scene, STEP))  # fmt: skip
+    assert energy.source == "contacts only take energy (e <= 1)" and depth.source == "bodies are impenetrable"
+    assert energy.because.startswith("a step order shows a conserved energy with half a step of its loads' work")
+    assert depth.because.startswith("a contact is found one step late at most")
+
+
+def test_energy_that_something_may_feed_is_shown_without_a_truth_and_says_what_feeds_it():
+    pusher = Body("pusher", Disc(0.5), pose=(5.0, 5.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
+    energy, depth = invariants.checks(over_floor(ball(), pusher), STEP)
+    assert (energy.truth, energy.bound) == (None, None)
+    assert energy.because == "shown: a prescribed body may feed energy in"
+    assert invariants.fed_by(over_floor(pusher)) == "a prescribed body may feed energy in"
+    assert depth.truth == 0.0
+    assert invariants.fed_by(over_floor(ball())) == ""
+
+
+def box(name="box", x=0.0, **changed):
+    return Body(name, Box((0.5, 0.5)), **{"mass": 2.0, "inertia": 0.5, "pose": (x, 1.0, 0.0)} | changed)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "fed"),
+    [
+        ((Pair("box", "floor", 0.5, 0.25),), True),
+        ((Pair("box", "floor", 0.5, 0.0),), False),
+        ((Pair("box", "floor", 0.0, 0.25),), False),
+        # Restitution here and friction there are no paradox, and neither is one of round bodies.
+        ((Pair("box", "floor", 0.5, 0.0), Pair("box", "ball", 0.0, 0.25)), False),
+        ((Pair("ball", "floor", 0.5, 0.25),), False),
+        ((Pair("ball", "floor", 0.5, 0.25), Pair("box", "floor", 0.5, 0.0), Pair("box", "ball", 0.0, 0.25)), False),
+        ((Pair("box", "ball", 0.5, 0.25),), True),
+    ],
+)
+def test_kane_s_paradox_needs_a_box_with_both_in_one_pair(pairs, fed):
+    floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
+    for bodies in ((floor, box(), ball()), (floor, ball(), box())):
+        scene = Scene("drop", 1, 2, bodies, pairs, (0.0, -9.81), 1.0)
+        assert invariants.fed_by(scene) == (
+            "Newton's restitution with friction can add energy where a box is hit off its centre (Kane's paradox)"
+            if fed else "")  # fmt: skip
+
+
+def test_a_fixed_box_is_no_body_that_turns():
+    wall = Body("wall", Box((0.5, 0.5)), motion="fixed", pose=(9.0, 1.0, 0.0))
+    scene = Scene("drop", 1, 2, (wall, ball()), (Pair("*", "*", 0.5, 0.25),), (0.0, 0.0), 1.0)
+    assert invariants.fed_by(scene) == ""
+
+
+def test_the_bound_of_energy_is_the_work_of_each_load_in_a_step_and_round_off_of_what_is_at_play():
+    """Loads 2 (0, -8) + (6, 28) = (6, 12) and 4 (0, -8) = (0, -32); bounds in binary numbers."""
+    one = ball("one", force=(6.0, 28.0), torque=(3.0,), inertia=0.5, pose=(3.0, 4.0, 0.0), twist=(0.0, 2.0, 4.0))
+    two = ball("two", mass=4.0, pose=(0.0, 2.0, 0.0))
+    kicked = Body("kicked", Disc(9.0), mass=64.0, pose=(50.0, 1.0, 0.0), twist=(9.0, 9.0, 9.0), motion="prescribed")
+    scene = over_floor(one, two, kicked, gravity=(0.0, -8.0))
+    work = ((36.0 + 144.0) / 2.0 + 9.0 / 0.5 + 32.0**2 / 4.0) * STEP**2
+    assert invariants.energy_bound(scene, STEP) == pytest.approx(work, rel=1e-6)
+    at_play = 0.5 * 2.0 * 4.0 + 0.5 * 0.5 * 16.0 + math.sqrt(180.0) * 5.0 + 32.0 * 2.0
+    size = 0.5 * (2.0 + 4.0) * 1e-12 * (0.3 / STEP) ** 2
+    assert invariants.energy_bound(scene, STEP) - work == pytest.approx(1e-12 * (at_play + size), rel=1e-3, abs=0.0)
+
+
+def test_a_body_without_load_is_known_to_the_round_off_of_its_size():
+    scene = over_floor(box(mass=2.0, pose=(0.0, 0.0, 0.0)), gravity=(0.0, 0.0))
+    reach = math.sqrt(0.5)
+    assert invariants.energy_bound(scene, STEP) == pytest.approx(1e-24 * (reach / STEP) ** 2, rel=1e-12, abs=0.0)
+
+
+def test_in_space_a_torque_works_on_the_least_moment_and_spin_counts_with_the_largest():
+    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed")
+    pose = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    body = Body("body", Box((0.5, 0.5, 0.5)), 1.0, (0.5, 0.25, 1.0), pose, torque=(1.0, 2.0, 2.0))
+    scene = Scene("s", 1, 3, (floor, body), (Pair(),), (0.0, 0.0, 0.0), 1.0)
+    assert invariants.energy_bound(scene, STEP) == pytest.approx(9.0 / 0.25 * STEP**2, rel=1e-6)
+    turning = 3.0 * math.sqrt(0.75) / 0.25
+    assert invariants.overlap_bound(scene, STEP) == pytest.approx(turning * STEP**2, rel=1e-6)
+    spun = Body("body", Sphere(1e-9), 1.0, (0.5, 0.25, 1.0), pose, (0.0, 0.0, 0.0, 2.0, 0.0, 0.0))
+    scene = Scene("s", 1, 3, (floor, spun), (Pair(),), (0.0, 0.0, 0.0), 1.0)
+    assert invariants.energy_bound(scene, STEP) == pytest.approx(1e-12 * 0.5 * 1.0 * 4.0, rel=1e-6, abs=0.0)
+
+
+def test_the_bound_of_an_overlap_is_what_the_two_strongest_loads_add_in_a_step():
+    """Accelerations 8, 8 + 3 of a push, and 8 + 2 (.707)/.5 of a torque on a box; no torque moves a rim."""
+    bodies = (
+        ball("a", torque=(5.0,)), ball("b", force=(0.0, -6.0)),
+        box("c", torque=(2.0,)), ball("d", mass=1.0),
+    )  # fmt: skip
+    scene = over_floor(*bodies, gravity=(0.0, -8.0))
+    most = 8.0 + 3.0 + 8.0 + 2.0 * math.sqrt(0.5) / 0.5
+    place = 1.0 + math.sqrt(0.5)  # of the box, the farthest outermost point
+    assert invariants.overlap_bound(scene, STEP) == pytest.approx(most * STEP**2, rel=1e-9)
+    assert invariants.overlap_bound(scene, STEP) - most * STEP**2 == pytest.approx(1e-12 * place, rel=1e-3, abs=0.0)
+    alone = over_floor(ball(), gravity=(0.0, -8.0))
+    assert invariants.overlap_bound(alone, STEP) == pytest.approx(8.0 * STEP**2 + 1.3e-12, rel=1e-12)
+
+
+def test_the_place_of_a_body_that_does_not_move_counts_and_its_weight_does_not():
+    wall = Body("wall", Box((0.5, 0.5)), mass=1e-9, motion="fixed", pose=(3e9, 4e9, 0.0))
+    scene = over_floor(ball(), wall, gravity=(0.0, -8.0))
+    assert invariants.overlap_bound(scene, STEP) == pytest.approx(8.0 * STEP**2 + 5e-3, rel=1e-9)
+
+
+def resting(scene, overlaps, dt=STEP, speed=0.0):
+    """One ball of radius .3 m over the floor, as deep in it as ``overlaps`` say, moving down at ``speed``."""
+    n = len(overlaps)
+    pose = np.column_stack([np.zeros(n), 0.3 - np.asarray(overlaps), np.zeros(n)])
+    twist = np.column_stack([np.zeros(n), np.full(n, -speed), np.zeros(n)])
+    return moved(scene, (pose, twist), dt=dt)
+
+
+def test_an_overlap_may_be_one_step_of_the_approach_that_led_to_it_and_what_a_scene_starts_with():
+    scene = over_floor(ball())
+    step = 2.0 * STEP
+
+    def beyond(*overlaps):
+        return invariants.deepest(scene, resting(scene, overlaps, speed=2.0))
+
+    assert beyond(-0.1, -0.1, step) == ((0.0, ""), (pytest.approx(step), ""))
+    found, depth = beyond(-0.1, 1.5 * step, -0.1)
+    assert (found[0], depth[0]) == (pytest.approx(0.5 * step), pytest.approx(1.5 * step))
+    assert beyond(0.125, 0.125 + step)[0] == (pytest.approx(0.0, abs=1e-15), "")  # what it starts with is its author's
+    assert beyond(0.125, -0.1, 0.125)[0][0] == pytest.approx(0.125 - step)  # and no one's once it has left
+    assert beyond(-0.1, 0.125)[0][0] == pytest.approx(0.125 - step)
+    assert beyond(-0.1, -0.1) == ((0.0, ""), (0.0, ""))
+
+
+def test_the_longest_step_since_an_overlap_began_counts_and_none_before():
+    granted = invariants._granted(np.array([0.0, 0.1, 0.1, 0.0, 0.1]), np.array([1.0, 2.0, 1.5, 0.25, 0.125]))
+    assert granted.tolist() == [0.0, 2.0, 2.0, 0.0, 0.25]
+    granted = invariants._granted(np.array([0.5, 0.1, 0.1, 0.0, 0.1]), np.array([0.5, 2.0, 1.5, 0.25, 0.125]))
+    assert granted.tolist() == [1.0, 2.5, 2.5, 0.0, 0.25]
+
+
+def test_an_approach_is_along_a_face_s_normal_or_of_both_centres_with_the_spin_of_boxes():
+    floor = Body("floor", HalfSpace((0.6, 0.8), 0.0), motion="fixed")
+    scene = Scene("s", 1, 2, (floor, box(), ball(pose=(9.0, 9.0, 0.0))), (Pair(),), (0.0, 0.0), 1.0)
+    twist = np.zeros((2, 3, 3))
+    twist[:, 1], twist[:, 2] = [(5.0, 0.0, 2.0), (0.0, 5.0, -4.0)], [(2.0, 4.0, 9.0), (0.0, 5.0, 9.0)]
+    trajectory = Trajectory(np.arange(2.0), np.zeros((2, 3, 3)), twist, None, 1.0, "completed")
+    reach = math.sqrt(0.5)
+    assert invariants.approach(scene, trajectory, 0, 1) == pytest.approx([3.0 + 2.0 * reach, 4.0 + 4.0 * reach])
+    assert invariants.approach(scene, trajectory, 0, 2) == pytest.approx([1.2 + 3.2, 4.0])
+    assert invariants.approach(scene, trajectory, 1, 2) == pytest.approx([5.0 + 2.0 * reach, 4.0 * reach])
+
+
+def test_growth_is_against_the_start_less_half_a_step_of_power_then_and_now():
+    """A ball of 2 kg under a force of 16 N across, no gravity; speeds 0, 1, 3, 2 m/s while it stays where it is."""
+    scene = over_floor(ball(force=(16.0, 0.0)), gravity=(0.0, 0.0))
+    speed = np.array([0.0, 1.0, 3.0, 2.0])
+    pose = np.column_stack([np.full(4, 7.0), np.full(4, 1.0), np.zeros(4)])
+    twist = np.column_stack([speed, np.zeros(4), np.zeros(4)])
+    growth, why = invariants.energy_growth(scene, moved(scene, (pose, twist), dt=STEP))
+    assert (growth, why) == (pytest.approx(9.0 - 0.5 * STEP * 16.0 * 3.0), "")
+    growth, _ = invariants.energy_growth(scene, moved(scene, (pose, twist[::-1]), dt=STEP))
+    assert growth == pytest.approx(5.0 - 0.5 * STEP * 16.0 * (3.0 + 2.0))  # from 2 m/s to 3 m/s
+    moving = pose + np.outer([0.0, 0.25, 0.5, 0.75], [1.0, 0.0, 0.0])
+    growth, _ = invariants.energy_growth(scene, moved(scene, (moving, twist), dt=STEP))
+    assert growth == pytest.approx(9.0 - 16.0 * 0.5 - 0.5 * STEP * 16.0 * 3.0)  # the load's work is none
+    assert invariants.energy_growth(scene, moved(scene, (pose, 0.0 * twist), dt=STEP)) == (0.0, "")
+
+
+def test_ripples_of_all_bodies_and_round_off_of_the_work_at_play_are_taken_off():
+    """Two balls that fall at 4 m/s each under 8 m/s^2; and one that has come far under a load that moves little."""
+    scene = over_floor(ball("a"), ball("b"), gravity=(0.0, -8.0))
+    speed = np.array([0.0, -4.0])
+    path = np.column_stack([np.zeros(2), np.ones(2), np.zeros(2)]), np.column_stack([np.zeros(2), speed, np.zeros(2)])
+    growth, _ = invariants.energy_growth(scene, moved(scene, path, path, dt=STEP))
+    assert growth == pytest.approx(2.0 * 16.0 - 2.0 * 0.5 * STEP * 16.0 * 4.0)
+    far = over_floor(ball(mass=2.0), gravity=(-8.0, 0.0))
+    # Across the load: no work, and a path of 4e9 m and then of 3e9 m.
+    pose = np.array([(5e9, 0.0, 0.0), (5e9, 4e9, 0.0), (5e9, 3e9, 0.0)])
+    twist = np.zeros((3, 3))
+    twist[2, 1] = 0.3  # .09 J, of which 16 N times 3e9 m round .048 J
+    assert invariants.energy_growth(far, moved(far, (pose, twist), dt=STEP))[0] == pytest.approx(0.09 - 0.048)
+
+
+def test_the_work_of_a_load_is_from_the_start_and_of_a_torque_added_up():
+    scene = over_floor(ball(torque=(4.0,), force=(0.0, 3.0)), gravity=(0.0, -8.0))
+    pose = np.array([(5.0, 2.0, 0.0), (6.0, 3.0, 0.0), (9.0, 1.0, 0.0)])
+    twist = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 2.0), (0.0, 0.0, 4.0)])
+    energy = invariants.mechanical_energy(scene, moved(scene, (pose, twist), dt=0.5))
+    spins = 0.5 * 0.09 * np.array([1.0, 4.0, 16.0])
+    assert energy == pytest.approx(spins + 13.0 * np.array([0.0, 1.0, -1.0]) - 4.0 * np.array([0.0, 0.75, 2.25]))

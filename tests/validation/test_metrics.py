@@ -426,3 +426,86 @@ def test_a_crossing_at_a_sample_is_that_sample():
     time = metrics.crossing(np.array([0.0, 1.0]), np.array([-1.0, 1.0]), rate, 0.0)[0][0]
     roots = np.roots([56.0, -84.0, 30.0, -1.0])
     assert time == pytest.approx(roots.real.min(), abs=1e-9)
+
+
+def test_a_crossing_starts_below_its_level_and_what_begins_at_it_has_not_risen_through():
+    t, value = np.arange(5.0), np.array([0.0, 1.0, 0.0, -1.0, 1.0])
+    assert metrics.crossing(t, value, np.zeros(5), 0.0)[0][0] == pytest.approx(3.5)
+
+
+def test_a_crossing_lies_between_its_samples_though_its_cubic_crosses_elsewhere_as_well():
+    """(s - 0.4)^2 meets 0.2 at 0.4 -+ 0.447; (s - 0.8)((s - 0.2)^2 + 0.25) has the one real root 0.8."""
+    t = np.array([0.0, 1.0])
+    (time, _), (speed, _) = metrics.crossing(t, (t - 0.4) ** 2, 2.0 * (t - 0.4), 0.2)
+    assert (time, speed) == (pytest.approx(0.4 + math.sqrt(0.2)), pytest.approx(2.0 * math.sqrt(0.2)))
+    cubic = np.array([1.0, -1.2, 0.61, -0.232])
+    value, rate = np.polyval(cubic, t), np.polyval(np.polyder(cubic), t)
+    assert metrics.crossing(t, value, rate, 0.0)[0][0] == pytest.approx(0.8, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1.3, 1.9, 3.0])
+@pytest.mark.parametrize("level", [0.0, 2.0])
+def test_what_only_just_gets_to_its_level_crosses_it_there(rate, level):
+    """A double root, which round-off makes complex or moves beyond the sample."""
+    (time, _), (speed, _) = metrics.crossing(
+        np.array([3.0, 5.0]), level + np.array([-4.0, 0.0]), np.array([2.0 * rate, 0.0]), level
+    )
+    assert (time, speed) == (pytest.approx(5.0, abs=1e-4), pytest.approx(0.0, abs=1e-4))
+
+
+def test_two_samples_have_no_top_and_a_top_is_looked_for_beside_its_turn_alone():
+    assert len(metrics.apexes(np.arange(2) / 8, np.array([0.0, 1.0]), np.array([1.0, -1.0]))[0]) == 0
+    # The last sample is the highest and has no neighbour: the top is the nearest that has two.
+    times, _ = metrics.apexes(np.arange(4) / 8, np.array([0.0, 0.2, 0.8, 1.0]), np.array([1.0, 1.0, 1.0, -1.0]))
+    assert list(times) == pytest.approx([3 / 8])
+    velocity = np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+    times, _ = metrics.apexes(np.arange(7.0), np.array([0.0, 9.0, 0.4, 0.5, 0.5, 0.4, 0.0]), velocity)
+    assert list(times) == pytest.approx([3.5])  # and not the earlier one, which belongs to nothing
+
+
+def test_late_impulses_are_those_of_the_pair_step_by_step_after_the_windows_first_instant():
+    t = np.arange(9) / 8
+    rows = [[(0, 1, (64.0, 64.0))]] * 4 + [[(0, 1, (1.0, 2.0)), (1, 0, (-0.5, -0.25))], [], [(0, 2, (9.0, 9.0))], []]
+    trajectory = recorded(planar(t, np.zeros(9), np.zeros(9)), rows)
+    found = metrics.late_impulses(trajectory, 0, 1, 0.5)
+    assert found is not None and found.tolist() == [[1.5, 2.25], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]
+    last = metrics.late_impulses(trajectory, 0, 1, 0.125)
+    assert last is not None and last.tolist() == [[0.0, 0.0]]
+
+
+def test_late_impulses_that_nobody_reported_are_none():
+    assert metrics.late_impulses(resting(3), 0, 1, 1.0) is None
+    assert metrics.late_impulses(recorded(resting(9), [[(0, 1, (1.0, 1.0))]]), 0, 1, 0.2) is None  # all too early
+    assert metrics.late_impulses(recorded(resting(2), [[(0, 1, (1.0, math.nan))]]), 0, 1, 1.0) is None
+
+
+def test_the_deepest_overlap_of_stated_pairs_is_of_them_alone():
+    scene = pile(2, Disc(0.5), Disc(0.5))
+    pose = np.zeros((1, 3, 3))
+    pose[:, 1:, 1] = [0.25, 0.125]  # 0.25 deep in the floor and 0.375; 0.875 in each other
+    trajectory = Trajectory(np.zeros(1), pose, np.zeros_like(pose), None, 1.0, "completed")
+    assert metrics.deepest_overlap(scene, trajectory, [(0, 1)]) == 0.25
+    assert metrics.deepest_overlap(scene, trajectory, [(0, 1), (0, 2)]) == 0.375
+    assert metrics.deepest_overlap(scene, trajectory, []) == 0.0
+
+
+def test_astray_is_the_farthest_of_all_samples_from_where_the_first_one_was():
+    line = np.array([1.0, 0.0])
+    places = [(1.0, 2.0), (3.0, 2.5), (4.0, 1.25), (5.0, 2.5)]
+    space = [(*p, 0.0, 1.0, 0.0, 0.0, 0.0) for p in places]
+    assert metrics.astray(moved(space, dimension=3), line) == 0.75
+
+
+@pytest.mark.parametrize("angles", [(0.3, 0.5, -0.4), (0.3, 1.0, 0.4), (-2.0, 1.0, 0.0)])
+def test_what_has_turned_is_the_largest_angle_against_the_first_pose(angles):
+    largest = max(abs(a - angles[0]) for a in angles)
+    assert metrics.turned(np.array([(7.0, 8.0 * k, a) for k, a in enumerate(angles)])) == pytest.approx(largest)
+    for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (2 / 3, 1 / 3, -2 / 3)):
+        pose = np.array([(7.0, 8.0 * k, 9.0, *q) for k, q in enumerate(turned(axis, angles))])
+        assert metrics.turned(pose) == pytest.approx(largest, abs=1e-7)
+
+
+def test_half_a_turn_in_space_is_the_largest_there_is_and_in_the_plane_whole_turns_count():
+    assert metrics.turned(np.array([(0.0, 0.0, 0.5), (0.0, 0.0, 10.5)])) == 10.0
+    pose = np.array([(0.0, 0.0, 0.0, *q) for q in turned((0.6, 0.0, 0.8), (0.0, math.pi, 5.0))])
+    assert metrics.turned(pose) == pytest.approx(math.pi)

@@ -28,8 +28,9 @@ from validation.workers import TIMEOUT
 
 #: Seconds beyond a cell's own limit after which an environment that says nothing is given up: it starts a worker.
 SILENCE = 180.0
-#: Outcomes that may be different next time: what was missing may be there, what was slow may be fast.
-ASKED_AGAIN = (Outcome.NOT_INSTALLED, Outcome.UNSUPPORTED, Outcome.TIMED_OUT)
+#: Outcomes that may be different next time: what was missing may be there, what was slow may be fast. What an adapter
+#: refuses it refuses again; a release that it does not know was not asked at all, and its run says nothing of any code.
+ASKED_AGAIN = (Outcome.NOT_INSTALLED, Outcome.TIMED_OUT)
 #: Most scenes that the title of a run names.
 NAMED = 4
 Say = Callable[[str], None]

@@ -120,7 +120,9 @@ def _slides(member: Member) -> bool:
 
 def threshold(members: Sequence[Member]) -> Reduced | None:
     """Middle of the bracket [largest ratio that sticks, smallest that slides], and half its width as bound."""
-    measured = [member for member in members if member.metrics.get("acceleration", (None, ""))[0] is not None]
+    # On the edge itself Coulomb's law lets a box stick and slide alike: that cell tells neither.
+    telling = [member for member in members if member.params["ratio"] != 1.0]
+    measured = [member for member in telling if member.metrics.get("acceleration", (None, ""))[0] is not None]
     ratios = [(member.params["ratio"], _slides(member)) for member in measured]
     below = [ratio for ratio, _ in ratios if ratio < 1.0]
     above = [ratio for ratio, _ in ratios if ratio > 1.0]

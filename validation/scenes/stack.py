@@ -101,7 +101,7 @@ SCENE = CanonicalScene(
     smooth=("penetration",),
     frontiers=(
         Frontier("stack height", "boxes", "n", 1.0, 40.0, 200.0, columns.fate, columns.STANDS, whole=True),
-        Frontier("step", "s", "dt", 1.0 / 480.0, 1.0 / 5.0, 1.0, columns.fate, columns.STANDS),
+        Frontier("step", "s", "dt", 1.0 / 480.0, 1.0 / 10.0, 1.0 / 10.0, columns.fate, columns.STANDS),
         Frontier(
             "iterations", "", "iterations", 100.0, 1.0, 1.0, columns.fate, columns.STANDS, {"n": 10.0}, whole=True
         ),

@@ -85,6 +85,18 @@ def test_what_is_stored_is_not_asked_again_but_what_was_missing_is(toy, store):
     assert asked[-1] == "again"
 
 
+def test_what_an_adapter_refuses_is_stored_but_a_release_that_was_never_asked_is_asked_with_try(toy, store):
+    refused = Slot("incline", (), 2, "toy", "default", 1 / 240)
+    asked = []
+    for _ in range(2):
+        (found,) = ask(store, "1.0.0", [refused], progress=lambda observation: asked.append(observation.outcome))
+        assert found.outcome is Outcome.UNSUPPORTED and "the toy knows discs" in found.reason
+    assert asked == [Outcome.UNSUPPORTED]
+    unknown = replace(release("1.1.0"), unknown="1.1.0 is not known")
+    assert drive(store, unknown, [SLOT], ONE)[0].outcome is Outcome.UNSUPPORTED
+    assert answered(store, unknown, [SLOT]) == {}  # no code of ours has spoken: nothing of it counts
+
+
 def test_what_other_code_measured_does_not_count(toy, store, monkeypatch):
     ask(store, "1.0.0")
     assert list(answered(store, release("1.0.0"), [SLOT])) == [SLOT]

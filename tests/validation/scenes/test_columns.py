@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
+from adapters.scene import Box, Disc, Sphere
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 from validation import columns
 from validation.catalogue import CATALOGUE
@@ -124,3 +125,70 @@ def test_overlaps_are_rounded_relative_to_the_height_of_the_topmost_body():
 )
 def test_a_displacement_is_the_larger_of_drift_and_overlap_in_sizes(drift, penetration, found):
     assert columns.displacement({"drift": drift, "penetration": penetration}, 0.25) == found
+
+
+def found(drift=0.0, penetration=0.0, energy=0.0):
+    return {"drift": (drift, ""), "penetration": (penetration, ""), "kinetic_energy": (energy, "")}
+
+
+#: What three boxes of 2 kg with a side of a metre gain in a fall by one, under 8 m/s^2 [J].
+FALL = 3 * 2.0 * 8.0
+
+
+@pytest.mark.parametrize(
+    ("measured", "said"),
+    [
+        (found(), ""),
+        (found(0.5, 0.1, FALL), ""),  # as far as it may and still stand
+        (found(0.51, 0.0, 0.0), "toppled"),
+        (found(0.5, 0.11, 0.0), "sank"),
+        (found(0.51, 0.11, 0.0), "toppled"),
+        (found(9.0, 9.0, 1.01 * FALL), "exploded"),
+        (found(0.5, 0.0, 0.99 * FALL), ""),
+        (found(drift=None), "NaN"),
+        (found(penetration=None), "NaN"),
+        (found(energy=None), "NaN"),
+        ({}, "NaN"),
+    ],
+)
+def test_a_column_stands_sinks_topples_or_explodes(measured, said):
+    assert columns.fate(column(), measured) == said
+
+
+@pytest.mark.parametrize(("half", "side"), [((0.25, 0.125), 0.25), ((0.5, 0.5), 1.0), ((3.0, 2.0), 4.0)])
+def test_a_side_is_the_height_of_the_lowest_body(half, side):
+    scene = column()
+    flat = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], shape=Box(half)), *scene.bodies[2:]))
+    assert columns.fate(flat, found(0.51 * side)) == "toppled"
+    assert columns.fate(flat, found(0.49 * side)) == ""
+    assert columns.fate(flat, found(0.0, 0.11 * side)) == "sank"
+    assert columns.fate(flat, found(0.0, 0.09 * side)) == ""
+    assert columns.fate(flat, found(energy=1.01 * 48.0 * side)) == "exploded"
+    assert columns.fate(flat, found(energy=0.99 * 48.0 * side)) == ""
+
+
+def test_in_space_a_side_is_the_height_as_well():
+    scene = column(3)
+    flat = replace(scene.bodies[1], shape=Box((0.5, 0.5, 0.25)))
+    lower = replace(scene, bodies=(scene.bodies[0], flat, *scene.bodies[2:]))
+    assert columns.fate(lower, found(0.26)) == "toppled" and columns.fate(lower, found(0.24)) == ""
+
+
+def test_what_is_not_made_of_boxes_has_no_side_and_no_fate():
+    for dimension, shape in ((2, Disc(0.5)), (3, Sphere(0.5))):
+        scene = column(dimension)
+        ball = replace(scene.bodies[1], shape=shape)
+        balls = replace(scene, bodies=(scene.bodies[0], ball, *scene.bodies[2:]))
+        assert columns.fate(balls, found(9.0, 9.0, 9e9)) == ""
+
+
+def test_overlaps_are_looked_for_between_layers_and_not_within_them():
+    """Two boxes side by side on the floor, one upon both; the two overlap each other by a quarter, the upper one by an
+    eighth, and in the list of bodies each is the neighbour of the next."""
+    scene = column(n=3)
+    pose = resting(scene).pose.copy()
+    pose[:, 1, :2], pose[:, 2, :2], pose[:, 3, :2] = (-0.375, 0.5), (0.375, 0.5), (0.0, 1.375)
+    layers = ((0,), (1, 2), (3,))
+    trajectory = replace(resting(scene), pose=pose)
+    assert columns.measure(scene, trajectory, layers)["penetration"] == (0.125, "")
+    assert columns.exact(scene, layers) == columns.exact(column(n=2))  # two interfaces

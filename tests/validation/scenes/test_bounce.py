@@ -1,0 +1,170 @@
+"""Bounces: the scene, its closed form and its measure, each worked out by hand in numbers that are exact in binary."""
+
+import math
+
+import numpy as np
+import pytest
+
+from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes import bounce
+
+#: A fall from 1 m under 8 m/s^2 takes half a second and ends at 4 m/s.
+G, HEIGHT = 8.0, 1.0
+
+
+def scene(dimension=2, **params):
+    return CATALOGUE["bounce"].scene(dimension, {"e": 0.5, "g": G, "height": HEIGHT, **params})
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_ball_is_dropped_from_its_clearance(dimension):
+    made = scene(dimension, mass=2.0, mu=0.25, height=1.5)
+    floor, ball = made.bodies
+    up = (0.0,) * (dimension - 1)
+    assert (floor.name, floor.motion, floor.shape.normal, floor.shape.offset) == ("floor", "fixed", (*up, 1.0), 0.0)
+    assert (ball.name, ball.mass, ball.shape.radius, ball.pose[:dimension]) == ("ball", 2.0, 0.5, (*up, 2.0))
+    assert not any(ball.twist) and made.gravity == (*up, -G) and made.name == "bounce" and made.version == 1
+    assert made.material("ball", "floor").restitution == 0.5 and made.material("ball", "floor").friction == 0.25
+    assert made.params == {"e": 0.5, "height": 1.5, "g": G, "mu": 0.25, "mass": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("e", "end"),
+    [
+        (0.5, 1.1 * 1.5 + 0.25),  # rest after .5 (1.5)/(.5) s, a tenth and a quarter of a second more
+        (0.0, 0.5 + 0.3),  # it rests where it lands: 1.1 times .5 s and a quarter
+        (1.0, 0.5 * 12.0),  # the fall and five whole arcs, and one arc more
+    ],
+)
+def test_it_runs_past_rest_and_for_six_arcs_if_it_never_rests(e, end):
+    assert scene(e=e).duration == pytest.approx(end, rel=1e-12)
+    assert bounce.rest_time(e, HEIGHT, G) == (math.inf if e == 1.0 else pytest.approx(0.5 * (1.0 + e) / (1.0 - e)))
+
+
+def test_what_is_exact():
+    assert bounce.exact(scene()) == pytest.approx(
+        {f"apex[{n}]": 0.25**n for n in range(1, 6)}
+        | {"apex_interval_ratio": 0.5, "apex_growth": 0.0, "rest_time": 1.5}
+    )
+    assert "rest_time" not in bounce.exact(scene(e=1.0))
+
+
+@pytest.mark.parametrize(
+    ("t", "height"),
+    [
+        (0.0, 1.0),
+        (0.25, 0.75),
+        (0.5, 0.0),
+        (0.75, 0.25),  # it leaves with 2 m/s and is at its first top a quarter of a second later
+        (0.625, 0.1875),
+        (1.0, 0.0),
+        (1.125, 0.0625),
+        (1.3125, 0.015625),
+        (2.0, 0.0),  # at rest since 1.5 s
+    ],
+)
+def test_the_exact_clearance_is_parabolas_between_exact_bounces(t, height):
+    assert bounce.clearance(0.5, HEIGHT, G, t) == pytest.approx(height, abs=1e-9)
+    for dimension in (2, 3):
+        track = bounce.track(scene(dimension))
+        assert track.body == "ball"
+        assert track.position(t) == pytest.approx((*(0.0,) * (dimension - 1), 0.5 + height), abs=1e-9)
+
+
+def test_without_restitution_it_lies_where_it_lands():
+    assert [bounce.clearance(0.0, HEIGHT, G, t) for t in (0.25, 0.5, 0.75, 9.0)] == [0.75, 0.0, 0.0, 0.0]
+
+
+def test_one_that_never_rests_is_as_high_after_any_number_of_bounces():
+    assert bounce.clearance(1.0, HEIGHT, G, 20.0) == pytest.approx(1.0, abs=1e-9)  # twenty whole arcs
+
+
+def sampled(made, dt=1 / 64, heights=None):
+    """The exact motion at every step, with the velocity of its parabolas."""
+    e, up = made.params["e"], made.dimension - 1
+    t = np.arange(int(made.duration / dt) + 1) * dt
+    clear = np.array([bounce.clearance(e, HEIGHT, G, x) for x in t]) if heights is None else heights(t)
+    pose = np.zeros((len(t), 2, 3 if made.dimension == 2 else 7))
+    twist = np.zeros((len(t), 2, 3 if made.dimension == 2 else 6))
+    pose[:, 1, up] = 0.5 + clear
+    ahead = np.array([bounce.clearance(e, HEIGHT, G, x + 1e-7) for x in t]) if heights is None else heights(t + 1e-7)
+    twist[:, 1, up] = (ahead - clear) / 1e-7
+    return Trajectory(t, pose, twist, None, dt, "completed")
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_exact_motion_measures_as_its_truth(dimension):
+    made = scene(dimension)
+    found = {name: value for name, (value, why) in bounce.measure(made, sampled(made)).items() if not why}
+    truth = bounce.exact(made)
+    # Samples are on the tops of arcs 1 and 2; of later ones the parabola through three samples says all.
+    assert [found[f"apex[{n}]"] for n in (1, 2)] == pytest.approx([truth["apex[1]"], truth["apex[2]"]], abs=1e-6)
+    assert found["apex_interval_ratio"] == pytest.approx(0.5, abs=1e-6)
+    assert found["apex_growth"] == 0.0
+    # Rest begins where no speed is above 2 g dt = .25 m/s any more: within the arcs from .25 m/s on, .125 s in all.
+    assert 1.5 - 0.125 <= found["rest_time"] <= 1.5
+
+
+def test_a_ball_that_does_not_rise_again_has_no_apex_and_says_which():
+    made = scene()
+    lying = sampled(made, heights=lambda t: np.maximum(1.0 - 4.0 * t**2, 0.0))
+    found = bounce.measure(made, lying)
+    assert [found[f"apex[{n}]"] for n in (1, 5)] == [
+        (0.0, "there is no apex 1: the ball does not rise again"),
+        (0.0, "there is no apex 5: the ball does not rise again"),
+    ]
+    assert "apex[6]" not in found and found["apex_growth"] == (0.0, "")
+    assert found["apex_interval_ratio"] == (0.0, "there are only 0 apexes, three are needed")
+
+
+def test_growth_is_the_largest_rise_of_an_apex_over_the_one_before_in_drops():
+    made = scene(e=1.0, height=2.0)
+
+    def arcs(t):
+        """Arcs of a second with tops 2.5, 2.25, 3 m, above a drop from 2 m."""
+        tops = np.array([2.0, 2.5, 2.25, 3.0, 1.0, 1.0])
+        k = np.minimum((t + 0.5).astype(int), 5)
+        return np.maximum(tops[k] * (1.0 - 4.0 * (t - k) ** 2), 0.0)
+
+    t = np.arange(5 * 64) / 64
+    pose, twist = np.zeros((len(t), 2, 3)), np.zeros((len(t), 2, 3))
+    pose[:, 1, 1], twist[:, 1, 1] = 0.5 + arcs(t), (arcs(t + 1e-7) - arcs(t)) / 1e-7
+    found = bounce.measure(made, Trajectory(t, pose, twist, None, 1 / 64, "completed"))
+    assert [found[f"apex[{n}]"][0] for n in (1, 2, 3)] == pytest.approx([2.5, 2.25, 3.0], abs=1e-9)
+    assert found["apex_growth"][0] == pytest.approx(0.375)  # .75 m over a drop of 2 m; the first rise is .5 m
+
+
+def apexes(*heights):
+    return {f"apex[{n}]": (h, "") for n, h in enumerate(heights, 1)}
+
+
+def test_the_apex_error_is_the_largest_of_those_that_are_resolved_relative_to_the_drop():
+    """Speeds are 4, 2, 1, .5 m/s; twenty steps of gravity at 1/256 s are .625 m/s: two arcs count, a third does not."""
+    made = scene()
+    exact = (0.25, 0.0625, 0.015625, 0.0, 0.0)
+    assert bounce.apex_error(made, 1 / 256, apexes(*exact)) == (0.0, "")
+    assert bounce.apex_error(made, 1 / 256, apexes(0.375, 0.0625, 9.0, 9.0, 9.0)) == (0.125, "")
+    assert bounce.apex_error(made, 1 / 256, apexes(0.25, 0.0, 9.0, 9.0, 9.0)) == (0.0625, "")
+    assert bounce.apex_error(made, 1 / 256, apexes(0.0, 0.0, 9.0, 9.0, 9.0)) == (0.25, "")
+    doubled = apexes(1.0, 0.125, 0.03125, 9.0, 9.0)  # from 2 m an apex of .5 m is true; .5 m is a quarter of 2 m
+    assert bounce.apex_error(scene(height=2.0), 1 / 256, doubled) == (0.25, "")
+    assert bounce.apex_error(made, 1 / 80, apexes(9.0, 9.0, 9.0, 9.0, 9.0)) == (
+        None, "no apex is resolved at this step")  # fmt: skip
+    assert bounce.apex_error(made, 1 / 81, apexes(0.5, 9.0, 9.0, 9.0, 9.0)) == (0.25, "")
+    missing = apexes(0.375, 9.0, 9.0, 9.0, 9.0) | {"apex[2]": (None, "gone")}
+    assert bounce.apex_error(made, 1 / 256, missing) == (0.125, "")
+
+
+@pytest.mark.parametrize(("apex", "e"), [(0.5, 0.5), (2.0, 1.0), (0.0, 0.0), (-0.1, 0.0)])
+def test_an_apex_shows_a_restitution(apex, e):
+    assert bounce.rebound({"height": 2.0}, apex) == e
+
+
+def test_the_quick_suite_drops_from_sixteen_heights_and_at_four_restitutions():
+    quick = [dict(variation.params) for variation in CATALOGUE["bounce"].quick]
+    assert quick == [{"e": 0.8, "height": pytest.approx(1.0 + 0.01 * k)} for k in range(16)] + [
+        {"e": e, "height": 1.0} for e in (0.5, 0.95, 1.0)
+    ]
+    full = {(v.params["e"], round(v.params["height"], 2)) for v in CATALOGUE["bounce"].full}
+    assert full == {(e, round(1.0 + 0.01 * k, 2)) for e in (0.5, 0.8, 0.95, 1.0) for k in range(16)}
