@@ -1,4 +1,4 @@
-"""What Box2D makes of seams, far places and corners: the laws of `adapters.box2d.motions` against the engine."""
+"""What Box2D makes of seams, far places and corners: the laws of `adapters.single_motions` against the engine."""
 
 from dataclasses import replace
 
@@ -9,9 +9,9 @@ pytest.importorskip("Box2D", reason="Box2D is set apart: pip install 'contact-cr
 
 from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import DEVIATIONS
-from adapters.box2d.motions import corner_law, standstill_law
 from adapters.needs import needs
 from adapters.scene import Pair
+from adapters.single_motions import corner_law, standstill_law
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 
