@@ -8,7 +8,6 @@ Profiles differ in what solves the contact problem, and in nothing else.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from importlib.metadata import version
 from types import MappingProxyType
@@ -22,6 +21,7 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.scene import Scene
+from adapters.settings import checked_step
 
 
 @final
@@ -93,9 +93,7 @@ class DartEngine(Engine):
         EngineError
             For a scene that `refuses` names, a bad step or setting.
         """
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        chosen = checked(settings)
+        dt, chosen = checked_step(dt), checked(settings)
         reason = self.refuses(scene, "")
         if reason:
             raise EngineError(reason)

@@ -8,18 +8,25 @@ fbf       forward-backward-forward splitting with Coulomb's own cone
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters import settings
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
-SETTING_NAMES = ("solver", "detector", "iterations", "tolerance")
-SOLVERS = ("dantzig", "pgs", "nsgs", "fbf")
-DETECTORS = ("fcl", "dart", "ode", "bullet")
+#: What Dantzig's solver takes, which pivots and has neither iterations nor a tolerance, and what the others take.
+PIVOTING: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "solver": settings.word("dantzig", "pgs", "nsgs", "fbf"),
+        "detector": settings.word("fcl", "dart", "ode", "bullet"),
+    }
+)
+SWEEPING: Mapping[str, settings.Check] = MappingProxyType(
+    {**PIVOTING, "iterations": settings.whole(1, 10**6), "tolerance": settings.number(0.0, 1.0)}
+)
 _SOURCE = "dartpy 6.20, dart.constraint"
 
 
@@ -52,29 +59,6 @@ _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
-def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take.
-
-    Raises
-    ------
-    EngineError
-        Naming the first setting that is unknown, missing or of the wrong kind.
-    """
-    for name in settings:
-        if name not in SETTING_NAMES:
-            raise EngineError(f"{name}: dart has no such setting, it has {', '.join(SETTING_NAMES)}")
-    for name, words in (("solver", SOLVERS), ("detector", DETECTORS)):
-        if settings.get(name) not in words:
-            raise EngineError(f"{name}: {settings.get(name)!r} must be one of {', '.join(words)}")
-    if settings["solver"] == "dantzig":
-        if set(settings) & {"iterations", "tolerance"}:
-            raise EngineError("iterations: dantzig pivots, it has neither iterations nor a tolerance")
-        return dict(settings)
-    count: Any = settings.get("iterations")
-    tolerance: Any = settings.get("tolerance")
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10**6:
-        raise EngineError(f"iterations: {count!r} must be a whole number from 1 to 1000000")
-    number = isinstance(tolerance, int | float) and not isinstance(tolerance, bool) and math.isfinite(tolerance)
-    if not number or not 0.0 <= tolerance <= 1.0:
-        raise EngineError(f"tolerance: {tolerance!r} must be a number from 0 to 1")
-    return dict(settings)
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("dart", PIVOTING if asked.get("solver") == "dantzig" else SWEEPING, asked)
