@@ -8,7 +8,7 @@ from adapters.law import Deviation, exactly
 from adapters.single_motions import standstill_law
 from adapters.single_precision import Method, rounded_law
 
-#: Metrics of blows in free space, by scene, that no turn within the step changes.
+#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
@@ -18,7 +18,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "galperin": ("small_speed", "large_speed", "energy_defect"),
     "thin_wall": ("rebound_ratio",),
     "oblique": ("rebound_ratio",),
-    "pair_matrix": tuple(f"{name}[{k}]" for name in ("restitution", "friction") for k in range(1, 5)),
+    "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
 }
 
 
@@ -33,8 +33,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         ("default", "tuned"),
         scene,
         exactly(metric),
-        rounded_law(metric, Method(newton, rebound_after_friction=True)),
-        "numbers are singles, 2^-24 of their size; a rebound comes after friction, which knows compression only",
+        rounded_law(metric, Method(newton)),
+        "numbers are singles, 2^-24 of their size",
         "rapier3d, built for f32; motion in adapters/single_precision.py",
         ("0.36.",),
     )
