@@ -13,8 +13,8 @@ from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.dart.profiles import PROFILES, checked
-from adapters.dart.shipped import MIXING, PUSH_OUT, SOLVED, restitution
+from adapters.dart.profiles import PROFILES, checked, solved
+from adapters.dart.shipped import MIXING, PUSH_OUT, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
@@ -104,8 +104,8 @@ class DartEngine(Engine):
         """Restitution under the compliance of contacts, and friction under its own."""
         if needs.regime != "impact":
             return {}
-        if needs.restitution == 0.0:
+        if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED
             return {"restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s")}
-        value = restitution(needs.restitution, REBOUND_SPEED)
-        return {"restitution": Declared(value, SOLVED, "a contact gives way by 1e-5 of the speed it is to change")}
+        value, left = restitution(needs.restitution, REBOUND_SPEED), solved(profile, needs.friction > 0.0)
+        return {"restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change")}

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters import settings
+from adapters.dart.shipped import SOLVED
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
@@ -48,15 +49,25 @@ def _sweeping(solver: str, count: int, tolerance: float, why: str, needs: Needs,
     ]
 
 
+#: Changes below which the sweeps of a profile stop, as a share.
+TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
+
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": _pivoting,
-    "pgs": partial(_sweeping, "pgs", 200, 1e-12, "the sweeps of a textbook on the pyramid of the shipped solver"),
-    "nsgs": partial(
-        _sweeping, "nsgs", 1000, 1e-10, "the exact cone: friction opposes the slip, whatever its direction"
+    "pgs": partial(
+        _sweeping, "pgs", 200, TOLERANCES["pgs"], "the sweeps of a textbook on the pyramid of the shipped solver"
     ),
-    "fbf": partial(_sweeping, "fbf", 1000, 1e-8, "the exact cone by another method"),
+    "nsgs": partial(
+        _sweeping, "nsgs", 1000, TOLERANCES["nsgs"], "the exact cone: friction opposes the slip, whatever its direction"
+    ),
+    "fbf": partial(_sweeping, "fbf", 1000, TOLERANCES["fbf"], "the exact cone by another method"),
 }
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
+
+
+def solved(profile: str, rough: bool) -> float:
+    """What a profile's solver leaves of a single contact, as a share: with friction ten times its own tolerance."""
+    return max(SOLVED, 10.0 * TOLERANCES.get(profile, 0.0)) if rough else SOLVED
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:

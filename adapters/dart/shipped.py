@@ -12,8 +12,8 @@ MIXING = 1e-5
 THRESHOLD, FASTEST = 0.1, 100.0
 #: Largest speed at which an overlap is pushed out, where nothing rebounds [m/s]; measured: 2.0 m/s leave 1e-3 m/s.
 PUSH_OUT = 1e-3
-#: What a solver leaves of a single contact, as a share: measured 7e-16 at most, for all four, at ratios of mass from
-#: 1e-4 to 1e4 and speeds from 0.3 to 50 m/s; the round-off that any engine is allowed.
+#: What a solver leaves of a single contact without friction, as a share: measured 7e-16 at most, for all four, at
+#: ratios of mass from 1e-4 to 1e4 and speeds from 0.3 to 50 m/s; the round-off that any engine is allowed.
 SOLVED = 1e-12
 
 

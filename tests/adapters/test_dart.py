@@ -114,7 +114,7 @@ def test_a_blow_is_what_its_law_says_and_a_millionth_more_is_not(profile, params
     scene = impact.scene(3, params)
     found = impact.measure(scene, drive(scene, profile))
     for metric in BLOWS["impact"]:
-        value, band = blow_law(metric)(scene, DT, impact.measure)
+        value, band = blow_law(metric, profile)(scene, DT, impact.measure)
         assert abs(found[metric][0] - value) <= band, metric
         if scene.params["e"] * scene.params["v"] > 0.1:
             assert band < 1e-8 and (metric == "momentum_defect" or abs(found[metric][0] * 1.000001 - value) > band)
