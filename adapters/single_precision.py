@@ -38,8 +38,33 @@ APART = 4.0
 #: Gap that counts as touching [m], for places of order 1 in doubles.
 TOUCHING = 1e-9
 
+#: Least and largest number that a mass or a moment may be: a square or an inverse of it still is a single number.
+SMALLEST, LARGEST = 1e-30, 1e30
+
 #: ``restitution(e, speed)``: what an engine uses at an approach of ``speed`` [m/s].
 Restitution = Callable[[float, float], float]
+
+
+def without_a_place(scene: Scene) -> str | None:
+    """The first mass or moment of a free body that single precision cannot hold, in one line; None if all have one."""
+    for body in scene.bodies:
+        moments = body.inertia if isinstance(body.inertia, tuple) else (body.inertia,)
+        for name, value in (("mass", body.mass), *(("inertia", moment) for moment in moments)):
+            if body.motion == "free" and not SMALLEST <= value <= LARGEST:
+                return f"{body.name}.{name}: {value:g} has no place in single precision"
+    return None
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Restitution above a speed of approach [m/s], none up to it; at that speed itself as ``rebounds_at`` says."""
+
+    speed: float
+    rebounds_at: bool = False
+
+    def __call__(self, e: float, speed: float) -> float:
+        """Restitution at an approach of ``speed``."""
+        return e if speed > self.speed or (self.rebounds_at and speed == self.speed) else 0.0
 
 
 @dataclass(frozen=True)
@@ -54,11 +79,14 @@ class Method:
         Over the contacts of a moment; 0: nothing is said of several at once.
     unit
         Round-off of its numbers, as a share.
+    rebound_after_friction
+        Friction knows the impulse of compression only: what rebounds is added when friction is done.
     """
 
     restitution: Restitution
     sweeps: int = 0
     unit: float = UNIT
+    rebound_after_friction: bool = False
 
 
 @dataclass
@@ -312,11 +340,14 @@ class _Flight:
                 self._push(c, (push - normal[k]) * c.normal)
                 normal[k] = push
         given = []
-        for c, jn in zip(contacts, normal, strict=True):
+        for k, (c, jn) in enumerate(zip(contacts, normal, strict=True)):
             slip = self._slip(c)
             speed, rub = float(np.linalg.norm(slip)), np.zeros(3)
             if c.mu > 0.0 and speed > 0.0:
-                rub = -slip / speed * min(c.mu * jn, speed / self._response(c, slip / speed))
+                # A contact of a ball: what stops it is its approach over its response.
+                stop = max(0.0, approach[k]) / self._response(c, c.normal)
+                pressed = stop if self.method.rebound_after_friction else jn
+                rub = -slip / speed * min(c.mu * pressed, speed / self._response(c, slip / speed))
                 self._push(c, rub)
             given.append((c, jn * c.normal + rub))
         return given

@@ -2,7 +2,6 @@
 
 shipped        numbers of Box2D itself, most of them fixed when it was compiled
 profiles       settings with their reasons
-motions        motions that single numbers change, for laws
 simulation     one world
 listening      contacts, as they can be heard while a step is made
 engine         the adapter

@@ -8,7 +8,6 @@ It computes in single precision. Names in the sources are those of Box2D's own f
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, final
@@ -19,6 +18,8 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED
 from adapters.scene import Scene
+from adapters.settings import checked_step
+from adapters.single_precision import without_a_place
 
 
 @final
@@ -88,12 +89,7 @@ class Box2DEngine(Engine):
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that single precision cannot hold."""
-        for body in scene.bodies:
-            assert isinstance(body.inertia, float | int)
-            for name, value in (("mass", body.mass), ("inertia", body.inertia)):
-                if body.motion == "free" and not 1e-30 <= value <= 1e30:
-                    return f"{body.name}.{name}: {value:g} has no place in single precision"
-        return None
+        return without_a_place(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.
@@ -105,9 +101,7 @@ class Box2DEngine(Engine):
         """
         if scene.dimension != 2:
             raise EngineError("dimension: box2d is planar and cannot run a spatial scene")
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        chosen = checked(settings)
+        dt, chosen = checked_step(dt), checked(settings)
         reason = self.refuses(scene, "")
         if reason:
             raise EngineError(reason)

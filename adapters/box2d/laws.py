@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from adapters.box2d.motions import Chosen, corner_law, standstill_law
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
 from adapters.scene import Scene
-from adapters.single_precision import Method, rounded_law
+from adapters.single_motions import Chosen, corner_law, standstill_law
+from adapters.single_precision import Method, Threshold, rounded_law
 
 #: Metrics of blows in free space, by scene.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -42,24 +42,7 @@ def _law(metric: str, units: float, sweeps: int) -> Law:
 
 
 def _method(units: float, sweeps: int) -> Method:
-    threshold = VELOCITY_THRESHOLD / units
-    return Method(_Threshold(threshold), sweeps)
-
-
-class _Threshold:
-    """Restitution above a speed of approach; equal for equal thresholds, so that motions are computed once."""
-
-    def __init__(self, speed: float) -> None:
-        self.speed = speed
-
-    def __call__(self, e: float, speed: float) -> float:
-        return e if speed > self.speed else 0.0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Threshold) and other.speed == self.speed
-
-    def __hash__(self) -> int:
-        return hash(self.speed)
+    return Method(Threshold(VELOCITY_THRESHOLD / units), sweeps)
 
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(
@@ -97,7 +80,7 @@ DEVIATIONS += tuple(
         "stopping_distance",
         standstill_law("stopping_distance", _chosen(profile)),
         "places are singles: a step's way below half their spacing (12 cm at 1e6 m) is lost",
-        "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/box2d/motions.py",
+        "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
     for profile in PROFILES
@@ -111,7 +94,7 @@ DEVIATIONS += tuple(
         metric,
         corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
         "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to one unit a second",
-        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/box2d/motions.py",
+        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
     for profile in PROFILES

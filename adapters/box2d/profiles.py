@@ -14,17 +14,27 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from adapters import settings
 from adapters.box2d.shipped import (
     MAX_TRANSLATION,
     POLYGON_RADIUS,
     POSITION_ITERATIONS,
     VELOCITY_ITERATIONS,
 )
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 from adapters.probes import slide_speed
 
-SETTING_NAMES = ("iterations", "position_iterations", "continuous", "skin", "units_per_metre", "early_restitution")
+KINDS: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "iterations": settings.whole(1, 2**31 - 1),
+        "position_iterations": settings.whole(1, 2**31 - 1),
+        "continuous": settings.flag,
+        "skin": settings.number(0.0, 1e6),
+        "units_per_metre": settings.number(1e-6, 1e6),
+        "early_restitution": settings.flag,
+    }
+)
 #: Largest unit that `tuned` chooses: slop and threshold are then 0.08 mm and 16 mm/s.
 FINEST = 64.0
 #: Skin of boxes that rest, in `tuned` [length].
@@ -95,30 +105,6 @@ def units(needs: Needs, dt: float) -> float:
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
 
 
-def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take.
-
-    Raises
-    ------
-    EngineError
-        Naming the first setting that is unknown, missing or of the wrong kind.
-    """
-    for name in settings:
-        if name not in SETTING_NAMES:
-            raise EngineError(f"{name}: box2d has no such setting, it has {', '.join(SETTING_NAMES)}")
-    for name in SETTING_NAMES:
-        if name not in settings:
-            raise EngineError(f"{name}: this setting is missing")
-    for name in ("iterations", "position_iterations"):
-        value = settings[name]
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value < 2**31:
-            raise EngineError(f"{name}: {value!r} must be a whole number from 1 to 2147483647")
-    for name in ("continuous", "early_restitution"):
-        if not isinstance(settings[name], bool):
-            raise EngineError(f"{name}: {settings[name]!r} must be true or false")
-    for name, least in (("skin", 0.0), ("units_per_metre", 1e-6)):
-        value = settings[name]
-        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        if not number or not least <= value <= 1e6:
-            raise EngineError(f"{name}: {value!r} must be a number from {least:g} to 1e6")
-    return dict(settings)
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("box2d", KINDS, asked)

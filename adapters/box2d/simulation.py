@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.needs import needs
+from adapters.ground import reach
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
-
-#: Least half width of the ground [m], and how far beyond all that moves it reaches.
-GROUND = 100.0
 
 
 class Box2DSimulation(Simulation):
@@ -185,12 +182,3 @@ def _single(scene: Scene) -> tuple[float, float] | None:
     """Restitution and friction, if they are the same for all pairs: what Box2D mixes of equal numbers is the number."""
     found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
     return found.pop() if len(found) == 1 else None
-
-
-def reach(scene: Scene) -> float:
-    """Half width and depth of the ground [m]: farther than anything of the scene gets."""
-    wanted, farthest = needs(scene), 0.0
-    for body in scene.bodies:
-        if not isinstance(body.shape, HalfSpace):
-            farthest = max(farthest, math.hypot(*body.pose[:2]))
-    return max(GROUND, 2.0 * (farthest + wanted.top_speed * scene.duration))

@@ -148,6 +148,15 @@ def _late_impulse(world: World, told: Contacts, size: float) -> Contacts:
     return replace(told, impulse=(1.0 - size) * told.impulse)
 
 
+def _spread(world: World, told: Contacts, size: float) -> Contacts:
+    """A share of every impulse comes a step later, so that their sum is right."""
+    late = world.before[2]
+    parts = [(told, 1.0 - size), (late, size)] if world.steps else [(told, 1.0)]
+    kept = ("a", "b", "point", "normal", "gap")
+    joined = {name: np.concatenate([getattr(rows, name) for rows, _ in parts]) for name in kept}
+    return Contacts(impulse=np.concatenate([share * rows.impulse for rows, share in parts]), **joined)
+
+
 def _slipping(told: Contacts, size: float) -> Array:
     normal = (told.impulse * told.normal).sum(axis=1, keepdims=True) * told.normal
     return np.asarray(normal + (1.0 - size) * (told.impulse - normal))
@@ -162,6 +171,18 @@ def _tilted(world: World, told: Contacts, size: float) -> Contacts:
 def _tilted_once(world: World, told: Contacts, size: float) -> Contacts:
     """The last normal alone: others beside it are right."""
     return replace(told, normal=np.vstack([told.normal[:-1], _tilted(world, told, size).normal[-1:]]))
+
+
+def _long_once(world: World, told: Contacts, size: float) -> Contacts:
+    """The last normal alone is too long."""
+    return replace(told, normal=np.vstack([told.normal[:-1], (1.0 + size) * told.normal[-1:]]))
+
+
+def _turned_aside(world: World, value: Array, size: float) -> Array:
+    """The last body moves along one axis for what it has along the other: components add up as before."""
+    value = value.copy()
+    value[-1, [0, 2]] += np.array([size, -size]) * float(world.steps > 0)
+    return value
 
 
 def _backwards(world: World, told: Contacts, size: float) -> Contacts:
@@ -191,6 +212,10 @@ def _known_only(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) 
 
 def _any_step(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) -> tuple[float, dict[str, Any]]:
     return (dt if 0.0 < dt < math.inf else DT), given
+
+
+def _any_direction(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) -> tuple[float, dict[str, Any]]:
+    return abs(dt), given
 
 
 def _any_count(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) -> tuple[float, dict[str, Any]]:
@@ -237,6 +262,7 @@ FAULTS: dict[str, Fault] = {
     "unknown settings ignored": Fault("refusals", build=_known_only),
     "refusal of several lines": Fault("refusals", refuses=lambda scene, said: "bodies:\nno" if said else None),
     "step of any number taken": Fault("bad_numbers", build=_any_step),
+    "step backwards taken": Fault("bad_numbers", build=_any_direction),
     "count below 1 taken": Fault("bad_numbers", build=_any_count),
     "refused, and yet built": Fault(
         "capabilities", refuses=lambda scene, said: said or ("no" if len(scene.bodies) == 1 else None)
@@ -257,6 +283,7 @@ FAULTS: dict[str, Fault] = {
     "momentum out of nothing": Fault(
         "momentum", SHARES, "share", twist=_scaled(-1, LINEAR, lambda world: float(world.steps > 0))
     ),
+    "momentum along one axis for that along another": Fault("momentum", SHARES, "m/s", twist=_turned_aside),
     "spin out of nothing": Fault(
         "spin", (1.0, 0.1, 0.03), "share", twist=_scaled(0, ANGULAR, lambda world: float(world.steps > 0))
     ),
@@ -264,6 +291,7 @@ FAULTS: dict[str, Fault] = {
     "normal not of length 1": Fault(
         "contacts", SHARES, "share", contacts=lambda _, told, size: replace(told, normal=(1.0 + size) * told.normal)
     ),
+    "one normal of several not of length 1": Fault("contacts", SHARES, "share", contacts=_long_once),
     "normal from the second body": Fault("contacts", contacts=lambda _, told, size: replace(told, normal=-told.normal)),
     # Bodies may sink by centimetres, and every other place of a body is farther from the floor.
     "contact point elsewhere": Fault(
@@ -277,12 +305,18 @@ FAULTS: dict[str, Fault] = {
         "impulse", COARSE, "share", contacts=_impulse(lambda told, size: (1.0 - 2.0 * size) * told.impulse)
     ),
     "impulse of the step before": Fault("sampling", COARSE, "share", contacts=_late_impulse),
+    # The sum over all steps is right: a check that looks at the sum alone sees nothing.
+    "impulse spread over two steps": Fault("sampling", COARSE, "share", contacts=_spread),
     "first body drifts": Fault(
         "order", COARSE, "m/s", pose=_at(0, 0, lambda world: world.steps * world.dt), twist=_at(0, 0, lambda world: 1.0)
     ),
     "all drift to one side": Fault("mirror", COARSE, "m/s", pose=_at(ALL, 0, lambda world: world.steps * world.dt)),
     "slower upwards than sideways": Fault("quarter_turn", SHARES, "share", twist=_scaled(ALL, 2, lambda world: 1.0)),
     "world shared with another": Fault("fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.others))),
+    # Nothing is wrong with worlds that are stepped one after another, each to its end.
+    "steps in turn with another world": Fault(
+        "fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.interrupted))
+    ),
     "another answer each time": Fault("repeat", BITS, "m/s", twist=_at(ALL, 0, lambda world: random.random())),
     "another answer after another scene": Fault(
         "history", BITS, "m", pose=_at(ALL, 0, lambda world: float(world.after not in ("", world.scene.name)))

@@ -51,6 +51,7 @@ class Past:
 
     steps: int = 0
     last: str = ""
+    stepped: World | None = None
     kept: list[bytes] = field(default_factory=list)
 
 
@@ -106,7 +107,8 @@ class World(Simulation):
 
     def __init__(self, engine: Spoilt, scene: Scene, inner: Simulation, dt: float) -> None:
         self.engine, self.scene, self.inner, self.dt = engine, scene, inner, dt
-        self.steps, self.at_once = 0, 1
+        self.steps, self.at_once, self.interrupted = 0, 1, 0
+        # Interrupted: steps of its own that came right after one of another world.
         #: Steps that other worlds of this engine had made when this one was built, and the scene before it.
         self.born, self.after = engine.past.steps, engine.past.last
         engine.past.last = scene.name
@@ -123,6 +125,8 @@ class World(Simulation):
         for _ in range(steps):
             self.before = self.inner.pose(), self.inner.twist(), self.inner.contacts()
             self.inner.advance(1)
+            self.interrupted += self.steps > 0 and self.engine.past.stepped is not self
+            self.engine.past.stepped = self
             self.steps += 1
             self.engine.past.steps += 1
 

@@ -8,20 +8,20 @@ Profiles differ in what solves the contact problem, and in nothing else.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.dart.profiles import PROFILES, checked
-from adapters.dart.shipped import MIXING, PUSH_OUT, SOLVED, restitution
+from adapters.dart.profiles import PROFILES, checked, solved
+from adapters.dart.shipped import MIXING, PUSH_OUT, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.scene import Scene
+from adapters.settings import checked_step
 
 
 @final
@@ -59,9 +59,10 @@ class DartEngine(Engine):
                 "dartpy 6.20.0, PgsBoxedLcpSolver",
             ),
             Quirk(
-                "contacts give way by 1e-5 of the speed that they are to change, and nothing rebounds at up to 0.1 m/s",
+                "contacts give way by 1e-5 of the speed that they are to change; no rebound is slower than 0.1 m/s or "
+                "faster than 100 m/s",
                 "declared; laws predict what blows make of it",
-                "ContactConstraint, constraint force mixing and bounce threshold; measured: 0.8 comes out as 0.799982",
+                "ContactConstraint: constraint force mixing, bouncing velocities; measured: 0.8 comes out as 0.799982",
             ),
             Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 6.20.0"),
         ),
@@ -93,9 +94,7 @@ class DartEngine(Engine):
         EngineError
             For a scene that `refuses` names, a bad step or setting.
         """
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        chosen = checked(settings)
+        dt, chosen = checked_step(dt), checked(settings)
         reason = self.refuses(scene, "")
         if reason:
             raise EngineError(reason)
@@ -105,8 +104,8 @@ class DartEngine(Engine):
         """Restitution under the compliance of contacts, and friction under its own."""
         if needs.regime != "impact":
             return {}
-        if needs.restitution == 0.0:
+        if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED
             return {"restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s")}
-        value = restitution(needs.restitution, REBOUND_SPEED)
-        return {"restitution": Declared(value, SOLVED, "a contact gives way by 1e-5 of the speed it is to change")}
+        value, left = restitution(needs.restitution, REBOUND_SPEED), solved(profile, needs.friction > 0.0)
+        return {"restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change")}

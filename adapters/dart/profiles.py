@@ -8,18 +8,26 @@ fbf       forward-backward-forward splitting with Coulomb's own cone
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters import settings
+from adapters.dart.shipped import SOLVED
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
-SETTING_NAMES = ("solver", "detector", "iterations", "tolerance")
-SOLVERS = ("dantzig", "pgs", "nsgs", "fbf")
-DETECTORS = ("fcl", "dart", "ode", "bullet")
+#: What Dantzig's solver takes, which pivots and has neither iterations nor a tolerance, and what the others take.
+PIVOTING: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "solver": settings.word("dantzig", "pgs", "nsgs", "fbf"),
+        "detector": settings.word("fcl", "dart", "ode", "bullet"),
+    }
+)
+SWEEPING: Mapping[str, settings.Check] = MappingProxyType(
+    {**PIVOTING, "iterations": settings.whole(1, 10**6), "tolerance": settings.number(0.0, 1.0)}
+)
 _SOURCE = "dartpy 6.20, dart.constraint"
 
 
@@ -41,40 +49,27 @@ def _sweeping(solver: str, count: int, tolerance: float, why: str, needs: Needs,
     ]
 
 
+#: Changes below which the sweeps of a profile stop, as a share.
+TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
+
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": _pivoting,
-    "pgs": partial(_sweeping, "pgs", 200, 1e-12, "the sweeps of a textbook on the pyramid of the shipped solver"),
-    "nsgs": partial(
-        _sweeping, "nsgs", 1000, 1e-10, "the exact cone: friction opposes the slip, whatever its direction"
+    "pgs": partial(
+        _sweeping, "pgs", 200, TOLERANCES["pgs"], "the sweeps of a textbook on the pyramid of the shipped solver"
     ),
-    "fbf": partial(_sweeping, "fbf", 1000, 1e-8, "the exact cone by another method"),
+    "nsgs": partial(
+        _sweeping, "nsgs", 1000, TOLERANCES["nsgs"], "the exact cone: friction opposes the slip, whatever its direction"
+    ),
+    "fbf": partial(_sweeping, "fbf", 1000, TOLERANCES["fbf"], "the exact cone by another method"),
 }
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
-def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take.
+def solved(profile: str, rough: bool) -> float:
+    """What a profile's solver leaves of a single contact, as a share: with friction ten times its own tolerance."""
+    return max(SOLVED, 10.0 * TOLERANCES.get(profile, 0.0)) if rough else SOLVED
 
-    Raises
-    ------
-    EngineError
-        Naming the first setting that is unknown, missing or of the wrong kind.
-    """
-    for name in settings:
-        if name not in SETTING_NAMES:
-            raise EngineError(f"{name}: dart has no such setting, it has {', '.join(SETTING_NAMES)}")
-    for name, words in (("solver", SOLVERS), ("detector", DETECTORS)):
-        if settings.get(name) not in words:
-            raise EngineError(f"{name}: {settings.get(name)!r} must be one of {', '.join(words)}")
-    if settings["solver"] == "dantzig":
-        if set(settings) & {"iterations", "tolerance"}:
-            raise EngineError("iterations: dantzig pivots, it has neither iterations nor a tolerance")
-        return dict(settings)
-    count: Any = settings.get("iterations")
-    tolerance: Any = settings.get("tolerance")
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10**6:
-        raise EngineError(f"iterations: {count!r} must be a whole number from 1 to 1000000")
-    number = isinstance(tolerance, int | float) and not isinstance(tolerance, bool) and math.isfinite(tolerance)
-    if not number or not 0.0 <= tolerance <= 1.0:
-        raise EngineError(f"tolerance: {tolerance!r} must be a number from 0 to 1")
-    return dict(settings)
+
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("dart", PIVOTING if asked.get("solver") == "dantzig" else SWEEPING, asked)

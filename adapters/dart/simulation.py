@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,11 +9,9 @@ import numpy as np
 
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Array, Contacts, Simulation
-from adapters.needs import needs
+from adapters.ground import reach
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
-#: Least half width and depth of the ground [m].
-GROUND = 100.0
 #: Names of the detectors' classes.
 DETECTORS = {
     "fcl": "FCLCollisionDetector",
@@ -183,12 +180,3 @@ def _turned(normal: Array) -> Array:
     x = np.cross(helper, normal)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(normal, x), normal])
-
-
-def reach(scene: Scene) -> float:
-    """Half width and depth of the ground [m]: farther than anything of the scene gets."""
-    wanted, farthest = needs(scene), 0.0
-    for body in scene.bodies:
-        if not isinstance(body.shape, HalfSpace):
-            farthest = max(farthest, math.hypot(*body.pose[:3]))
-    return max(GROUND, 2.0 * (farthest + wanted.top_speed * scene.duration))

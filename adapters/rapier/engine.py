@@ -8,7 +8,6 @@ Every number of a step belongs to all of its small steps: impulses are their sum
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from importlib.metadata import version
 from types import MappingProxyType
@@ -19,6 +18,8 @@ from adapters.needs import Needs
 from adapters.rapier.profiles import PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
 from adapters.rapier.simulation import RapierSimulation
 from adapters.scene import Scene
+from adapters.settings import checked_step
+from adapters.single_precision import without_a_place
 
 
 @final
@@ -83,11 +84,7 @@ class RapierEngine(Engine):
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that single precision cannot hold."""
-        for body in scene.bodies:
-            moments = body.inertia if isinstance(body.inertia, tuple) else (body.inertia,)
-            if body.motion == "free" and not all(1e-30 <= value <= 1e30 for value in (body.mass, *moments)):
-                return f"{body.name}.mass: mass or inertia has no place in single precision"
-        return None
+        return without_a_place(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.
@@ -97,9 +94,7 @@ class RapierEngine(Engine):
         EngineError
             For a scene that `refuses` names, a bad step or setting.
         """
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        chosen = checked(settings)
+        dt, chosen = checked_step(dt), checked(settings)
         reason = self.refuses(scene, "")
         if reason:
             raise EngineError(reason)

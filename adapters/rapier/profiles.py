@@ -6,12 +6,12 @@ tuned     stiffer contacts and more of the small steps that a step is made of
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters import settings
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
 #: Small steps of a step, as shipped. [`IntegrationParameters.num_solver_iterations`]
@@ -25,18 +25,19 @@ DAMPING = 10.0
 #: Overlap that is left alone, and distance at which contacts are seen ahead, in units of length.
 ALLOWED, PREDICTION = 0.005, 0.02
 
-SETTING_NAMES = (
-    "iterations",
-    "substeps",
-    "frequency",
-    "static_frequency",
-    "damping_ratio",
-    "allowed_error",
-    "prediction",
-    "friction_model",
-    "recycling",
+KINDS: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "iterations": settings.whole(1, 10**6),
+        "substeps": settings.whole(1, 10**6),
+        "frequency": settings.number(0.0, 1e9),
+        "static_frequency": settings.number(0.0, 1e9),
+        "damping_ratio": settings.number(0.0, 1e9),
+        "allowed_error": settings.number(0.0, 1e9),
+        "prediction": settings.number(0.0, 1e9),
+        "friction_model": settings.word("simplified", "coulomb"),
+        "recycling": settings.flag,
+    }
 )
-FRICTION_MODELS = ("simplified", "coulomb")
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
@@ -80,31 +81,6 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
 
 
-def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take.
-
-    Raises
-    ------
-    EngineError
-        Naming the first setting that is unknown, missing or of the wrong kind.
-    """
-    for name in settings:
-        if name not in SETTING_NAMES:
-            raise EngineError(f"{name}: rapier has no such setting, it has {', '.join(SETTING_NAMES)}")
-    for name in SETTING_NAMES:
-        if name not in settings:
-            raise EngineError(f"{name}: this setting is missing")
-    for name in ("iterations", "substeps"):
-        count = settings[name]
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10**6:
-            raise EngineError(f"{name}: {count!r} must be a whole number from 1 to 1000000")
-    if settings["friction_model"] not in FRICTION_MODELS:
-        raise EngineError(f"friction_model: {settings['friction_model']!r} must be one of {', '.join(FRICTION_MODELS)}")
-    if not isinstance(settings["recycling"], bool):
-        raise EngineError(f"recycling: {settings['recycling']!r} must be true or false")
-    for name in ("frequency", "static_frequency", "damping_ratio", "allowed_error", "prediction"):
-        value = settings[name]
-        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        if not number or not 0.0 <= value <= 1e9:
-            raise EngineError(f"{name}: {value!r} must be a number from 0 to 1e9")
-    return dict(settings)
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("rapier", KINDS, asked)

@@ -9,12 +9,14 @@ pytest.importorskip("dartpy", reason="DART is set apart: pip install 'contact-cr
 
 from adapters.conformance import items
 from adapters.dart import DartEngine
+from adapters.dart.laws import BLOWS, blow_law
 from adapters.dart.shipped import restitution
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling
+from validation.catalogue import CATALOGUE
 
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
@@ -87,3 +89,32 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, fi
     with pytest.raises(EngineError, match=rf"^{field}") as caught:
         ENGINE.build(sliding(), DT, settings(sliding(), profile, **changes))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("profile", ["default", "nsgs"])
+@pytest.mark.parametrize(
+    ("e", "speed", "leaves"),
+    [(0.2, 0.499, None), (0.2, 0.501, 0.1002), (0.5, 0.199, None), (1.0, 0.101, 0.101), (0.8, 150.0, 100.0)],
+)
+def test_the_speed_of_a_rebound_decides_whether_there_is_one_and_never_exceeds_100(profile, e, speed, leaves):
+    """Not the approach: 0.2 of 0.499 m/s is no rebound, all of 0.101 m/s is one."""
+    start = (0.0, 0.0, 0.5 + 2.3 * speed * DT, 1.0, 0.0, 0.0, 0.0)
+    ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), start, (0.0, 0.0, -speed, 0, 0, 0))
+    found = drive(Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e),), (0.0, 0.0, 0.0), 10 * DT), profile)
+    if leaves is None:
+        assert 0.0 <= found.twist[-1, 1, 2] <= 1.001e-3
+    else:
+        assert found.twist[-1, 1, 2] == pytest.approx(leaves, rel=1e-4)
+
+
+@pytest.mark.parametrize("profile", ["default", "pgs", "nsgs", "fbf"])
+@pytest.mark.parametrize("params", [{}, {"e": 0.0}, {"v": 0.1}, {"v": 50.0, "e": 1.0}], ids=str)
+def test_a_blow_is_what_its_law_says_and_a_millionth_more_is_not(profile, params):
+    impact = CATALOGUE["impact"]
+    scene = impact.scene(3, params)
+    found = impact.measure(scene, drive(scene, profile))
+    for metric in BLOWS["impact"]:
+        value, band = blow_law(metric, profile)(scene, DT, impact.measure)
+        assert abs(found[metric][0] - value) <= band, metric
+        if scene.params["e"] * scene.params["v"] > 0.1:
+            assert band < 1e-8 and (metric == "momentum_defect" or abs(found[metric][0] * 1.000001 - value) > band)

@@ -1,4 +1,4 @@
-"""What Box2D makes of seams, far places and corners: the laws of `adapters.box2d.motions` against the engine."""
+"""What Box2D makes of seams, far places and corners: the laws of `adapters.single_motions` against the engine."""
 
 from dataclasses import replace
 
@@ -9,9 +9,9 @@ pytest.importorskip("Box2D", reason="Box2D is set apart: pip install 'contact-cr
 
 from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import DEVIATIONS
-from adapters.box2d.motions import corner_law, standstill_law
 from adapters.needs import needs
 from adapters.scene import Pair
+from adapters.single_motions import corner_law, standstill_law
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 
@@ -104,9 +104,11 @@ def test_near_the_origin_and_of_other_scenes_the_law_of_places_is_silent():
         replace(far, bodies=(plate, replace(box, force=(1.0, 0.0)))),
         replace(far, bodies=(plate, replace(box, twist=(3.0, 1.0, 0.0)))),
         SEAM.scene(2),
-        FAR.scene(3),
     ):
         assert law(other, DT, FAR.measure) is None
+    deep = FAR.scene(3)
+    assert law(deep, DT, FAR.measure) == (0.0, 0.0)
+    assert law(replace(deep, gravity=(0.0, 0.1, -9.81)), DT, FAR.measure) is None
 
 
 @pytest.mark.parametrize(("skin", "stopped"), [(0.01, True), (0.0, False)])

@@ -1,4 +1,4 @@
-"""Two motions in the plane that single numbers change, as laws: a place that is too far away, a box on its corner."""
+"""Laws that engines share: a place too far away for single numbers, and a box on its corner in the plane."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        if len(scene.bodies) != 2 or scene.dimension != 2:
+        if len(scene.bodies) != 2:
             return None
         plate, box = scene.bodies
-        (x, _, _), (vx, vy, spin) = box.pose, box.twist
-        level = scene.gravity[0] == 0.0 and plate.motion == "fixed" and not any((*box.force, *box.torque, vy, spin))
+        x, vx, others = box.pose[0], box.twist[0], box.twist[1:]
+        level = not any(scene.gravity[:-1]) and plate.motion == "fixed" and not any((*box.force, *box.torque, *others))
         units, _ = chosen(scene, dt)
         place = np.float32(x * units)
         spacing = abs(float(np.nextafter(place, np.float32(math.copysign(math.inf, vx))) - place)) / units
@@ -37,7 +37,8 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
             return None
         start = np.array([body.pose for body in scene.bodies])
         times = np.array([0.0, step_count(scene.duration, dt) * dt])
-        still = Trajectory(times, np.array([start, start]), np.zeros((2, 2, 3)), None, dt, "completed")
+        rest = np.zeros((2, 2, len(box.twist)))
+        still = Trajectory(times, np.array([start, start]), rest, None, dt, "completed")
         value = measure(scene, still)[metric][0]
         # What is lost is lost to the last bit.
         return None if value is None else (value, 0.0)

@@ -1,0 +1,123 @@
+"""Contacts of Box2D 3.1 as far as its bindings show them: what the engine draws for debugging.
+
+No call of the bindings tells which contacts a body has. The engine draws each contact's points and normals, not the
+bodies; these are found by where the point lies. The impulses that it draws are sums over the solve and the relaxation
+of each small step, without a rebound: twice the weight of what rests, and of a blow what stops it. No momentum follows
+from them; they say that a contact pushed, and no more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import pyb2d3
+
+from adapters.engine import EngineError
+from adapters.scene import Body, Box, HalfSpace
+
+#: Point and unit normal of a contact that touches or pushed.
+Point = tuple[tuple[float, float], tuple[float, float]]
+#: Colour of the points of contacts that are seen ahead, and do not touch. [b2DrawContacts, b2_colorGray3]
+AHEAD = 0x4D4D4D
+#: What single numbers may make of the product of two unit normals, and the arc of a small turn within a step.
+ALONG = 1e-3
+
+
+class Pen(pyb2d3.DebugDraw):
+    """Keeps points and segments of what the engine draws of its contacts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.draw_shapes = self.draw_joints = False
+        self.draw_contacts = True
+        self.points: list[tuple[tuple[float, float], bool]] = []
+        self.segments: list[tuple[float, float]] = []
+
+    def draw_point(self, p: Any, size: float, color: int) -> None:
+        """Keep the point, and whether it is seen ahead only."""
+        x, y = p
+        self.points.append(((float(x), float(y)), color == AHEAD))
+
+    def draw_segment(self, p1: Any, p2: Any, color: int) -> None:
+        """Keep the vector: a normal, or an impulse along it."""
+        (x, y), (u, v) = p1, p2
+        self.segments.append((float(u) - float(x), float(v) - float(y)))
+
+    def drawn(
+        self, world: Any, normals: bool
+    ) -> tuple[list[tuple[tuple[float, float], bool]], list[tuple[float, float]]]:
+        """Points and vectors of all contacts, with their normals or their impulses."""
+        self.draw_contact_normals, self.draw_contact_impulses = normals, not normals
+        self.points, self.segments = [], []
+        world.draw(self, False)
+        return self.points, self.segments
+
+
+def touching(pen: Pen, world: Any) -> list[Point]:
+    """Points of contacts that touch, or have pushed within the step, with normals of length 1.
+
+    Raises
+    ------
+    EngineError
+        If points and vectors are not drawn one for one.
+    """
+    points, normals = pen.drawn(world, True)
+    _, pushes = pen.drawn(world, False)
+    if not len(points) == len(normals) == len(pushes):
+        raise EngineError(f"contacts: {len(points)} points are drawn with {len(normals)} normals")
+    found = []
+    for (place, ahead), (x, y), push in zip(points, normals, pushes, strict=True):
+        length = math.hypot(x, y)
+        if length > 0.0 and (not ahead or any(push)):
+            found.append((place, (x / length, y / length)))
+    return found
+
+
+def named(point: Point, bodies: Sequence[Body], places: Sequence[tuple[float, float, float, float]]) -> tuple[int, int]:
+    """Bodies of a contact: a plane across its normal has the first one behind it, the second ahead, and both at it.
+
+    ``places``: x, y, cosine and sine of each body when the contact was found.
+    """
+    (x, y), (nx, ny) = point
+    level, each = nx * x + ny * y, list(zip(bodies, places, strict=True))
+    away = [max(0.0, _distance(body, at, x, y)) for body, at in each]
+    behind = [away[k] + abs(level - _farthest(body, at, nx, ny)) for k, (body, at) in enumerate(each)]
+    ahead = [away[k] + abs(level + _farthest(body, at, -nx, -ny)) for k, (body, at) in enumerate(each)]
+    pairs = [
+        (behind[i] + ahead[j], i, j)
+        for i in range(len(bodies))
+        for j in range(len(bodies))
+        if i != j and "free" in (bodies[i].motion, bodies[j].motion)
+    ]
+    _, i, j = min(pairs)
+    return i, j
+
+
+def _farthest(body: Body, place: tuple[float, float, float, float], nx: float, ny: float) -> float:
+    """How far a body reaches along a direction of length 1 [m]; a half-space does so along its normal only."""
+    shape = body.shape
+    if isinstance(shape, HalfSpace):
+        along = nx * shape.normal[0] + ny * shape.normal[1] > 1.0 - ALONG
+        return shape.offset if along else math.inf
+    x, y, c, s = place
+    centre = nx * x + ny * y
+    if not isinstance(shape, Box):
+        return centre + shape.radius
+    a, b = shape.half_extents
+    return centre + a * abs(nx * c + ny * s) + b * abs(ny * c - nx * s)
+
+
+def _distance(body: Body, place: tuple[float, float, float, float], x: float, y: float) -> float:
+    """Signed distance of a point from a body's surface, negative inside [m]."""
+    shape = body.shape
+    if isinstance(shape, HalfSpace):
+        return shape.normal[0] * x + shape.normal[1] * y - shape.offset
+    px, py, c, s = place
+    u, v = x - px, y - py
+    if not isinstance(shape, Box):
+        return math.hypot(u, v) - shape.radius
+    a = abs(c * u + s * v) - shape.half_extents[0]
+    b = abs(c * v - s * u) - shape.half_extents[1]
+    return math.hypot(max(a, 0.0), max(b, 0.0)) + min(max(a, b), 0.0)

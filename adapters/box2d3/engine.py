@@ -1,0 +1,129 @@
+"""Box2D 3.1 behind the plugin line: planar, soft contacts, small steps with warm starting, single precision.
+
+    step:  detect  ->  n times: v += g dt/n, contacts as springs that are solved with the velocities, x += v dt/n,
+           contacts once more without their springs  ->  restitution  ->  sweep what moves against what does not
+
+Names in the sources are those of Box2D's own files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS, checked
+from adapters.box2d3.shipped import SUBSTEPS
+from adapters.box2d3.simulation import Box2D3Simulation
+from adapters.box2d3.translation import frictions, restitutions
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.scene import Scene
+from adapters.settings import checked_step
+from adapters.single_precision import without_a_place
+
+
+@final
+class Box2D3Engine(Engine):
+    """Planar engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="box2d3",
+        title="Box2D 3.1",
+        package="pyb2d3",
+        dimensions=frozenset({2}),
+        scheme=Scheme("detect, then small steps of velocity and position, restitution last, sweep", 1.0 / SUBSTEPS),
+        profile_schemes=MappingProxyType(
+            {"tuned": Scheme("as shipped, with twice the small steps", 1.0 / TUNED_SUBSTEPS)}
+        ),
+        customary_dt=1.0 / 60.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        precision="single",
+        apart=True,
+        quirks=(
+            Quirk(
+                "contacts are springs of 30 Hz, 60 Hz against what is fixed: columns sink by millimetres whatever "
+                "the step is",
+                "left alone in `default`, as stiff as the small steps resolve in `tuned`",
+                "types.c, b2DefaultWorldDef: contactHertz; solver.c, staticSoftness",
+            ),
+            Quirk(
+                "nothing rebounds below 1 m/s",
+                "left alone in `default`, what gravity adds in a step in `tuned`",
+                "types.c, b2DefaultWorldDef: restitutionThreshold",
+            ),
+            Quirk(
+                "a rebound comes after friction, which knows the impulse of compression only: mu / (1 + e)",
+                "left alone; laws predict it",
+                "contact_solver.c, b2ApplyRestitutionTask; measured with 0.11.1",
+            ),
+            Quirk(
+                "the bindings tell of no body's contacts; what the engine draws has points and normals, and impulses "
+                "that add up the solve and the relaxation of each small step: twice a weight, no rebound",
+                "points and normals are those that are drawn, impulses are not stated (NaN)",
+                "pyb2d3 0.11.1; contact_solver.c, totalNormalImpulse; measured",
+            ),
+            Quirk(
+                "friction of a pair is the root of a product, restitution the larger of two",
+                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "types.h, b2WorldDef: frictionCallback, restitutionCallback, which the bindings leave out",
+            ),
+            Quirk(
+                "the angle it tells is an approximation of an arc tangent, off by 1e-4",
+                "angles are computed from its cosine and sine",
+                "math_functions.c, b2Atan2",
+            ),
+            Quirk("bodies sleep", "worlds and bodies are made so that none may", "types.h, b2WorldDef, b2BodyDef"),
+            Quirk("there is room for 128 worlds", "a world is destroyed when its run ends", "core.h, B2_MAX_WORLDS"),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of the installed bindings, which bring their own Box2D."""
+        import pyb2d3  # noqa: F401  (a release that cannot be imported has no version)
+
+        return version("pyb2d3")
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        if restitutions(scene) is None:
+            return "pairs: restitution of a pair is the larger of two numbers here, this table has none"
+        if frictions(scene) is None:
+            return "pairs: friction of a pair is the root of a product of two numbers here, this table has none"
+        return without_a_place(scene)
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a spatial scene, a scene that `refuses` names, a bad step or setting.
+        """
+        if scene.dimension != 2:
+            raise EngineError("dimension: box2d3 is planar and cannot run a spatial scene")
+        dt, chosen = checked_step(dt), checked(settings)
+        reason = self.refuses(scene, "")
+        if reason:
+            raise EngineError(reason)
+        return Box2D3Simulation(scene, dt, chosen)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """Nothing so far."""
+        return {}
+
+    def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+        """Python: arguments of a step and attributes of the world."""
+        lines = [f"# world: your pyb2d3.World, stepped with world.step({dt:.9g}, {settings['substeps']})"]
+        if {"hertz", "damping_ratio", "push_speed"} & set(names):
+            springs = ", ".join(f"{settings[name]:g}" for name in ("hertz", "damping_ratio", "push_speed"))
+            lines.append(f"world.set_contact_tuning({springs})")
+        if "restitution_threshold" in names:
+            lines.append(f"world.restitution_threshold = {settings['restitution_threshold']:g}")
+        if "continuous" in names:
+            lines.append(f"world.continuous_enabled = {settings['continuous']}")
+        if "maximum_speed" in names:
+            lines.append(f"# and make it with pyb2d3.World(maximum_linear_speed={settings['maximum_speed']:g})")
+        return "\n".join(lines)

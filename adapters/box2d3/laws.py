@@ -1,0 +1,124 @@
+"""What Box2D 3.1 does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from adapters.box2d3.ball_on_plane import Chosen, ball_law
+from adapters.box2d3.profiles import PROFILES
+from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD
+from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.needs import needs
+from adapters.scene import Scene
+from adapters.single_motions import corner_law, standstill_law
+from adapters.single_precision import Method, Threshold, rounded_law
+
+#: Metrics of blows in free space, by scene.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "spin", "energy_lost", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),
+    "pair_matrix": tuple(f"{name}[{k}]" for name in ("restitution", "friction") for k in range(1, 5)),
+}
+
+
+#: Metrics of a ball on a plane, by scene.
+ON_A_PLANE: Mapping[str, tuple[str, ...]] = {
+    "bounce": ("rest_time",),
+    "oblique": ("rebound_ratio", "forward_speed", "spin_speed"),
+}
+
+
+def _chosen(profile: str) -> Chosen:
+    """Settings of a profile by name."""
+
+    def of(scene: Scene, dt: float) -> dict[str, Any]:
+        return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+
+    return of
+
+
+def _lengths(profile: str) -> Callable[[Scene, float], tuple[float, float]]:
+    """Units a metre of a profile, and its skin around polygons."""
+    return lambda scene, dt: (_chosen(profile)(scene, dt)["units_per_metre"], 0.0)
+
+
+def blow_law(profile: str, metric: str) -> Law:
+    """Blows in single precision, that rebound above the threshold, after friction."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        threshold = Threshold(_chosen(profile)(scene, dt)["restitution_threshold"], rebounds_at=True)
+        method = Method(threshold, rebound_after_friction=True)
+        return rounded_law(metric, method)(scene, dt, measure)
+
+    return law
+
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "box2d3",
+        (profile,),
+        scene,
+        exactly(metric),
+        blow_law(profile, metric),
+        "numbers are singles, 2^-24 of their size; nothing rebounds at an approach below the threshold; and friction "
+        "knows the impulse of compression only, as the rebound comes last",
+        "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for scene, metrics in BLOWS.items()
+    for metric in metrics
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d3",
+        (profile,),
+        scene,
+        metric,
+        ball_law(metric, _chosen(profile), sampled=metric == "rest_time"),
+        "a rebound is that of the velocity at the start of its step, comes after friction, above the threshold only; "
+        "the rest of that step is lost; the point that a ball is held by turns with it within a step, and lifts it",
+        "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for scene, metrics in ON_A_PLANE.items()
+    for metric in metrics
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d3",
+        (profile,),
+        "far_origin",
+        "stopping_distance",
+        standstill_law("stopping_distance", _lengths(profile)),
+        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d3",
+        (profile,),
+        "edge_drop",
+        metric,
+        # What approaches just as fast as the threshold rebounds here.
+        corner_law(
+            metric, _lengths(profile), math.nextafter(RESTITUTION_THRESHOLD, 0.0) if profile == "default" else 0.0
+        ),
+        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to the threshold",
+        "types.h, restitutionThreshold; motion in adapters/single_motions.py",
+        CHECKED_ON,
+    )
+    for profile in PROFILES
+    for metric in ("rise", "spin")
+)

@@ -1,0 +1,175 @@
+"""One Box2D 3.1 world and what is read from it.
+
+A step is made of small ones, each velocity first: poses and velocities belong together, contacts to the places where
+bodies stood before the step. Lengths are handed over in the units of the profile, and are metres again when read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.box2d3.translation import frictions, restitutions
+from adapters.engine import Array, Contacts, Simulation
+from adapters.ground import reach
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+
+_UNKNOWN = (math.nan, math.nan)
+
+
+class Box2D3Simulation(Simulation):
+    """One world; bodies in the scene's order."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import pyb2d3
+
+        from adapters.box2d3.drawing import Pen
+
+        self.scene, self.dt, self.settings = scene, dt, settings
+        units = self.units = float(settings["units_per_metre"])
+        self.world: Any = pyb2d3.World(
+            gravity=self._vector(scene.gravity),
+            restitution_threshold=settings["restitution_threshold"] * units,
+            maximum_linear_speed=settings["maximum_speed"] * units,
+        )
+        self.world.set_contact_tuning(settings["hertz"], settings["damping_ratio"], settings["push_speed"] * units)
+        self.world.continuous_enabled = settings["continuous"]
+        self.world.sleeping_enabled = False
+        self.reach = reach(scene)
+        self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
+        self.bodies = [self._made(pyb2d3, index, body) for index, body in enumerate(scene.bodies)]
+        self.loads = [
+            (self.bodies[i], self._vector(body.force), body.torque[0] * units**2)
+            for i, body in enumerate(scene.bodies)
+            if body.motion == "free" and (any(body.force) or any(body.torque))
+        ]
+        self.pen = Pen()
+        self.before = self._places()
+
+    def _vector(self, v: tuple[float, ...]) -> tuple[float, float]:
+        return v[0] * self.units, v[1] * self.units
+
+    def _made(self, pyb2d3: Any, index: int, asked: Body) -> Any:
+        make = {
+            "free": self.world.create_dynamic_body,
+            "fixed": self.world.create_static_body,
+            "prescribed": self.world.create_kinematic_body,
+        }[asked.motion]
+        if isinstance(asked.shape, HalfSpace):
+            (nx, ny), offset = asked.shape.normal, asked.shape.offset
+            x, y = offset * nx, offset * ny
+            # Without a turn along an axis of the world, of which a single number would miss.
+            c, s = (1.0, 0.0) if 0.0 in (nx, ny) else (ny, -nx)
+        else:
+            x, y, theta = asked.pose
+            c, s = math.cos(theta), math.sin(theta)
+        turn = pyb2d3.Rot()
+        turn.c, turn.s = c, s
+        body = make(position=self._vector((x, y)), rotation=turn, enable_sleep=False)
+        material = pyb2d3.surface_material(restitution=self.restitutions[index], friction=self.frictions[index])
+        body.create_shape(pyb2d3.shape_def(density=1.0, material=material), self._shape(pyb2d3, asked))
+        if asked.motion == "free":
+            assert isinstance(asked.inertia, float | int)
+            held = body.mass_data
+            held.mass, held.center = asked.mass, (0.0, 0.0)
+            held.rotational_inertia = asked.inertia * self.units**2
+            body.mass_data = held
+        if asked.motion != "fixed":
+            vx, vy, omega = asked.twist
+            body.linear_velocity, body.angular_velocity = self._vector((vx, vy)), omega
+        return body
+
+    def _shape(self, pyb2d3: Any, asked: Body) -> Any:
+        shape = asked.shape
+        if isinstance(shape, Disc):
+            return pyb2d3.circle(radius=shape.radius * self.units)
+        if isinstance(shape, Box):
+            return pyb2d3.box(*self._vector(shape.half_extents))
+        assert isinstance(shape, HalfSpace)
+        # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision.
+        nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
+        wide = self.reach * self.units
+        return pyb2d3.box(wide, wide, center=(-nx * wide, -ny * wide))
+
+    def _places(self) -> list[tuple[float, float, float, float]]:
+        """Place [m], cosine and sine of each body."""
+        rows, units = [], self.units
+        for body in self.bodies:
+            (x, y), turn = body.position, body.rotation
+            rows.append((float(x) / units, float(y) / units, float(turn.c), float(turn.s)))
+        return rows
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`; forces are cleared by every step."""
+        step, dt, count = self.world.step, self.dt, self.settings["substeps"]
+        for k in range(steps):
+            for body, force, torque in self.loads:
+                body.apply_force_to_center(force)
+                body.apply_torque(torque)
+            if k == steps - 1:
+                self.before = self._places()
+            step(dt, count)
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`; a half-space's own pose is the origin."""
+        rows = []
+        for asked, (x, y, c, s) in zip(self.scene.bodies, self._places(), strict=True):
+            rows.append((0.0, 0.0, 0.0) if isinstance(asked.shape, HalfSpace) else (x, y, math.atan2(s, c)))
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        units = self.units
+        rows = [
+            (x / units, y / units, body.angular_velocity) for body in self.bodies for x, y in (body.linear_velocity,)
+        ]
+        return np.array(rows, float)
+
+    def contacts(self) -> Contacts:
+        """Points and normals of what touched in the last step; impulses and gaps are not told (NaN)."""
+        from adapters.box2d3.drawing import named, touching
+
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for (x, y), normal in touching(self.pen, self.world):
+            point = (x / self.units, y / self.units)
+            i, j = named((point, normal), self.scene.bodies, self.before)
+            rows.append((i, j, point, normal, _UNKNOWN, math.nan))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 2)
+
+    def readback(self) -> dict[str, Any]:
+        """What the world, its bodies and shapes hold; the bindings do not tell springs and speeds again."""
+        world, units = self.world, self.units
+        held: dict[str, Any] = {
+            "dt": self.dt,
+            "gravity": [float(g) / units for g in world.gravity],
+            "restitution_threshold": float(world.restitution_threshold) / units,
+            "continuous": bool(world.continuous_enabled),
+            "may_sleep": bool(world.sleeping_enabled),
+            "bodies": {
+                asked.name: {
+                    "mass": float(body.mass),
+                    "inertia": float(body.mass_data.rotational_inertia) / units**2,
+                    "damping": [float(body.linear_damping), float(body.angular_damping)],
+                }
+                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
+                if asked.motion == "free"
+            },
+        }
+        shapes = [body.shapes[0] for body in self.bodies]
+        held["pairs"] = {
+            f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                "restitution": max(float(shapes[i].restitution), float(shapes[j].restitution)),
+                "friction": math.sqrt(float(shapes[i].friction) * float(shapes[j].friction)),
+            }
+            for i, j, _ in self.scene.contact_pairs()
+        }
+        return held
+
+    def close(self) -> None:
+        """Give the world back: there is room for 128 of them."""
+        self.bodies, self.loads = [], []
+        self.world.destroy()
