@@ -59,6 +59,8 @@ def _lift_body(body: Body) -> Body:
         twist=(vx, 0.0, vy, 0.0, -omega, 0.0),
         force=_lift_vector(body.force),
         torque=(0.0, -body.torque[0], 0.0),
+        surface_velocity=_lift_vector(body.surface_velocity),
+        course=body.course and replace(body.course, amplitude=_lift_vector(body.course.amplitude)),
     )
 
 
@@ -78,8 +80,8 @@ def _lowered_body(body: Body) -> Body | None:
     x, y, z, w, qx, qy, qz = body.pose
     vx, vy, vz, wx, wy, wz = body.twist
     shape = body.shape
-    out = (y, qx, qz, vy, wx, wz, body.force[1], body.torque[0], body.torque[2])
-    if any(out) or (isinstance(shape, HalfSpace) and shape.normal[1] != 0.0):
+    out = (y, qx, qz, vy, wx, wz, body.force[1], body.torque[0], body.torque[2], body.surface_velocity[1])
+    if any(out) or body.course is not None or (isinstance(shape, HalfSpace) and shape.normal[1] != 0.0):
         return None
     if isinstance(shape, HalfSpace):
         flat: Shape = HalfSpace((shape.normal[0], shape.normal[2]), shape.offset)
@@ -93,6 +95,7 @@ def _lowered_body(body: Body) -> Body | None:
         twist=(vx, vz, -wy),
         force=(body.force[0], body.force[2]),
         torque=(-body.torque[1],),
+        surface_velocity=(body.surface_velocity[0], body.surface_velocity[2]),
     )
 
 

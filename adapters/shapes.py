@@ -84,7 +84,7 @@ class Box:
 class HalfSpace:
     """Everything with ``normal . x <= offset`` [m] is solid, in world axes; ``normal`` is a unit vector.
 
-    It never moves, and its body's pose stays empty: normal and offset say where it lies.
+    Its body's pose stays empty: normal and offset say where it lies, at the start if its body is prescribed.
     """
 
     normal: tuple[float, ...]

@@ -269,11 +269,13 @@ def _posed(
     for body in scene.bodies:
         pose, twist, shape = np.array(body.pose), np.array(body.twist), body.shape
         if isinstance(shape, HalfSpace):
-            bodies.append(replace(body, shape=HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)))
+            face = HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)
+            twist = np.concatenate([place(twist[:d]), 0.0 * twist[d:]])
+            bodies.append(replace(_driven(body, place), shape=face, twist=_plain(twist)))
             continue
         bodies.append(
             replace(
-                body,
+                _driven(body, place),
                 pose=(*_plain(place(pose[:d])), *_plain(attitude(pose[d:]))),
                 twist=(*_plain(place(twist[:d])), *_plain(spin(twist[d:]))),
                 force=_plain(place(np.array(body.force))),
@@ -281,6 +283,12 @@ def _posed(
             )
         )
     return replace(scene, bodies=tuple(bodies))
+
+
+def _driven(body: Body, place: Callable[[Array], Array]) -> Body:
+    """The body with its surface's velocity and its course mapped."""
+    course = body.course and replace(body.course, amplitude=_plain(place(np.array(body.course.amplitude))))
+    return replace(body, surface_velocity=_plain(place(np.array(body.surface_velocity))), course=course)
 
 
 def _returned(found: Trajectory, matrix: Array, attitude: Callable[[Array], Array], spins: Array) -> Trajectory:

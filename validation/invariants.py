@@ -56,6 +56,8 @@ def fed_by(scene: Scene) -> str:
     """
     if any(body.motion == "prescribed" for body in scene.bodies):
         return "a prescribed body may feed energy in"
+    if any(any(body.surface_velocity) for body in scene.bodies):
+        return "a surface that runs may feed energy in"
     boxes = [body.motion == "free" and isinstance(body.shape, Box) for body in scene.bodies]
     if not any(boxes) or not any(e > 0.0 and mu > 0.0 for e, mu in scene.materials()):
         return ""  # without a look at every pair

@@ -56,8 +56,22 @@ class HalfSpaceModel(_Strict):
     offset: float = 0.0
 
 
+class CourseModel(_Strict):
+    """Oscillation of a prescribed body, added to its twist: ``amplitude`` [m] along the world axes, ``frequency`` [Hz].
+
+    It begins where the body's pose is: displaced by amplitude (sin(2 pi frequency t + phase) - sin(phase)).
+    """
+
+    amplitude: tuple[float, ...]
+    frequency: float
+    phase: float = 0.0
+
+
 class BodyModel(_Strict):
-    """A body; see `adapters.scene.Body`. ``mass`` [kg] or ``density`` [kg/m^2 in the plane, kg/m^3 in space]."""
+    """A body; see `adapters.scene.Body`. ``mass`` [kg] or ``density`` [kg/m^2 in the plane, kg/m^3 in space].
+
+    ``surface_velocity`` [m/s, world axes] makes a conveyor of a body that is not free.
+    """
 
     name: str
     shape: Annotated[DiscModel | SphereModel | BoxModel | HalfSpaceModel, Field(discriminator="type")]
@@ -69,6 +83,8 @@ class BodyModel(_Strict):
     motion: Literal["free", "fixed", "prescribed"] = "free"
     force: tuple[float, ...] = ()
     torque: tuple[float, ...] = ()
+    surface_velocity: tuple[float, ...] = ()
+    course: CourseModel | None = None
 
 
 class PairModel(_Strict):

@@ -13,6 +13,7 @@ import numpy as np
 
 from adapters.bullet.profiles import checked
 from adapters.bullet.translation import factors, moments, placement
+from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.scene import Body, HalfSpace, Scene, Sphere
 
@@ -85,7 +86,7 @@ class BulletSimulation(Simulation):
         for i, body in enumerate(scene.bodies):
             self._place(i, body)
         p.setGravity(*scene.gravity, physicsClientId=client)
-        self._loads = self._constant_loads()
+        self._loads, self._made = self._constant_loads(), 0
         self._driven = [i for i, body in enumerate(scene.bodies) if body.motion == "prescribed"]
         if self._driven:
             names = ", ".join(scene.bodies[i].name for i in self._driven)
@@ -142,7 +143,8 @@ class BulletSimulation(Simulation):
         # Pose first: it zeroes the velocity.
         self._p.resetBasePositionAndOrientation(identifier, position, quaternion, physicsClientId=client)
         if body.motion != "fixed":
-            self._p.resetBaseVelocity(identifier, body.twist[:3], body.twist[3:], physicsClientId=client)
+            velocity = velocity_over(body, self._dt, 0)
+            self._p.resetBaseVelocity(identifier, velocity, body.twist[3:], physicsClientId=client)
 
     def _constant_loads(self) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
         """External force and torque of every body that has any; a prescribed body is held against gravity."""
@@ -185,8 +187,10 @@ class BulletSimulation(Simulation):
     def _apply_loads(self) -> None:
         p, client = self._p, self._client
         for i in self._driven:
-            twist = self._scene.bodies[i].twist
-            p.resetBaseVelocity(self._ids[i], twist[:3], twist[3:], physicsClientId=client)
+            body = self._scene.bodies[i]
+            velocity = velocity_over(body, self._dt, self._made)
+            p.resetBaseVelocity(self._ids[i], velocity, body.twist[3:], physicsClientId=client)
+        self._made += 1
         for i, force, torque in self._loads:
             centre, _ = p.getBasePositionAndOrientation(self._ids[i], physicsClientId=client)
             p.applyExternalForce(self._ids[i], -1, force, centre, p.WORLD_FRAME, physicsClientId=client)

@@ -72,4 +72,5 @@ def moments(body: Body, mass: float) -> tuple[float, ...]:
     if body.motion == "free":
         assert isinstance(body.inertia, tuple)
         return body.inertia
-    return (mass * body.shape.smallest_size**2,) * 3
+    size = FLOOR_DEPTH if isinstance(body.shape, HalfSpace) else body.shape.smallest_size
+    return (mass * size**2,) * 3

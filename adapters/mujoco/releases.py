@@ -201,7 +201,9 @@ def _text(attributes: dict[str, Any]) -> dict[str, str]:
 def _written(value: Any) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, int) and not isinstance(value, bool):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
         return repr(value)

@@ -115,6 +115,56 @@ def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values
     assert_same_bits(slot, tmp_path, allowed=("reference_solver",) if engine == registry.solver() else ())
 
 
+DRIVEN = """
+name = "driven"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.25
+[[bodies]]
+name = "belt"
+shape = { type = "half_space", angle = 0.0 }
+motion = "%s"
+surface_velocity = [%s, 0.0]
+%s
+[[bodies]]
+name = "box"
+shape = { type = "box", half_extents = [0.5, 0.25] }
+pose = [0.0, 0.25, 0.0]
+[[bodies]]
+name = "hammer"
+shape = { type = "box", half_extents = [0.5, 0.25] }
+motion = "prescribed"
+pose = [1.2, 0.35, 0.1]
+twist = [-0.2, 0.0, 0.5]
+%s
+[[pairs]]
+friction = 0.5
+"""
+COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
+
+
+@pytest.mark.parametrize(("engine", "runs", "shaken"), [
+    ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
+    ("mujoco", False, True), ("reference", True, False),
+])  # fmt: skip
+def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
+    found = registry.find(engine).engine
+    if found is None:
+        pytest.skip(f"{engine} is not installed")
+    from validation.posed import pinned
+
+    path, course = tmp_path / "driven.toml", COURSE if shaken else ""
+    moved = ("fixed", 1.0, "") if runs else ("prescribed", 0.0, COURSE)
+    path.write_text(DRIVEN % (*moved, course))
+    slot = slot_of(engine, pinned(str(path)), {}, found.facts.profile("textbook") or "tuned", 2)
+    allowed = ("reference_solver",) if engine == registry.solver() else ()
+    pose, twist = printed(slot, tmp_path, allowed)
+    expected = ended(slot)
+    standing = [1, 2] if runs else [0, 1, 2]  # a script's conveyor may be a half-space that moves along itself
+    assert np.array_equal(pose[standing], expected[0][standing])
+    assert np.array_equal(twist[standing], expected[1][standing])
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimension, profile):
