@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engine import Array, Contacts
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Shape, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Shape, Sphere
 
 
 def lift(scene: Scene) -> Scene:
@@ -40,6 +40,11 @@ def _lift_shape(shape: Shape) -> Shape:
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
         return Box((hx, max(hx, hy), hy))  # as deep as it is wide or tall, so that it cannot fall sideways
+    if isinstance(shape, Capsule):
+        return shape
+    if isinstance(shape, Polygon):  # a prism, as deep as it is wide
+        deep = shape.reach
+        return Hull(tuple((x, y, z) for x, z in shape.vertices for y in (-deep, deep)))
     assert isinstance(shape, HalfSpace)
     return HalfSpace(_lift_vector(shape.normal), shape.offset)
 
@@ -85,6 +90,10 @@ def _lowered_body(body: Body) -> Body | None:
         return None
     if isinstance(shape, HalfSpace):
         flat: Shape = HalfSpace((shape.normal[0], shape.normal[2]), shape.offset)
+    elif isinstance(shape, Capsule):
+        flat = shape
+    elif isinstance(shape, Cylinder | Hull):
+        return None
     else:
         flat = Disc(shape.radius) if isinstance(shape, Sphere) else Box(_ends(shape))
     return replace(

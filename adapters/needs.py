@@ -11,6 +11,7 @@ from typing import Literal
 
 from adapters.drives import top_speed
 from adapters.scene import Box, HalfSpace, Scene
+from adapters.shapes import ROUND
 
 Regime = Literal["free", "impact", "rest"]
 
@@ -70,7 +71,7 @@ def needs(scene: Scene) -> Needs:
     masses = [body.mass for body in free] or [1.0]
     return Needs(
         dimension=d,
-        rotation=friction > 0.0 or spin or any(isinstance(body.shape, Box) for body in free),
+        rotation=friction > 0.0 or spin or any(not isinstance(body.shape, ROUND) for body in free),
         friction=friction,
         restitution=restitution,
         regime=_regime(bool(materials), restitution, loaded),

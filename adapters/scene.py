@@ -35,9 +35,14 @@ from adapters.plain import NAME, is_visible, one_line
 from adapters.shapes import (
     SHAPE_NAMES,
     SHAPES,
+    SHAPES_OF,
     Box,
+    Capsule,
+    Cylinder,
     Disc,
     HalfSpace,
+    Hull,
+    Polygon,
     SceneError,
     Shape,
     Sphere,
@@ -49,12 +54,16 @@ from adapters.shapes import (
 __all__ = [
     "Body",
     "Box",
+    "Capsule",
+    "Cylinder",
     "Disc",
     "HalfSpace",
     "Harmonic",
+    "Hull",
     "ImpactLaw",
     "Motion",
     "Pair",
+    "Polygon",
     "Scene",
     "SceneError",
     "Shape",
@@ -226,7 +235,7 @@ def _canonical(value: Any) -> Any:
 
 
 def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+    return tuple(map(_as_tuple, value)) if isinstance(value, list | tuple) else value
 
 
 def _identity(dimension: int) -> tuple[float, ...]:
@@ -272,8 +281,7 @@ def _validate_scene(scene: Scene) -> None:
 
 def _validate_body(body: Body, dimension: int) -> None:
     planar = dimension == 2
-    allowed = (Disc, Box, HalfSpace) if planar else (Sphere, Box, HalfSpace)
-    if not isinstance(body.shape, allowed):
+    if not isinstance(body.shape, SHAPES_OF[dimension]):
         raise SceneError(f"{body.name}.shape: a {type(body.shape).__name__} has no place in {dimension}-D")
     body.shape.validate(body.name)
     if isinstance(body.shape, Box):

@@ -18,7 +18,8 @@ import numpy as np
 from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Contacts, Engine, EngineError, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
-from adapters.scene import Body, Box, Disc, Scene, Sphere
+from adapters.scene import Body, Scene
+from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
 #: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
@@ -192,7 +193,7 @@ def _record(
 def _fastest(scene: Scene) -> float:
     """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add."""
     d = scene.dimension
-    initial = max(top_speed(b) + _reach(b) * math.hypot(*b.twist[d:]) for b in scene.bodies)
+    initial = max(top_speed(b) + reach(b.shape) * math.hypot(*b.twist[d:]) for b in scene.bodies)
     pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
     return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
 
@@ -200,14 +201,7 @@ def _fastest(scene: Scene) -> float:
 def _pull(body: Body) -> float:
     """Acceleration that a body's external force and torque give to its outermost point [m/s^2]."""
     moment = min(body.inertia) if isinstance(body.inertia, tuple) else body.inertia
-    return math.hypot(*body.force) / body.mass + _reach(body) * math.hypot(*body.torque) / moment
-
-
-def _reach(body: Body) -> float:
-    """Distance of the outermost point from the centre [m]: a contact turns spin into that much speed."""
-    if isinstance(body.shape, Box):
-        return math.hypot(*body.shape.half_extents)
-    return body.shape.radius if isinstance(body.shape, Disc | Sphere) else 0.0
+    return math.hypot(*body.force) / body.mass + reach(body.shape) * math.hypot(*body.torque) / moment
 
 
 def _divergence(pose: np.ndarray, twist: np.ndarray, dimension: int, limit: float) -> str:

@@ -13,6 +13,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from adapters.scene import Pair, Scene, SceneError, Shape, scene_from_dict
+from adapters.shapes import MOST_VERTICES
+from validation.centring import centre
 from validation.mass_properties import HOW, moments, volume
 from validation.quantities import QUANTITIES, parts_of
 from validation.stated import Stated, StatedCheck
@@ -41,6 +43,36 @@ class BoxModel(_Strict):
 
     type: Literal["box"]
     half_extents: tuple[float, ...]
+
+
+class CapsuleModel(_Strict):
+    """All points within ``radius`` of a segment of 2 ``half_length`` on the body's x axis [m]."""
+
+    type: Literal["capsule"]
+    half_length: float
+    radius: float
+
+
+class CylinderModel(_Strict):
+    """Cylinder about the body's x axis, 2 ``half_length`` long [m]; spatial."""
+
+    type: Literal["cylinder"]
+    half_length: float
+    radius: float
+
+
+class PolygonModel(_Strict):
+    """Convex polygon by its corners [m], counter-clockwise; planar. The body's centre is their centroid."""
+
+    type: Literal["polygon"]
+    vertices: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=MOST_VERTICES)
+
+
+class HullModel(_Strict):
+    """Convex hull of its corners [m]; spatial. The body's centre is its centre of mass."""
+
+    type: Literal["hull"]
+    vertices: tuple[tuple[float, float, float], ...] = Field(min_length=4, max_length=MOST_VERTICES)
 
 
 class HalfSpaceModel(_Strict):
@@ -74,7 +106,10 @@ class BodyModel(_Strict):
     """
 
     name: str
-    shape: Annotated[DiscModel | SphereModel | BoxModel | HalfSpaceModel, Field(discriminator="type")]
+    shape: Annotated[
+        DiscModel | SphereModel | BoxModel | HalfSpaceModel | CapsuleModel | PolygonModel | CylinderModel | HullModel,
+        Field(discriminator="type"),
+    ]
     mass: float | None = None
     density: float | None = None
     inertia: float | tuple[float, float, float] | None = None
@@ -144,6 +179,8 @@ def stated(model: SceneModel) -> Stated:
     data = model.model_dump(exclude={"checks"})
     for body in data["bodies"]:
         _face(body, model.dimension, notes)
+        if body["shape"]["type"] in ("polygon", "hull"):
+            centre(body, notes)
         _mass(body, model.dimension, notes)
     scene = scene_from_dict(data)
     for number, check in enumerate(model.checks):
@@ -191,7 +228,7 @@ def _mass(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
     shape = _shape(body["shape"], name)
     unit = "kg m^2"
     if density is not None:
-        body["mass"] = density * volume(shape)
+        body["mass"] = density * volume(shape, dimension)
         notes.append(f"{name}.mass: {body['mass']:.6g} kg, its density times its {_content(dimension)}")
     elif body["mass"] is None:
         body["mass"] = 1.0

@@ -80,7 +80,10 @@ def _metric(name: str, at: float | None = None) -> str:
 
 
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
-    beyond, depth = invariants.deepest(read.scene, trajectory)
+    try:
+        beyond, depth = invariants.deepest(read.scene, trajectory)
+    except ModuleNotFoundError:
+        beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
     measured: dict[str, Measured] = {
         "energy_growth": invariants.energy_growth(read.scene, trajectory),
         "penetration": beyond,

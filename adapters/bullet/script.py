@@ -8,10 +8,10 @@ from typing import Any
 
 from adapters.bullet.profiles import checked
 from adapters.bullet.simulation import HEAVY, WAITING_ROOM
-from adapters.bullet.translation import factors, moments, placement
+from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.drives import velocity_over
 from adapters.engine import EngineError
-from adapters.scene import Body, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 from adapters.script import constants, imports, keywords, literal, stepped, text, velocity
 
 
@@ -43,8 +43,15 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
 def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any]) -> list[str]:
     """Lines that make a body in its place in the waiting room."""
     sizes, _, quaternion = placement(body, scene)
-    round_ = isinstance(body.shape, Sphere)
-    shape = f"p.GEOM_SPHERE, radius={sizes[0]!r}" if round_ else f"p.GEOM_BOX, halfExtents={literal(sizes)}"
+    shape = f"p.GEOM_BOX, halfExtents={literal(sizes)}"
+    if isinstance(body.shape, Sphere):
+        shape = f"p.GEOM_SPHERE, radius={sizes[0]!r}"
+    elif isinstance(body.shape, Hull):
+        shape = f"p.GEOM_MESH, vertices={literal(body.shape.vertices)}"
+    elif isinstance(body.shape, Capsule | Cylinder):
+        kind = "p.GEOM_CAPSULE" if isinstance(body.shape, Capsule) else "p.GEOM_CYLINDER"
+        lying = f"collisionFrameOrientation={literal(Z_TO_X)}"
+        shape = f"{kind}, radius={sizes[0]!r}, height={sizes[1]!r}, {lying}"
     waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
     given = f"{mass!r}, shape, -1, {literal(waiting)}, {literal(quaternion)}, useMaximalCoordinates={maximal}"
     lines = [

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from adapters.bullet.profiles import checked
-from adapters.bullet.translation import factors, moments, placement
+from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.scene import Body, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5
@@ -101,6 +101,12 @@ class BulletSimulation(Simulation):
         sizes, position, quaternion = placement(body, self._scene)
         if isinstance(body.shape, Sphere):
             shape = p.createCollisionShape(p.GEOM_SPHERE, radius=sizes[0], physicsClientId=client)
+        elif isinstance(body.shape, Capsule | Cylinder):
+            kind = p.GEOM_CAPSULE if isinstance(body.shape, Capsule) else p.GEOM_CYLINDER
+            lying = {"collisionFrameOrientation": Z_TO_X}
+            shape = p.createCollisionShape(kind, radius=sizes[0], height=sizes[1], **lying, physicsClientId=client)
+        elif isinstance(body.shape, Hull):
+            shape = p.createCollisionShape(p.GEOM_MESH, vertices=body.shape.vertices, physicsClientId=client)
         else:
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=sizes, physicsClientId=client)
         mass = {"free": body.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[body.motion]

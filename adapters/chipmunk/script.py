@@ -8,7 +8,7 @@ from typing import Any
 from adapters.chipmunk.profiles import checked
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import corners, moment
-from adapters.scene import Body, Disc, Scene
+from adapters.scene import Body, Capsule, Disc, Scene
 from adapters.script import constants, imports, literal, stepped, text, velocity
 
 _SPACE = ("iterations", "collision_slop", "collision_bias", "collision_persistence")
@@ -40,6 +40,9 @@ def _made(asked: Body, body: Any, shape: Any) -> list[str]:
         lines.append(f"body.velocity, body.angular_velocity = {literal(tuple(body.velocity))}, {asked.twist[2]!r}")
     if isinstance(asked.shape, Disc):
         lines.append(f"shape = pymunk.Circle(body, {asked.shape.radius!r})")
+    elif isinstance(asked.shape, Capsule):
+        x = asked.shape.half_length
+        lines.append(f"shape = pymunk.Segment(body, ({-x!r}, 0.0), ({x!r}, 0.0), {asked.shape.radius!r})")
     else:
         lines.append(f"shape = pymunk.Poly(body, {corners(asked.shape)!r})")
     if any(asked.surface_velocity):

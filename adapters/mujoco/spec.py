@@ -13,11 +13,13 @@ from adapters.engine import Array, EngineError
 from adapters.mujoco.moving import is_moved_face
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
-from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
 #: below the round-off that every check allows.
 PRESCRIBED_MASS = 1e15
+#: MuJoCo's capsules and cylinders lie along their z axis, ours along the body's x.
+Z_TO_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 
 
 def moments(body: Body) -> tuple[float, float, float]:
@@ -65,6 +67,7 @@ class Spec:
         self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
         one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
         self.shared = materials.pop() if one else None
+        self.hulls: list[str] = []
         self._options()
         free = [body for body in scene.bodies if body.motion == "free"]
         self.heavy = PRESCRIBED_MASS * max((b.mass for b in free), default=1.0)
@@ -117,6 +120,14 @@ class Spec:
             return {"type": kinds.mjGEOM_SPHERE, "size": [shape.radius, 0.0, 0.0]}
         if isinstance(shape, Box):
             return {"type": kinds.mjGEOM_BOX, "size": list(shape.half_extents)}
+        if isinstance(shape, Capsule | Cylinder):
+            kind = kinds.mjGEOM_CAPSULE if isinstance(shape, Capsule) else kinds.mjGEOM_CYLINDER
+            return {"type": kind, "size": [shape.radius, shape.half_length, 0.0], "quat": Z_TO_X}
+        if isinstance(shape, Hull):
+            name = f"hull{len(self.hulls)}"
+            self.hulls.append(name)
+            self.spec.add_mesh(name=name, uservert=[x for vertex in shape.vertices for x in vertex])
+            return {"type": kinds.mjGEOM_MESH, "meshname": name}
         assert isinstance(shape, HalfSpace)
         foot = [shape.offset * n for n in shape.normal]
         plane = {"type": kinds.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}  # 0: without end, and exact

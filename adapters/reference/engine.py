@@ -33,7 +33,7 @@ LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is le
 
 
 class ReferenceEngine(Engine):
-    """Planar and spatial; discs, spheres, boxes, half-spaces."""
+    """Planar and spatial; discs, spheres, boxes, capsules, planar polygons, half-spaces."""
 
     facts = EngineFacts(
         name="reference",
@@ -44,7 +44,7 @@ class ReferenceEngine(Engine):
         customary_dt=1.0 / 60.0,
         roles=MappingProxyType({"classical": "textbook", "reference": "solution"}),
         colour="#3568ad",
-        abilities=frozenset({"moving half-space"}),
+        abilities=frozenset({"moving half-space", "capsule", "polygon"}),
         profile_schemes=MappingProxyType({"reference": LOCATED}),
         quirks=(
             Quirk(
