@@ -212,17 +212,25 @@ class Scene:
 
 def scene_from_dict(data: Mapping[str, Any]) -> Scene:
     """Inverse of `Scene.as_dict`; the file boundary (`validation.scene_files`) checks types before."""
-    bodies = []
-    for raw in data["bodies"]:
-        shape = dict(raw["shape"])
-        cls = SHAPES[shape.pop("type")]
-        values = {**raw, "shape": cls(**{k: _as_tuple(v) for k, v in shape.items()})}
-        if values.get("course") is not None:
-            values["course"] = Harmonic(**{k: _as_tuple(v) for k, v in values["course"].items()})
-        bodies.append(Body(**{key: _as_tuple(value) for key, value in values.items()}))
+    bodies = [body_from_dict(raw) for raw in data["bodies"]]
     rest = {key: _as_tuple(value) for key, value in data.items() if key not in ("bodies", "pairs", "params")}
     pairs = tuple(Pair(**pair) for pair in data["pairs"])
     return Scene(bodies=tuple(bodies), pairs=pairs, params=dict(data.get("params", {})), **rest)
+
+
+def body_from_dict(raw: Mapping[str, Any]) -> Body:
+    """One body of `Scene.as_dict`'s data, not yet checked."""
+    shape = dict(raw["shape"])
+    cls = SHAPES[shape.pop("type")]
+    values = {**raw, "shape": cls(**{k: _as_tuple(v) for k, v in shape.items()})}
+    if values.get("course") is not None:
+        values["course"] = Harmonic(**{k: _as_tuple(v) for k, v in values["course"].items()})
+    return Body(**{key: _as_tuple(value) for key, value in values.items()})
+
+
+def check_body(body: Body, dimension: int) -> None:
+    """Raise `SceneError`, naming the field, unless ``body`` is one that a scene of this dimension may hold."""
+    _validate_body(_complete(body, dimension), dimension)
 
 
 def _canonical(value: Any) -> Any:
