@@ -150,8 +150,8 @@ def _view(
     room = FOLLOWED * (high - low)
     for _, recording in members:
         seen = recording.pose[:, free, :d].reshape(-1, d)
-        low = np.minimum(low, np.maximum(seen.min(0) - reach, low - room))
-        high = np.maximum(high, np.minimum(seen.max(0) + reach, high + room))
+        low = np.minimum(low, np.maximum(seen.min(0) - around, low - room))
+        high = np.maximum(high, np.minimum(seen.max(0) + around, high + room))
     return low, high
 
 
