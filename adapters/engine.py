@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from adapters.drives import Ability
 from adapters.needs import Needs
 from adapters.releases import Releases
 from adapters.scene import Scene
@@ -193,6 +194,9 @@ class EngineFacts:
     precision: Precision = "double"
     #: Whether an extra of its own alone installs it: a run that names no engine leaves it out where it is not there.
     apart: bool = False
+    #: What the adapter honours beyond discs, balls, boxes and half-spaces that are fixed. A scene that asks for more is
+    #: UNSUPPORTED before the adapter sees it.
+    abilities: frozenset[Ability] = frozenset()
 
     @property
     def epsilon(self) -> float:

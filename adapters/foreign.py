@@ -19,6 +19,7 @@ from importlib.metadata import EntryPoint
 from multiprocessing.connection import Connection
 from typing import Any, cast, get_args
 
+from adapters.drives import Ability
 from adapters.engine import (
     ROLES,
     Declared,
@@ -268,6 +269,7 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         _colour(data["colour"]),
         _precision(data["precision"]),
         bool(data["apart"]),
+        frozenset(map(_ability, data["abilities"])),
     )
 
 
@@ -275,6 +277,12 @@ def _precision(text: Any) -> Precision:
     if text not in get_args(Precision):
         raise ValueError(f"precision is {one_line(text, NAME)!r}, possible are {', '.join(get_args(Precision))}")
     return cast(Precision, text)
+
+
+def _ability(text: Any) -> Ability:
+    if text not in get_args(Ability):
+        raise ValueError(f"ability is {one_line(text, NAME)!r}, possible are {', '.join(get_args(Ability))}")
+    return cast(Ability, text)
 
 
 def _role(role: Any) -> Role:

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engine import Array, Contacts
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Shape, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Shape, Sphere
 
 
 def lift(scene: Scene) -> Scene:
@@ -40,6 +40,11 @@ def _lift_shape(shape: Shape) -> Shape:
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
         return Box((hx, max(hx, hy), hy))  # as deep as it is wide or tall, so that it cannot fall sideways
+    if isinstance(shape, Capsule):
+        return shape
+    if isinstance(shape, Polygon):  # a prism, as deep as it is wide
+        deep = shape.reach
+        return Hull(tuple((x, y, z) for x, z in shape.vertices for y in (-deep, deep)))
     assert isinstance(shape, HalfSpace)
     return HalfSpace(_lift_vector(shape.normal), shape.offset)
 
@@ -59,6 +64,8 @@ def _lift_body(body: Body) -> Body:
         twist=(vx, 0.0, vy, 0.0, -omega, 0.0),
         force=_lift_vector(body.force),
         torque=(0.0, -body.torque[0], 0.0),
+        surface_velocity=_lift_vector(body.surface_velocity),
+        course=body.course and replace(body.course, amplitude=_lift_vector(body.course.amplitude)),
     )
 
 
@@ -78,11 +85,15 @@ def _lowered_body(body: Body) -> Body | None:
     x, y, z, w, qx, qy, qz = body.pose
     vx, vy, vz, wx, wy, wz = body.twist
     shape = body.shape
-    out = (y, qx, qz, vy, wx, wz, body.force[1], body.torque[0], body.torque[2])
-    if any(out) or (isinstance(shape, HalfSpace) and shape.normal[1] != 0.0):
+    out = (y, qx, qz, vy, wx, wz, body.force[1], body.torque[0], body.torque[2], body.surface_velocity[1])
+    if any(out) or body.course is not None or (isinstance(shape, HalfSpace) and shape.normal[1] != 0.0):
         return None
     if isinstance(shape, HalfSpace):
         flat: Shape = HalfSpace((shape.normal[0], shape.normal[2]), shape.offset)
+    elif isinstance(shape, Capsule):
+        flat = shape
+    elif isinstance(shape, Cylinder | Hull):
+        return None
     else:
         flat = Disc(shape.radius) if isinstance(shape, Sphere) else Box(_ends(shape))
     return replace(
@@ -93,6 +104,7 @@ def _lowered_body(body: Body) -> Body | None:
         twist=(vx, vz, -wy),
         force=(body.force[0], body.force[2]),
         torque=(-body.torque[1],),
+        surface_velocity=(body.surface_velocity[0], body.surface_velocity[2]),
     )
 
 

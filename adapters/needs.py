@@ -9,7 +9,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from adapters.drives import top_speed
 from adapters.scene import Box, HalfSpace, Scene
+from adapters.shapes import ROUND
 
 Regime = Literal["free", "impact", "rest"]
 
@@ -32,12 +34,12 @@ class Needs:
         ``impact``: a pair that can meet has e > 0, or nothing but motion brings bodies together;
         ``rest``: gravity or a force acts and no e > 0; ``free``: no pair can meet.
     slide
-        Friction acts and a body starts with tangential motion or spin, or load acts along a fixed half-space; over a
-        fixed box what moves across gravity slides.
+        Friction acts and a body starts with tangential motion or spin, or a surface runs, or load acts along a
+        half-space; over a fixed box what moves across gravity slides.
     smallest_size
         Smallest full extent of a free body [m].
     top_speed
-        Largest initial speed plus what gravity can add over the duration [m/s].
+        Largest initial, prescribed or surface speed plus what gravity can add over the duration [m/s].
     mass_ratio
         Largest over smallest mass of the free bodies.
     gravity
@@ -69,13 +71,13 @@ def needs(scene: Scene) -> Needs:
     masses = [body.mass for body in free] or [1.0]
     return Needs(
         dimension=d,
-        rotation=friction > 0.0 or spin or any(isinstance(body.shape, Box) for body in free),
+        rotation=friction > 0.0 or spin or any(not isinstance(body.shape, ROUND) for body in free),
         friction=friction,
         restitution=restitution,
         regime=_regime(bool(materials), restitution, loaded),
         slide=friction > 0.0 and (spin or _tangential(scene)),
         smallest_size=min((body.shape.smallest_size for body in free), default=1.0),
-        top_speed=max((math.hypot(*body.twist[:d]) for body in scene.bodies), default=0.0) + gravity * scene.duration,
+        top_speed=max(map(top_speed, scene.bodies)) + gravity * scene.duration,
         mass_ratio=max(masses) / min(masses),
         gravity=gravity,
     )
@@ -88,8 +90,13 @@ def _regime(can_meet: bool, restitution: float, loaded: bool) -> Regime:
 
 
 def _tangential(scene: Scene) -> bool:
-    """True if a body moves along, or load acts along, the face of a half-space, or moves level over a fixed box."""
+    """True if a body moves along, or load acts along, the face of a half-space, or moves level over a fixed box.
+
+    So it is where a surface runs, or a course moves what others lie on.
+    """
     d = scene.dimension
+    if any(any(body.surface_velocity) or body.course for body in scene.bodies):
+        return True
     motions = [body.twist[:d] for body in scene.bodies]
     loads = [scene.gravity] + [body.force for body in scene.bodies]
     for face in (body.shape for body in scene.bodies if isinstance(body.shape, HalfSpace)):

@@ -15,7 +15,7 @@ import numpy as np
 
 from adapters.engine import Array, Contacts, Declared, Engine, EngineError, Simulation
 from adapters.needs import Needs
-from adapters.scene import Body, Box, Disc, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, Disc, Hull, Polygon, Scene, Sphere
 
 #: Faults of a given size that any engine can be given from outside, in what it is told...
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
@@ -83,6 +83,11 @@ class Planted(Engine):
             return replace(body, inertia=k * moments)
         if self.fault == "extent" and isinstance(shape, Box):
             return replace(body, shape=Box(tuple(k * h for h in shape.half_extents)))
+        if self.fault == "extent" and isinstance(shape, Capsule | Cylinder):
+            return replace(body, shape=type(shape)(shape.half_length, k * shape.radius))
+        if self.fault == "extent" and isinstance(shape, Polygon | Hull):
+            corners: Any = tuple(tuple(k * x for x in vertex) for vertex in shape.vertices)
+            return replace(body, shape=type(shape)(corners))
         if self.fault == "extent" and isinstance(shape, Disc | Sphere):
             return replace(body, shape=type(shape)(k * shape.radius))
         return body

@@ -29,14 +29,20 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any, Literal
 
+from adapters.drives import Harmonic, check_drive
 from adapters.materials import Materials, Pair, single
 from adapters.plain import NAME, is_visible, one_line
 from adapters.shapes import (
     SHAPE_NAMES,
     SHAPES,
+    SHAPES_OF,
     Box,
+    Capsule,
+    Cylinder,
     Disc,
     HalfSpace,
+    Hull,
+    Polygon,
     SceneError,
     Shape,
     Sphere,
@@ -45,7 +51,24 @@ from adapters.shapes import (
     check_positive,
 )
 
-__all__ = ["Body", "Box", "Disc", "HalfSpace", "ImpactLaw", "Motion", "Pair", "Scene", "SceneError", "Shape", "Sphere"]
+__all__ = [
+    "Body",
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "Disc",
+    "HalfSpace",
+    "Harmonic",
+    "Hull",
+    "ImpactLaw",
+    "Motion",
+    "Pair",
+    "Polygon",
+    "Scene",
+    "SceneError",
+    "Shape",
+    "Sphere",
+]
 
 Motion = Literal["free", "fixed", "prescribed"]
 ImpactLaw = Literal["N-SIM", "N-SEQ"]
@@ -68,9 +91,15 @@ class Body:
     pose, twist
         As in the module's conventions. An empty pose or twist stands for the origin and for rest.
     motion
-        ``free``; ``fixed``; or ``prescribed`` (moves with its constant twist whatever hits it).
+        ``free``; ``fixed``; or ``prescribed`` (moves with its constant twist whatever hits it). A half-space is not
+        free, and does not turn.
     force, torque
         Constant external load in world axes [N], [N m]; torque is a 1-tuple in the plane.
+    surface_velocity
+        Of a body that is not free: velocity of its surface against the body [m/s], world axes; what of it lies along
+        the face that is touched drags by friction (a conveyor).
+    course
+        Of a prescribed body: oscillation that is added to its twist (`adapters.drives`).
     """
 
     name: str
@@ -82,6 +111,8 @@ class Body:
     motion: Motion = "free"
     force: tuple[float, ...] = ()
     torque: tuple[float, ...] = ()
+    surface_velocity: tuple[float, ...] = ()
+    course: Harmonic | None = None
 
 
 @dataclass(frozen=True)
@@ -162,10 +193,14 @@ class Scene:
                 yield i, j, self.material(self.bodies[i].name, self.bodies[j].name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data (JSON-ready) that `scene_from_dict` reads back."""
+        """Plain data (JSON-ready) that `scene_from_dict` reads back; drives only of bodies that have one."""
         data = asdict(self)
         for body, raw in zip(self.bodies, data["bodies"], strict=True):
             raw["shape"] = {"type": SHAPE_NAMES[type(body.shape)], **raw["shape"]}
+            if not any(body.surface_velocity):
+                del raw["surface_velocity"]
+            if body.course is None:
+                del raw["course"]
         data["params"] = dict(self.params)
         return data
 
@@ -177,15 +212,25 @@ class Scene:
 
 def scene_from_dict(data: Mapping[str, Any]) -> Scene:
     """Inverse of `Scene.as_dict`; the file boundary (`validation.scene_files`) checks types before."""
-    bodies = []
-    for raw in data["bodies"]:
-        shape = dict(raw["shape"])
-        cls = SHAPES[shape.pop("type")]
-        values = {**raw, "shape": cls(**{k: _as_tuple(v) for k, v in shape.items()})}
-        bodies.append(Body(**{key: _as_tuple(value) for key, value in values.items()}))
+    bodies = [body_from_dict(raw) for raw in data["bodies"]]
     rest = {key: _as_tuple(value) for key, value in data.items() if key not in ("bodies", "pairs", "params")}
     pairs = tuple(Pair(**pair) for pair in data["pairs"])
     return Scene(bodies=tuple(bodies), pairs=pairs, params=dict(data.get("params", {})), **rest)
+
+
+def body_from_dict(raw: Mapping[str, Any]) -> Body:
+    """One body of `Scene.as_dict`'s data, not yet checked."""
+    shape = dict(raw["shape"])
+    cls = SHAPES[shape.pop("type")]
+    values = {**raw, "shape": cls(**{k: _as_tuple(v) for k, v in shape.items()})}
+    if values.get("course") is not None:
+        values["course"] = Harmonic(**{k: _as_tuple(v) for k, v in values["course"].items()})
+    return Body(**{key: _as_tuple(value) for key, value in values.items()})
+
+
+def check_body(body: Body, dimension: int) -> None:
+    """Raise `SceneError`, naming the field, unless ``body`` is one that a scene of this dimension may hold."""
+    _validate_body(_complete(body, dimension), dimension)
 
 
 def _canonical(value: Any) -> Any:
@@ -198,7 +243,7 @@ def _canonical(value: Any) -> Any:
 
 
 def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+    return tuple(map(_as_tuple, value)) if isinstance(value, list | tuple) else value
 
 
 def _identity(dimension: int) -> tuple[float, ...]:
@@ -207,7 +252,7 @@ def _identity(dimension: int) -> tuple[float, ...]:
 
 
 def _complete(body: Body, dimension: int) -> Body:
-    """Fill an empty pose, twist, force or torque with rest at the origin and no load."""
+    """Fill an empty pose, twist, force, torque or surface velocity with rest at the origin and no load."""
     return Body(
         body.name,
         body.shape,
@@ -218,6 +263,8 @@ def _complete(body: Body, dimension: int) -> Body:
         body.motion,
         body.force or (0.0,) * dimension,
         body.torque or (0.0,) * (1 if dimension == 2 else 3),
+        body.surface_velocity or (0.0,) * dimension,
+        body.course,
     )
 
 
@@ -242,16 +289,15 @@ def _validate_scene(scene: Scene) -> None:
 
 def _validate_body(body: Body, dimension: int) -> None:
     planar = dimension == 2
-    allowed = (Disc, Box, HalfSpace) if planar else (Sphere, Box, HalfSpace)
-    if not isinstance(body.shape, allowed):
+    if not isinstance(body.shape, SHAPES_OF[dimension]):
         raise SceneError(f"{body.name}.shape: a {type(body.shape).__name__} has no place in {dimension}-D")
     body.shape.validate(body.name)
     if isinstance(body.shape, Box):
         check_length(f"{body.name}.shape.half_extents", body.shape.half_extents, dimension)
     if isinstance(body.shape, HalfSpace):
         check_length(f"{body.name}.shape.normal", body.shape.normal, dimension)
-        if body.motion != "fixed":
-            raise SceneError(f"{body.name}.motion: a half-space must be fixed")
+        if body.motion == "free":
+            raise SceneError(f"{body.name}.motion: a half-space is fixed or prescribed")
         if body.pose != _identity(dimension):
             raise SceneError(f"{body.name}.pose: a half-space lies where its normal and offset say, leave it empty")
     if body.motion not in ("free", "fixed", "prescribed"):
@@ -275,6 +321,9 @@ def _validate_body(body: Body, dimension: int) -> None:
         raise SceneError(f"{body.name}.pose: the quaternion {body.pose[3:]!r} must have length 1")
     if body.motion == "fixed" and any(body.twist):
         raise SceneError(f"{body.name}.twist: a fixed body cannot move")
+    if isinstance(body.shape, HalfSpace) and any(body.twist[dimension:]):
+        raise SceneError(f"{body.name}.twist: a half-space does not turn")
+    check_drive(body, dimension)
 
 
 def _validate_pair(pair: Pair, names: Mapping[str, int]) -> None:

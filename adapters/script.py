@@ -9,10 +9,13 @@ Each engine's folder writes its own (`adapters.engine.Engine.exports`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+
+from adapters.scene import Body, Scene
 
 #: How often a script tells the state, beside the start.
 TOLD = 10
@@ -36,6 +39,23 @@ def keywords(values: Mapping[str, Any]) -> str:
 def constants(dt: float, steps: int) -> list[str]:
     """Lines that name the step [s] and the number of steps."""
     return [f"DT, STEPS = {dt!r}, {steps}"]
+
+
+def imports(scene: Scene, *others: str) -> list[str]:
+    """First lines of a script: what it imports, with what the courses of a scene need."""
+    ours = ["import json", "import math"] if any(body.course for body in scene.bodies) else ["import json"]
+    return [*ours, "", *others, ""]
+
+
+def velocity(body: Body) -> str:
+    """Velocity over step number ``done`` (1 is the first) of a prescribed body: `adapters.drives.velocity_over`."""
+    straight, course = body.twist[: len(body.force)], body.course
+    if course is None:
+        return literal(straight)
+    rate = 2.0 * math.pi * course.frequency
+    late, early = (f"math.sin({rate!r} * ({k} * DT) + {course.phase!r})" for k in ("done", "(done - 1)"))
+    parts = (f"{v!r} + {a!r} * (({late} - {early}) / DT)" for v, a in zip(straight, course.amplitude, strict=True))
+    return f"({', '.join(parts)})"
 
 
 def stepped(step: Iterable[str]) -> list[str]:

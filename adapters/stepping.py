@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Contacts, Engine, EngineError, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
-from adapters.scene import Body, Box, Disc, Scene, Sphere
+from adapters.scene import Body, Scene
+from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
 #: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
@@ -49,19 +51,58 @@ class PlanarView:
         return lower_contacts(self.inner.contacts())
 
 
+class StandingView:
+    """Reads a simulation in which some bodies move so that their surfaces run: they stay where the scene has them."""
+
+    def __init__(self, inner: Simulation | PlanarView, scene: Scene, standing: Sequence[int]) -> None:
+        self.inner, self.standing = inner, list(standing)
+        self.places = np.array([scene.bodies[i].pose for i in standing])
+
+    def pose(self) -> np.ndarray:
+        """Poses (n, 3) or (n, 7)."""
+        pose = self.inner.pose()
+        pose[self.standing] = self.places
+        return pose
+
+    def twist(self) -> np.ndarray:
+        """Twists (n, 3) or (n, 6)."""
+        twist = self.inner.twist()
+        twist[self.standing] = 0.0
+        return twist
+
+    def contacts(self) -> Contacts:
+        """Contacts as they are."""
+        return self.inner.contacts()
+
+
 def posed_for(engine: Engine, scene: Scene) -> Scene:
-    """Return the scene as ``engine`` gets it: itself, or lifted.
+    """Return the scene as ``engine`` gets it: itself, or lifted, or with half-spaces that move where surfaces run.
 
     Raises
     ------
     EngineError
-        If the engine has no dimension for it (a spatial scene on a planar engine).
+        If the engine has no dimension for it (a spatial scene on a planar engine), or no ability for what it asks.
     """
+    known = engine.facts.abilities
     if scene.dimension in engine.facts.dimensions:
-        return scene
-    if scene.dimension == 2 and 3 in engine.facts.dimensions:
-        return lift(scene)
-    raise EngineError(f"dimension: {engine.name} is planar and cannot run a spatial scene")
+        posed = scene
+    elif scene.dimension == 2 and 3 in engine.facts.dimensions:
+        posed = lift(scene)
+    else:
+        raise EngineError(f"dimension: {engine.name} is planar and cannot run a spatial scene")
+    if "surface velocity" not in known and "moving half-space" in known:
+        posed = as_moving(posed)
+    for field, ability in asked_abilities(posed):
+        if ability not in known:
+            raise EngineError(f"{field}: {_lacking(engine, ability)}")
+    return posed
+
+
+def _lacking(engine: Engine, ability: str) -> str:
+    """Why an adapter cannot honour what a scene asks."""
+    if ability == "surface velocity" and "moving half-space" in engine.facts.abilities:
+        return f"in {engine.name} only the surface of a fixed half-space runs"
+    return f"the adapter of {engine.name} has no {ability}"
 
 
 def step_count(duration: float, dt: float) -> int:
@@ -95,7 +136,7 @@ def run(
     started = time.perf_counter()
     simulation = engine.build(posed, dt, settings)
     try:
-        return _record(simulation, scene, posed.dimension != scene.dimension, dt, sampling, started)
+        return _record(simulation, scene, posed, dt, sampling, started)
     finally:
         simulation.close()
 
@@ -111,9 +152,14 @@ def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[in
 
 
 def _record(
-    simulation: Simulation, scene: Scene, lifted: bool, dt: float, sampling: Sampling, started: float
+    simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float
 ) -> Trajectory:
-    view = PlanarView(simulation) if lifted else simulation
+    plane = PlanarView(simulation) if posed.dimension != scene.dimension else None
+    view: Simulation | PlanarView | StandingView = plane or simulation
+    pairs = enumerate(zip(scene.bodies, posed.bodies, strict=True))
+    standing = [i for i, (asked, body) in pairs if asked.motion != body.motion]
+    if standing:
+        view = StandingView(plane or simulation, scene, standing)
     limit = EXPLOSION_FACTOR * _fastest(scene)
     poses, twists, steps_at = [view.pose()], [view.twist()], [0]
     collected: list[tuple[int, Contacts]] = []
@@ -139,7 +185,7 @@ def _record(
         initial_change=tuple(simulation.initial_change),
         readback=simulation.readback(),
         certificate=simulation.certificate(),
-        out_of_plane=view.outside if isinstance(view, PlanarView) else 0.0,
+        out_of_plane=plane.outside if plane else 0.0,
         wall_time=time.perf_counter() - started,
     )
 
@@ -147,7 +193,7 @@ def _record(
 def _fastest(scene: Scene) -> float:
     """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add."""
     d = scene.dimension
-    initial = max(math.hypot(*b.twist[:d]) + _reach(b) * math.hypot(*b.twist[d:]) for b in scene.bodies)
+    initial = max(top_speed(b) + reach(b.shape) * math.hypot(*b.twist[d:]) for b in scene.bodies)
     pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
     return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
 
@@ -155,14 +201,7 @@ def _fastest(scene: Scene) -> float:
 def _pull(body: Body) -> float:
     """Acceleration that a body's external force and torque give to its outermost point [m/s^2]."""
     moment = min(body.inertia) if isinstance(body.inertia, tuple) else body.inertia
-    return math.hypot(*body.force) / body.mass + _reach(body) * math.hypot(*body.torque) / moment
-
-
-def _reach(body: Body) -> float:
-    """Distance of the outermost point from the centre [m]: a contact turns spin into that much speed."""
-    if isinstance(body.shape, Box):
-        return math.hypot(*body.shape.half_extents)
-    return body.shape.radius if isinstance(body.shape, Disc | Sphere) else 0.0
+    return math.hypot(*body.force) / body.mass + reach(body.shape) * math.hypot(*body.torque) / moment
 
 
 def _divergence(pose: np.ndarray, twist: np.ndarray, dimension: int, limit: float) -> str:

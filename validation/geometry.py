@@ -1,7 +1,8 @@
 """Overlap of two bodies from their poses: the same exact routine for every engine.
 
 Engines report depths by their own rules (margins, speculative gaps, one point or four). Overlaps are therefore
-measured from poses by the certificate's geometry, which shares no code with any solver. It is asked only where bodies
+measured from poses by the certificate's geometry, which shares no code with any solver; cylinders and hulls by a
+library (`validation.solids`). It is asked only where bodies
 can overlap at all: along any axis the bodies' shadows are no farther apart than the bodies.
 """
 
@@ -10,15 +11,26 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.engine import Array
-from adapters.scene import Box, Disc, HalfSpace, Shape, Sphere
+from adapters.scene import Box, Cylinder, HalfSpace, Hull, Shape
+from adapters.shapes import reach
 from reference_solver.certification.geometry import gap, rotation
+from validation import solids
 
 #: Samples whose exact gap is asked for at a time while the deepest of a run is looked for.
 BATCH = 32
 
 
 def separation(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
-    """Signed distance of two bodies, (s,) [m]; < 0 is how far they must be moved to part."""
+    """Signed distance of two bodies, (s,) [m]; < 0 is how far they must be moved to part.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        For a cylinder or a hull where the library `coal` is not installed, which measures them.
+    """
+    kinds = {type(a), type(b)}
+    if Cylinder in kinds or (Hull in kinds and HalfSpace not in kinds):  # a hull over a face is its lowest corner
+        return solids.separation(a, pose_a, b, pose_b)
     return np.atleast_1d(gap(a, pose_a, b, pose_b))
 
 
@@ -65,8 +77,7 @@ def least_gap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 
 def _extent(shape: Shape, turn: Array, axis: Array) -> Array:
     """Half width (s,) of ``shape``'s shadow on ``axis`` (s, d), seen from its centre."""
-    if isinstance(shape, Disc | Sphere):
-        return np.full(len(axis), shape.radius)
-    assert isinstance(shape, Box)
+    if not isinstance(shape, Box):  # no less than its shadow is
+        return np.full(len(axis), reach(shape))
     along = np.einsum("sij,si->sj", turn, axis)
     return np.abs(along) @ np.array(shape.half_extents)

@@ -19,7 +19,8 @@ import numpy as np
 from adapters.engine import Array, Contacts
 from adapters.foreign import checked_refusal, said_by
 from adapters.registry import load
-from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, HalfSpace, Hull, Pair, Polygon, Scene, Shape
+from adapters.shapes import reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from validation.apart import Apart
@@ -92,14 +93,7 @@ def size_of(scene: Scene) -> float:
     free = [body for body in scene.bodies if body.motion == "free"]
     d = scene.dimension
     places = np.array([body.pose[:d] for body in free])
-    return float(np.ptp(places, axis=0).max() + 2.0 * max(_reach(body) for body in free))
-
-
-def _reach(body: Body) -> float:
-    shape = body.shape
-    if isinstance(shape, Box):
-        return math.hypot(*shape.half_extents)
-    return shape.radius if isinstance(shape, Disc | Sphere) else 0.0
+    return float(np.ptp(places, axis=0).max() + 2.0 * max(reach(body.shape) for body in free))
 
 
 def itself(scene: Scene) -> Posed | str:
@@ -150,8 +144,16 @@ def mirrored(scene: Scene) -> Posed | str:
         return np.asarray(q * (spins if d == 2 else quaternion))
 
     moved = _posed(scene, lambda x: flip @ x, attitude, lambda w: spins * w)
+    moved = replace(moved, bodies=tuple(replace(body, shape=_mirrored(body.shape)) for body in moved.bodies))
     moved = replace(moved, gravity=_plain(flip @ np.array(scene.gravity)))
     return Posed(moved, lambda found: _returned(found, flip, attitude, np.diag(spins)))
+
+
+def _mirrored(shape: Shape) -> Shape:
+    """The shape with left and right of its body swapped; corners stay counter-clockwise."""
+    if isinstance(shape, Polygon):
+        return Polygon(tuple((-x, y) for x, y in reversed(shape.vertices)))
+    return Hull(tuple((-x, y, z) for x, y, z in shape.vertices)) if isinstance(shape, Hull) else shape
 
 
 def moved_away(scene: Scene) -> Posed | str:
@@ -269,11 +271,13 @@ def _posed(
     for body in scene.bodies:
         pose, twist, shape = np.array(body.pose), np.array(body.twist), body.shape
         if isinstance(shape, HalfSpace):
-            bodies.append(replace(body, shape=HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)))
+            face = HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)
+            twist = np.concatenate([place(twist[:d]), 0.0 * twist[d:]])
+            bodies.append(replace(_driven(body, place), shape=face, twist=_plain(twist)))
             continue
         bodies.append(
             replace(
-                body,
+                _driven(body, place),
                 pose=(*_plain(place(pose[:d])), *_plain(attitude(pose[d:]))),
                 twist=(*_plain(place(twist[:d])), *_plain(spin(twist[d:]))),
                 force=_plain(place(np.array(body.force))),
@@ -281,6 +285,12 @@ def _posed(
             )
         )
     return replace(scene, bodies=tuple(bodies))
+
+
+def _driven(body: Body, place: Callable[[Array], Array]) -> Body:
+    """The body with its surface's velocity and its course mapped."""
+    course = body.course and replace(body.course, amplitude=_plain(place(np.array(body.course.amplitude))))
+    return replace(body, surface_velocity=_plain(place(np.array(body.surface_velocity))), course=course)
 
 
 def _returned(found: Trajectory, matrix: Array, attitude: Callable[[Array], Array], spins: Array) -> Trajectory:

@@ -16,7 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.engine import Array
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Body, HalfSpace, Scene
+from adapters.shapes import ROUND, reach
 from adapters.trajectory import Trajectory
 from validation import metrics
 from validation.bounds import ROUND_OFF
@@ -56,7 +57,9 @@ def fed_by(scene: Scene) -> str:
     """
     if any(body.motion == "prescribed" for body in scene.bodies):
         return "a prescribed body may feed energy in"
-    boxes = [body.motion == "free" and isinstance(body.shape, Box) for body in scene.bodies]
+    if any(any(body.surface_velocity) for body in scene.bodies):
+        return "a surface that runs may feed energy in"
+    boxes = [body.motion == "free" and not isinstance(body.shape, ROUND) for body in scene.bodies]
     if not any(boxes) or not any(e > 0.0 and mu > 0.0 for e, mu in scene.materials()):
         return ""  # without a look at every pair
     for i, j, material in scene.contact_pairs():
@@ -129,7 +132,7 @@ def energy_bound(scene: Scene, dt: float) -> float:
         place = math.hypot(*body.pose[: scene.dimension])
         scale += 0.5 * body.mass * speed * speed + 0.5 * moment * spin * spin + load * place
         # A body that rests without load still has a size, known to round-off, of which a step makes a speed.
-        scale += 0.5 * body.mass * ROUND_OFF * (metrics.reach(body.shape) / dt) ** 2
+        scale += 0.5 * body.mass * ROUND_OFF * (reach(body.shape) / dt) ** 2
     return bound + ROUND_OFF * scale
 
 
@@ -175,8 +178,8 @@ def approach(scene: Scene, trajectory: Trajectory, i: int, j: int) -> Array:
     speed = np.abs(linear @ np.array(faces[0].normal)) if faces else np.linalg.norm(linear, axis=1)
     for k in (i, j):
         shape = scene.bodies[k].shape
-        if isinstance(shape, Box):
-            speed = speed + metrics.reach(shape) * np.linalg.norm(trajectory.twist[:, k, d:], axis=1)
+        if not isinstance(shape, (*ROUND, HalfSpace)):
+            speed = speed + reach(shape) * np.linalg.norm(trajectory.twist[:, k, d:], axis=1)
     return np.asarray(speed)
 
 
@@ -186,7 +189,7 @@ def overlap_bound(scene: Scene, dt: float) -> float:
     for body in scene.bodies:
         if body.motion == "free":
             load, torque = math.hypot(*_load(scene, body)), math.hypot(*body.torque)
-            turning = 0.0 if isinstance(body.shape, Disc | Sphere) else metrics.reach(body.shape) / _least_moment(body)
+            turning = 0.0 if isinstance(body.shape, ROUND) else reach(body.shape) / _least_moment(body)
             pulls.append(load / body.mass + torque * turning)
-    place = max(math.hypot(*body.pose[: scene.dimension]) + metrics.reach(body.shape) for body in scene.bodies)
+    place = max(math.hypot(*body.pose[: scene.dimension]) + reach(body.shape) for body in scene.bodies)
     return sum(sorted(pulls)[-2:]) * dt * dt + ROUND_OFF * place

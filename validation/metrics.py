@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from adapters.engine import Array
-from adapters.scene import Box, Disc, Scene, Sphere
+from adapters.scene import Scene
+from adapters.shapes import reach as reach
 from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
@@ -104,13 +105,6 @@ def mean_rate(t: Array, value: Array) -> Measured:
     """Mean rate of change of ``value`` over the second half of the run."""
     middle = len(t) // 2
     return float((value[-1] - value[middle]) / (t[-1] - t[middle])), ""
-
-
-def reach(shape: object) -> float:
-    """Distance of a shape's outermost point from its centre [m]: turns spin into a speed."""
-    if isinstance(shape, Disc | Sphere):
-        return shape.radius
-    return float(np.linalg.norm(shape.half_extents)) if isinstance(shape, Box) else 0.0
 
 
 def free_bodies(scene: Scene) -> list[int]:

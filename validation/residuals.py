@@ -77,6 +77,8 @@ def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int
     pt = rows.impulse - pn[:, None] * normal
     un, un_before = _dot(after, normal), _dot(before, normal)
     slip = 0.5 * (after + before)
+    run = np.array([body.surface_velocity for body in scene.bodies])
+    slip = slip + run[rows.b] - run[rows.a]
     slip = slip - _dot(slip, normal)[:, None] * normal
     largest = float(np.abs(rows.impulse).max())
     fall = math.hypot(*scene.gravity) * found.dt

@@ -18,10 +18,13 @@ from validation.scene_format import SceneModel, stated
 from validation.scene_text import parsed, read_text, said
 from validation.stated import Stated, canonical_of
 
+#: Names of the schema's own language and of itself; the number is that of `SceneModel.format`.
+DIALECT, SCHEMA_ID = "https://json-schema.org/draft/2020-12/schema", "urn:contact-crosscheck:scene:1"
+
 
 def json_schema() -> dict[str, Any]:
-    """JSON Schema of a scene file, for editors."""
-    return SceneModel.model_json_schema()
+    """JSON Schema of a scene file, for editors and whoever writes such files."""
+    return {"$schema": DIALECT, "$id": SCHEMA_ID, **SceneModel.model_json_schema()}
 
 
 def load_scene(path: Path) -> Scene:

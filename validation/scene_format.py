@@ -8,14 +8,27 @@ the length of a half-space's normal.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from adapters.scene import Pair, Scene, SceneError, Shape, scene_from_dict
+from adapters.plain import one_line
+from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
+from adapters.shapes import MOST_VERTICES, check_length
+from validation.centring import centre
+from validation.expressions import FUNCTIONS, FormulaError, value_of
 from validation.mass_properties import HOW, moments, volume
 from validation.quantities import QUANTITIES, parts_of
+from validation.scene_text import listed
 from validation.stated import Stated, StatedCheck
+
+
+class SceneErrors(SceneError):
+    """Several fields are wrong: one line with all of them, of many the first few."""
+
+    def __init__(self, wrong: list[str]) -> None:
+        super().__init__(listed(wrong))
 
 
 class _Strict(BaseModel):
@@ -43,6 +56,36 @@ class BoxModel(_Strict):
     half_extents: tuple[float, ...]
 
 
+class CapsuleModel(_Strict):
+    """All points within ``radius`` of a segment of 2 ``half_length`` on the body's x axis [m]."""
+
+    type: Literal["capsule"]
+    half_length: float
+    radius: float
+
+
+class CylinderModel(_Strict):
+    """Cylinder about the body's x axis, 2 ``half_length`` long [m]; spatial."""
+
+    type: Literal["cylinder"]
+    half_length: float
+    radius: float
+
+
+class PolygonModel(_Strict):
+    """Convex polygon by its corners [m], counter-clockwise; planar. The body's centre is their centroid."""
+
+    type: Literal["polygon"]
+    vertices: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=MOST_VERTICES)
+
+
+class HullModel(_Strict):
+    """Convex hull of its corners [m]; spatial. The body's centre is its centre of mass."""
+
+    type: Literal["hull"]
+    vertices: tuple[tuple[float, float, float], ...] = Field(min_length=4, max_length=MOST_VERTICES)
+
+
 class HalfSpaceModel(_Strict):
     """Solid where n . x <= offset [m], with n the direction of ``normal``, or tilted by ``angle``.
 
@@ -56,11 +99,28 @@ class HalfSpaceModel(_Strict):
     offset: float = 0.0
 
 
+class CourseModel(_Strict):
+    """Oscillation of a prescribed body, added to its twist: ``amplitude`` [m] along the world axes, ``frequency`` [Hz].
+
+    It begins where the body's pose is: displaced by amplitude (sin(2 pi frequency t + phase) - sin(phase)).
+    """
+
+    amplitude: tuple[float, ...]
+    frequency: float
+    phase: float = 0.0
+
+
 class BodyModel(_Strict):
-    """A body; see `adapters.scene.Body`. ``mass`` [kg] or ``density`` [kg/m^2 in the plane, kg/m^3 in space]."""
+    """A body; see `adapters.scene.Body`. ``mass`` [kg] or ``density`` [kg/m^2 in the plane, kg/m^3 in space].
+
+    ``surface_velocity`` [m/s, world axes] makes a conveyor of a body that is not free.
+    """
 
     name: str
-    shape: Annotated[DiscModel | SphereModel | BoxModel | HalfSpaceModel, Field(discriminator="type")]
+    shape: Annotated[
+        DiscModel | SphereModel | BoxModel | HalfSpaceModel | CapsuleModel | PolygonModel | CylinderModel | HullModel,
+        Field(discriminator="type"),
+    ]
     mass: float | None = None
     density: float | None = None
     inertia: float | tuple[float, float, float] | None = None
@@ -69,6 +129,8 @@ class BodyModel(_Strict):
     motion: Literal["free", "fixed", "prescribed"] = "free"
     force: tuple[float, ...] = ()
     torque: tuple[float, ...] = ()
+    surface_velocity: tuple[float, ...] = ()
+    course: CourseModel | None = None
 
 
 class PairModel(_Strict):
@@ -83,6 +145,9 @@ class PairModel(_Strict):
 class CheckModel(_Strict):
     """A number that the scene's author knows: PASS if |measured - value| <= tolerance.
 
+    Value and tolerance are numbers or formulas (`validation.expressions`) in ``pi``, ``g`` (size of the gravity), ``t``
+    (time of the check [s]) and the file's constants; a tolerance in the step ``dt`` [s] as well.
+
     Parameters
     ----------
     quantity
@@ -96,15 +161,16 @@ class CheckModel(_Strict):
     """
 
     quantity: str
-    value: float
-    tolerance: float = Field(gt=0.0)
+    value: float | str
+    tolerance: Annotated[float, Field(gt=0.0)] | str
     at: float | None = Field(default=None, ge=0.0)
     because: str = "stated in the scene file"
 
 
 class SceneModel(_Strict):
-    """A scene file."""
+    """A scene file. ``format`` is the version of this description; ``constants`` are names for formulas of checks."""
 
+    format: Literal[1] = 1
     name: str = Field(min_length=1)
     version: int = 1
     dimension: Literal[2, 3]
@@ -113,6 +179,7 @@ class SceneModel(_Strict):
     impact_law: Literal["N-SIM", "N-SEQ"] = "N-SIM"
     bodies: tuple[BodyModel, ...]
     pairs: tuple[PairModel, ...] = ()
+    constants: dict[str, float | str] = {}
     checks: tuple[CheckModel, ...] = ()
 
 
@@ -121,23 +188,91 @@ def stated(model: SceneModel) -> Stated:
 
     Raises
     ------
-    SceneError
-        Naming the field that is no physics, or the check that names nothing.
+    SceneErrors
+        With every field that is no physics, and every check that names nothing.
     """
     notes: list[str] = []
-    data = model.model_dump(exclude={"checks"})
-    for body in data["bodies"]:
-        _face(body, model.dimension, notes)
-        _mass(body, model.dimension, notes)
-    scene = scene_from_dict(data)
-    for number, check in enumerate(model.checks):
-        _refuse_wrong_check(f"checks.{number}", check, scene)
+    wrong: list[str] = []
+    data = model.model_dump(exclude={"checks", "constants", "format"})
+    data["bodies"] = list(data["bodies"])
+    for k, body in enumerate(data["bodies"]):
+        try:
+            _face(body, model.dimension, notes)
+            if body["shape"]["type"] in ("polygon", "hull"):
+                centre(body, notes)
+            _mass(body, model.dimension, notes)
+            check_body(body_from_dict(body), model.dimension)
+        except (SceneError, ArithmeticError) as error:
+            wrong.append(_why(error, f"{body['name']}.shape"))
+            data["bodies"][k] = _stand_in(body["name"], model.dimension)
+    try:
+        scene = scene_from_dict(data)
+    except (SceneError, ArithmeticError) as error:
+        raise SceneErrors([*wrong, _why(error, "gravity")]) from None
+    numbered = [(f"checks.{k}", check) for k, check in enumerate(model.checks)]
+    right = [(label, check) for label, check in numbered if _is_right(label, check, scene, wrong)]
     quantities = [(check.quantity, check.at) for check in model.checks]
-    for quantity, at in quantities:
+    for quantity, at in dict.fromkeys(quantities):
         if quantities.count((quantity, at)) > 1:
-            raise SceneError(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
-    checks = tuple(StatedCheck(**check.model_dump()) for check in model.checks)
-    return Stated(scene, tuple(notes), checks)
+            wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
+    names = dict(told(model, scene, wrong))
+    made = [_stated(label, check, scene, names, wrong) for label, check in right]
+    if wrong:
+        raise SceneErrors(list(dict.fromkeys(wrong)))
+    return Stated(scene, tuple(notes), tuple(check for check in made if check is not None))
+
+
+def _why(error: Exception, field: str) -> str:
+    """What an error says; of arithmetic that overflows, which says nothing of where, with its field."""
+    if isinstance(error, SceneError):
+        return one_line(error)
+    return one_line(f"{field}: its numbers are too large or too small to compute with")
+
+
+def _stand_in(name: str, dimension: int) -> dict[str, Any]:
+    """A body in place of one that is wrong, so that the rest of the scene can be looked at."""
+    kind, inertia = ("disc", 1.0) if dimension == 2 else ("sphere", (1.0, 1.0, 1.0))
+    return {"name": name, "shape": {"type": kind, "radius": 1.0}, "mass": 1.0, "inertia": inertia}
+
+
+def told(model: SceneModel, scene: Scene, wrong: list[str]) -> Iterator[tuple[str, float]]:
+    """Names that a formula may use, and their values: pi, g, the file's constants in their order.
+
+    What is wrong with a constant is added to ``wrong``.
+    """
+    names = {"pi": math.pi, "g": math.hypot(*scene.gravity)}
+    yield from names.items()
+    for name, formula in model.constants.items():
+        label = f"constants.{one_line(name, 40)}"
+        if not name.isidentifier() or name in (*names, *FUNCTIONS, "t", "dt"):
+            wrong.append(f"{label}: cannot be the name of a constant, or has a meaning already")
+            continue
+        try:
+            names[name] = value_of(formula, names)
+        except FormulaError as error:
+            wrong.append(f"{label}: {error}")
+            continue
+        yield name, names[name]
+
+
+def _stated(
+    label: str, check: CheckModel, scene: Scene, names: dict[str, float], wrong: list[str]
+) -> StatedCheck | None:
+    """The check with its value; its tolerance, too, is tried, at a step of 1 s and of a nanosecond."""
+    when = scene.duration if check.at is None else check.at
+    here = {**names, "t": when}
+    field = "value"
+    try:
+        value = value_of(check.value, here)
+        field = "tolerance"
+        for dt in (1.0, 1e-9):
+            if not value_of(check.tolerance, {**here, "dt": dt}) > 0.0:
+                raise FormulaError(f"{check.tolerance!r} is not greater than 0 at a step of {dt:g} s")
+    except FormulaError as error:
+        wrong.append(f"{label}.{field}: {error}")
+        return None
+    formula = isinstance(check.tolerance, str)
+    return StatedCheck(check.quantity, value, check.tolerance, check.at, check.because, here if formula else {})
 
 
 def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
@@ -172,10 +307,10 @@ def _mass(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
         body["mass"] = 1.0 if body["mass"] is None else body["mass"]
         body["inertia"] = 1.0 if body["inertia"] is None else body["inertia"]
         return
-    shape = _shape(body["shape"], name)
+    shape = _shape(body["shape"], name, dimension)
     unit = "kg m^2"
     if density is not None:
-        body["mass"] = density * volume(shape)
+        body["mass"] = density * volume(shape, dimension)
         notes.append(f"{name}.mass: {body['mass']:.6g} kg, its density times its {_content(dimension)}")
     elif body["mass"] is None:
         body["mass"] = 1.0
@@ -193,28 +328,32 @@ def _content(dimension: int) -> str:
     return "area" if dimension == 2 else "volume"
 
 
-def _shape(raw: dict[str, Any], owner: str) -> Shape:
+def _shape(raw: dict[str, Any], owner: str, dimension: int) -> Shape:
     """Return a checked shape: its mass needs sizes that are sizes."""
     from adapters.scene import SHAPES
 
     shape: Shape = SHAPES[raw["type"]](**{key: value for key, value in raw.items() if key != "type"})
     shape.validate(owner)
+    if isinstance(shape, Box):
+        check_length(f"{owner}.shape.half_extents", shape.half_extents, dimension)
     return shape
 
 
-def _refuse_wrong_check(label: str, check: CheckModel, scene: Scene) -> None:
+def _is_right(label: str, check: CheckModel, scene: Scene, wrong: list[str]) -> bool:
+    """Whether a check names what is there; if not, why is added to ``wrong``."""
+    before = len(wrong)
     names = [b.name for b in scene.bodies]
     partner, body, what = parts_of(check.quantity, names)
     for name in (name for name in (body, partner) if name is not None):
         if name not in names:
-            raise SceneError(f"{label}.quantity: {check.quantity!r} names no body of the scene: {', '.join(names)}")
-    known = QUANTITIES[scene.dimension]
-    if what not in known:
-        raise SceneError(f"{label}.quantity: {what!r} is not one of {', '.join(known)}")
+            wrong.append(f"{label}.quantity: {check.quantity!r} names no body of the scene: {', '.join(names)}")
+    if what not in QUANTITIES[scene.dimension]:
+        wrong.append(f"{label}.quantity: {what!r} is not one of {', '.join(QUANTITIES[scene.dimension])}")
     is_force = what.startswith("f")
     if partner is not None and not is_force:
-        raise SceneError(f"{label}.quantity: {check.quantity!r}: only a force is between two bodies")
+        wrong.append(f"{label}.quantity: {check.quantity!r}: only a force is between two bodies")
     if is_force and check.at is not None:
-        raise SceneError(f"{label}.at: a force is a mean over the end of the run, it has no instant")
+        wrong.append(f"{label}.at: a force is a mean over the end of the run, it has no instant")
     if check.at is not None and check.at > scene.duration:
-        raise SceneError(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
+        wrong.append(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
+    return len(wrong) == before

@@ -74,5 +74,10 @@ def said(errors: ValidationError) -> str:
     """All fields that are wrong, in one line; of many the first few."""
     found = errors.errors(include_url=False, include_context=False, include_input=False)
     fields = [".".join(map(str, e["loc"])) or "file" for e in found]
-    told = "; ".join(one_line(f"{name}: {e['msg']}") for name, e in zip(fields[:MOST_ERRORS], found, strict=False))
-    return told if len(found) <= MOST_ERRORS else f"{told}; and {len(found) - MOST_ERRORS} more"
+    return listed([one_line(f"{name}: {e['msg']}") for name, e in zip(fields, found, strict=True)])
+
+
+def listed(wrong: list[str]) -> str:
+    """What is wrong in one line; of much the first, and how much more there is."""
+    told = "; ".join(wrong[:MOST_ERRORS])
+    return told if len(wrong) <= MOST_ERRORS else f"{told}; and {len(wrong) - MOST_ERRORS} more"

@@ -8,25 +8,34 @@ that a scene can be handed as plain data (`Stated.as_dict`) to where nothing is 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
 from validation import invariants
 from validation.canonical import CanonicalScene, Check, Measured
+from validation.expressions import value_of
 from validation.quantities import force_window, quantity, shown_quantities, unit
 
 
 @dataclass(frozen=True)
 class StatedCheck:
-    """A number that the author of a scene knows; see `validation.scene_format.CheckModel`."""
+    """A number that the author of a scene knows; see `validation.scene_format.CheckModel`.
+
+    A tolerance may be a formula in the step `dt`; ``names`` holds what else it may name.
+    """
 
     quantity: str
     value: float
-    tolerance: float
+    tolerance: float | str
     at: float | None
     because: str
+    names: Mapping[str, float] = field(default_factory=dict)
+
+    def bound(self, dt: float) -> float:
+        """Tolerance at step ``dt`` [s], in the quantity's unit."""
+        return value_of(self.tolerance, {**self.names, "dt": dt})
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,10 @@ def _metric(name: str, at: float | None = None) -> str:
 
 
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
-    beyond, depth = invariants.deepest(read.scene, trajectory)
+    try:
+        beyond, depth = invariants.deepest(read.scene, trajectory)
+    except ModuleNotFoundError:
+        beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
     measured: dict[str, Measured] = {
         "energy_growth": invariants.energy_growth(read.scene, trajectory),
         "penetration": beyond,
@@ -98,10 +110,10 @@ def _checks(read: Stated, dt: float) -> list[Check]:
     names = {_metric(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
     depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
-    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c) for m, c in told.items()), depth, *shown]
+    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
 
 
-def _stated_check(metric: str, check: StatedCheck) -> Check:
+def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
     return Check(
-        metric, unit(check.quantity), check.value, check.tolerance, check.because, "the scene file's [[checks]]"
+        metric, unit(check.quantity), check.value, check.bound(dt), check.because, "the scene file's [[checks]]"
     )

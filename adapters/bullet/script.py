@@ -8,10 +8,11 @@ from typing import Any
 
 from adapters.bullet.profiles import checked
 from adapters.bullet.simulation import HEAVY, WAITING_ROOM
-from adapters.bullet.translation import factors, moments, placement
+from adapters.bullet.translation import Z_TO_X, factors, moments, placement
+from adapters.drives import velocity_over
 from adapters.engine import EngineError
-from adapters.scene import Body, HalfSpace, Scene, Sphere
-from adapters.script import constants, keywords, literal, stepped, text
+from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.script import constants, imports, keywords, literal, stepped, text, velocity
 
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
@@ -22,7 +23,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
         raise EngineError("pairs: no product of two bodies' values gives this table of materials")
     heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
     masses = [{"free": b.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[b.motion] for b in scene.bodies]
-    lines = ["import json", "", "import pybullet as p", "", *constants(dt, steps), "", "p.connect(p.DIRECT)"]
+    lines = [*imports(scene, "import pybullet as p"), *constants(dt, steps), "", "p.connect(p.DIRECT)"]
     lines += [f"p.setPhysicsEngineParameter(fixedTimeStep=DT, {keywords(world)})", "p.setGravity(0.0, 0.0, 0.0)"]
     lines += ["bodies = {}", ""]
     lines.append("# A new inertia or orientation acts a step late: bodies wait far away, already turned, for one step.")
@@ -34,7 +35,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
         lines.append(f"p.setCollisionFilterPair(bodies[{a!r}], bodies[{b!r}], -1, -1, 0)")
     lines += ["p.stepSimulation()", "", "# Now to their places."]
     for body in scene.bodies:
-        lines += _placed(body, scene)
+        lines += _placed(body, scene, dt)
     lines += [f"p.setGravity{literal(scene.gravity)}", "", *_state(scene)]
     return text(lines + stepped([*_loads(scene, masses), "p.stepSimulation()"]))
 
@@ -42,8 +43,15 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
 def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any]) -> list[str]:
     """Lines that make a body in its place in the waiting room."""
     sizes, _, quaternion = placement(body, scene)
-    round_ = isinstance(body.shape, Sphere)
-    shape = f"p.GEOM_SPHERE, radius={sizes[0]!r}" if round_ else f"p.GEOM_BOX, halfExtents={literal(sizes)}"
+    shape = f"p.GEOM_BOX, halfExtents={literal(sizes)}"
+    if isinstance(body.shape, Sphere):
+        shape = f"p.GEOM_SPHERE, radius={sizes[0]!r}"
+    elif isinstance(body.shape, Hull):
+        shape = f"p.GEOM_MESH, vertices={literal(body.shape.vertices)}"
+    elif isinstance(body.shape, Capsule | Cylinder):
+        kind = "p.GEOM_CAPSULE" if isinstance(body.shape, Capsule) else "p.GEOM_CYLINDER"
+        lying = f"collisionFrameOrientation={literal(Z_TO_X)}"
+        shape = f"{kind}, radius={sizes[0]!r}, height={sizes[1]!r}, {lying}"
     waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
     given = f"{mass!r}, shape, -1, {literal(waiting)}, {literal(quaternion)}, useMaximalCoordinates={maximal}"
     lines = [
@@ -58,26 +66,22 @@ def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, mater
     return lines
 
 
-def _placed(body: Body, scene: Scene) -> list[str]:
+def _placed(body: Body, scene: Scene, dt: float) -> list[str]:
     """Lines that move a body to where it starts; its pose first, since that zeroes its velocity."""
     _, position, quaternion = placement(body, scene)
     lines = [f"p.resetBasePositionAndOrientation(bodies[{body.name!r}], {literal(position)}, {literal(quaternion)})"]
     if body.motion != "fixed":
-        lines.append(
-            f"p.resetBaseVelocity(bodies[{body.name!r}], {literal(body.twist[:3])}, {literal(body.twist[3:])})"
-        )
+        given = f"{literal(velocity_over(body, dt, 0))}, {literal(body.twist[3:])}"
+        lines.append(f"p.resetBaseVelocity(bodies[{body.name!r}], {given})")
     return lines
 
 
-def _velocity(body: Body) -> str:
-    return f"{literal(body.twist[:3])}, {literal(body.twist[3:])}"
-
-
 def _state(scene: Scene) -> list[str]:
-    """Lines of the function that reads all bodies; a half-space, here a box, stays where it is."""
-    still = {body.name: body.pose for body in scene.bodies if isinstance(body.shape, HalfSpace)}
+    """Lines of the function that reads all bodies; a half-space, here a box, is told without the way to its centre."""
+    ways = {body.name: placement(body, scene)[1] for body in scene.bodies if isinstance(body.shape, HalfSpace)}
     return [
-        f"HALF_SPACES = {{{', '.join(f'{name!r}: {literal(pose)}' for name, pose in still.items())}}}",
+        "# Half-spaces, and the way to the centre of the box that stands for each.",
+        f"HALF_SPACES = {{{', '.join(f'{name!r}: {literal(way)}' for name, way in ways.items())}}}",
         "",
         "",
         "def state():",
@@ -85,7 +89,10 @@ def _state(scene: Scene) -> list[str]:
         "    for name, body in bodies.items():",
         "        (x, y, z), (qx, qy, qz, qw) = p.getBasePositionAndOrientation(body)",
         "        velocity, spin = p.getBaseVelocity(body)",
-        "        found[name] = HALF_SPACES.get(name, (x, y, z, qw, qx, qy, qz)), (*velocity, *spin)",
+        "        if name in HALF_SPACES:",
+        "            a, b, c = HALF_SPACES[name]",
+        "            x, y, z, qw, qx, qy, qz = x - a, y - b, z - c, 1.0, 0.0, 0.0, 0.0",
+        "        found[name] = (x, y, z, qw, qx, qy, qz), (*velocity, *spin)",
         "    return found",
     ]
 
@@ -97,7 +104,8 @@ def _loads(scene: Scene, masses: list[float]) -> list[str]:
         force, torque = body.force, body.torque
         if body.motion == "prescribed":
             force, torque = tuple(-mass * g for g in scene.gravity), (0.0, 0.0, 0.0)
-            lines.append(f"p.resetBaseVelocity(bodies[{body.name!r}], {_velocity(body)})")
+            given = f"{velocity(body)}, {literal(body.twist[3:])}"
+            lines.append(f"p.resetBaseVelocity(bodies[{body.name!r}], {given})")
         if body.motion != "fixed" and any((*force, *torque)):
             own = f"bodies[{body.name!r}]"
             loads.append(f"centre, _ = p.getBasePositionAndOrientation({own})")

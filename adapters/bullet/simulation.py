@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from adapters.bullet.profiles import checked
-from adapters.bullet.translation import factors, moments, placement
+from adapters.bullet.translation import Z_TO_X, factors, moments, placement
+from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.scene import Body, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5
@@ -85,7 +86,7 @@ class BulletSimulation(Simulation):
         for i, body in enumerate(scene.bodies):
             self._place(i, body)
         p.setGravity(*scene.gravity, physicsClientId=client)
-        self._loads = self._constant_loads()
+        self._loads, self._made = self._constant_loads(), 0
         self._driven = [i for i, body in enumerate(scene.bodies) if body.motion == "prescribed"]
         if self._driven:
             names = ", ".join(scene.bodies[i].name for i in self._driven)
@@ -100,6 +101,12 @@ class BulletSimulation(Simulation):
         sizes, position, quaternion = placement(body, self._scene)
         if isinstance(body.shape, Sphere):
             shape = p.createCollisionShape(p.GEOM_SPHERE, radius=sizes[0], physicsClientId=client)
+        elif isinstance(body.shape, Capsule | Cylinder):
+            kind = p.GEOM_CAPSULE if isinstance(body.shape, Capsule) else p.GEOM_CYLINDER
+            lying = {"collisionFrameOrientation": Z_TO_X}
+            shape = p.createCollisionShape(kind, radius=sizes[0], height=sizes[1], **lying, physicsClientId=client)
+        elif isinstance(body.shape, Hull):
+            shape = p.createCollisionShape(p.GEOM_MESH, vertices=body.shape.vertices, physicsClientId=client)
         else:
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=sizes, physicsClientId=client)
         mass = {"free": body.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[body.motion]
@@ -142,7 +149,8 @@ class BulletSimulation(Simulation):
         # Pose first: it zeroes the velocity.
         self._p.resetBasePositionAndOrientation(identifier, position, quaternion, physicsClientId=client)
         if body.motion != "fixed":
-            self._p.resetBaseVelocity(identifier, body.twist[:3], body.twist[3:], physicsClientId=client)
+            velocity = velocity_over(body, self._dt, 0)
+            self._p.resetBaseVelocity(identifier, velocity, body.twist[3:], physicsClientId=client)
 
     def _constant_loads(self) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
         """External force and torque of every body that has any; a prescribed body is held against gravity."""
@@ -185,8 +193,10 @@ class BulletSimulation(Simulation):
     def _apply_loads(self) -> None:
         p, client = self._p, self._client
         for i in self._driven:
-            twist = self._scene.bodies[i].twist
-            p.resetBaseVelocity(self._ids[i], twist[:3], twist[3:], physicsClientId=client)
+            body = self._scene.bodies[i]
+            velocity = velocity_over(body, self._dt, self._made)
+            p.resetBaseVelocity(self._ids[i], velocity, body.twist[3:], physicsClientId=client)
+        self._made += 1
         for i, force, torque in self._loads:
             centre, _ = p.getBasePositionAndOrientation(self._ids[i], physicsClientId=client)
             p.applyExternalForce(self._ids[i], -1, force, centre, p.WORLD_FRAME, physicsClientId=client)

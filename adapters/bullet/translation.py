@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
-from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
 #: contact distances, computed relative to its centre, keep 1e-14 m.
 FLOOR_DEPTH = 20.0
+#: Bullet's capsules and cylinders lie along their z axis, ours along the body's x: quaternion (x, y, z, w).
+Z_TO_X = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 #: Half width of that box beyond the outermost body [m]: a body may slide 100 m and stay on it.
 FLOOR_REACH = 200.0
 
@@ -55,12 +57,16 @@ def _turn_up_to(normal: tuple[float, ...]) -> tuple[float, float, float, float]:
 
 
 def placement(body: Body, scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """Half extents (or radius), position and quaternion (x, y, z, w) of a body as Bullet gets it."""
+    """Sizes (half extents, radius, radius and length), position and quaternion (x, y, z, w) as Bullet gets them."""
     w, x, y, z = body.pose[3:]
     if isinstance(body.shape, Sphere):
         return (body.shape.radius,), body.pose[:3], (x, y, z, w)
     if isinstance(body.shape, Box):
         return body.shape.half_extents, body.pose[:3], (x, y, z, w)
+    if isinstance(body.shape, Capsule | Cylinder):
+        return (body.shape.radius, 2.0 * body.shape.half_length), body.pose[:3], (x, y, z, w)
+    if isinstance(body.shape, Hull):
+        return (), body.pose[:3], (x, y, z, w)
     assert isinstance(body.shape, HalfSpace)
     width = FLOOR_REACH + max(math.hypot(*other.pose[:3]) for other in scene.bodies)
     centre = tuple((body.shape.offset - FLOOR_DEPTH) * n for n in body.shape.normal)
@@ -72,4 +78,5 @@ def moments(body: Body, mass: float) -> tuple[float, ...]:
     if body.motion == "free":
         assert isinstance(body.inertia, tuple)
         return body.inertia
-    return (mass * body.shape.smallest_size**2,) * 3
+    size = FLOOR_DEPTH if isinstance(body.shape, HalfSpace) else body.shape.smallest_size
+    return (mass * size**2,) * 3

@@ -8,8 +8,8 @@ from typing import Any
 from adapters.chipmunk.profiles import checked
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import corners, moment
-from adapters.scene import Body, Disc, Scene
-from adapters.script import constants, literal, stepped, text
+from adapters.scene import Body, Capsule, Disc, Scene
+from adapters.script import constants, imports, literal, stepped, text, velocity
 
 _SPACE = ("iterations", "collision_slop", "collision_bias", "collision_persistence")
 
@@ -18,7 +18,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     """Python of a run with pymunk; see `adapters.engine.Writer`."""
     chosen = checked(settings)
     built = ChipmunkSimulation(scene, dt, chosen)  # places and materials are those that it has worked out
-    lines = ["import json", "", "import pymunk", "", *constants(dt, steps), "", "space = pymunk.Space()"]
+    lines = [*imports(scene, "import pymunk"), *constants(dt, steps), "", "space = pymunk.Space()"]
     lines.append(f"space.gravity = {literal(scene.gravity)}")
     lines += [f"space.{name} = {chosen[name]!r}" for name in _SPACE]
     lines += ["bodies = {}", *(f"# start: {change}" for change in built.initial_change)]
@@ -40,15 +40,21 @@ def _made(asked: Body, body: Any, shape: Any) -> list[str]:
         lines.append(f"body.velocity, body.angular_velocity = {literal(tuple(body.velocity))}, {asked.twist[2]!r}")
     if isinstance(asked.shape, Disc):
         lines.append(f"shape = pymunk.Circle(body, {asked.shape.radius!r})")
+    elif isinstance(asked.shape, Capsule):
+        x = asked.shape.half_length
+        lines.append(f"shape = pymunk.Segment(body, ({-x!r}, 0.0), ({x!r}, 0.0), {asked.shape.radius!r})")
     else:
         lines.append(f"shape = pymunk.Poly(body, {corners(asked.shape)!r})")
+    if any(asked.surface_velocity):
+        lines.append(f"shape.surface_velocity = {literal(asked.surface_velocity)}")
     lines.append(f"shape.elasticity, shape.friction = {shape.elasticity!r}, {shape.friction!r}")
     return [*lines, "space.add(body, shape)"]
 
 
 def _loads(scene: Scene) -> list[str]:
-    """Lines that apply the external loads, which every step clears."""
+    """Lines before a step: external loads, which every step clears, and velocities of courses."""
+    lines = [f"bodies[{b.name!r}].velocity = {velocity(b)}" for b in scene.bodies if b.course is not None]
     loaded = [b for b in scene.bodies if b.motion == "free" and (any(b.force) or any(b.torque))]
-    return [
+    return lines + [
         f"bodies[{b.name!r}].force, bodies[{b.name!r}].torque = {literal(b.force)}, {b.torque[0]!r}" for b in loaded
     ]

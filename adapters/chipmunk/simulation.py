@@ -14,6 +14,7 @@ import numpy as np
 from adapters.chipmunk.releases import point_impulses
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
+from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.scene import Scene
 
@@ -34,6 +35,13 @@ class ChipmunkSimulation(Simulation):
         self.space.collision_persistence = settings["collision_persistence"]
         self.bodies = [made_body(body) for body in scene.bodies]
         self.shapes = [made_shape(a.shape, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
+        for asked, shape in zip(scene.bodies, self.shapes, strict=True):
+            if any(asked.surface_velocity):
+                shape.surface_velocity = asked.surface_velocity
+        self.made = 0
+        self.driven = [(b, a) for a, b in zip(scene.bodies, self.bodies, strict=True) if a.course is not None]
+        for body, asked in self.driven:
+            body.velocity = velocity_over(asked, dt, 0)
         self._set_materials()
         if settings["start_overlap"] > 0.0:
             self._overlap_start(settings["start_overlap"])
@@ -80,6 +88,9 @@ class ChipmunkSimulation(Simulation):
         for _ in range(steps):
             for body, force, torque in self.loaded:
                 body.force, body.torque = force, torque
+            for body, asked in self.driven:
+                body.velocity = velocity_over(asked, dt, self.made)
+            self.made += 1
             step(dt)
 
     def pose(self) -> Array:

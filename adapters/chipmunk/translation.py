@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from adapters.needs import needs
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene
 
 #: A half-space is one thick static polygon. Nothing is swept, so what sinks deeper than half the depth in one step
 #: leaves on the wrong side: 1 km is safe to 1e5 m/s at 1/240 s. Results do not depend on either number (the
@@ -92,14 +92,19 @@ def made_shape(shape: Any, body: Any, skin: float) -> Any:
 
     if isinstance(shape, Disc):
         return pymunk.Circle(body, shape.radius + skin)
+    if isinstance(shape, Capsule):
+        ends = ((-shape.half_length, 0.0), (shape.half_length, 0.0))
+        return pymunk.Segment(body, *ends, shape.radius + skin)
     return pymunk.Poly(body, corners(shape), radius=skin)
 
 
 def corners(shape: Any) -> list[tuple[float, float]]:
-    """Corners of the polygon that a box or a half-space becomes, in body axes."""
+    """Corners of the polygon that a shape with corners becomes, in body axes."""
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
         return [(-hx, -hy), (hx, -hy), (hx, hy), (-hx, hy)]
+    if isinstance(shape, Polygon):
+        return list(shape.vertices)
     assert isinstance(shape, HalfSpace)
     return _ground(shape)
 

@@ -16,6 +16,7 @@ from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.mujoco.model import read
+from adapters.mujoco.moving import moved
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
@@ -45,6 +46,7 @@ class MujocoEngine(Engine):
         customary_dt=1.0 / 500.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
         colour="#d255f8",
+        abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "cylinder", "hull"}),
         quirks=(
             Quirk(
                 "a state that is not finite is reset to the start, time included, and stepping goes on",
@@ -80,6 +82,17 @@ class MujocoEngine(Engine):
                 "a mocap body has no velocity in contacts",
                 "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load",
                 f"{DOC}, modeling: mocap bodies",
+            ),
+            Quirk(
+                "corners of a mesh are kept in single precision",
+                "a hull is a mesh, off by 6e-8 of its size; a planar polygon is a prism",
+                "measured: a cube as a hull slides like the box to 1e-7",
+            ),
+            Quirk(
+                "a plane belongs to a body that has no joint, and no surface runs",
+                "a moving half-space is a mocap body; its velocity, as that of a running surface, enters aref of each "
+                "contact's rows between mj_step1 and mj_step2",
+                f"{DOC}, computation: constraint model; programming/simulation",
             ),
         ),
         known_bad_versions=KNOWN_BAD,
@@ -118,6 +131,8 @@ class MujocoEngine(Engine):
         if refusal:
             raise EngineError(refusal)
         check_settings(settings)
+        if moved(scene) and settings["integrator"] == "RK4":
+            raise EngineError("integrator: RK4 looks for contacts within a step, where no face that moves is known")
         return MujocoSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:

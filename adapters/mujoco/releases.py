@@ -109,6 +109,7 @@ class Mjcf:
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
         self._contact = ElementTree.Element("contact")
         self.stat = SimpleNamespace(meaninertia=None)
+        self._meshes: list[ElementTree.Element] = []
         self._keys: list[ElementTree.Element] = []
 
     def add_pair(self, *, geomname1: str, geomname2: str, **attributes: Any) -> None:
@@ -121,6 +122,10 @@ class Mjcf:
     def add_key(self, **attributes: Any) -> None:
         """Add a state to start from."""
         self._keys.append(ElementTree.Element("key", _text(attributes)))
+
+    def add_mesh(self, *, name: str, uservert: list[float]) -> None:
+        """Add a mesh by its corners, whose hull is what touches."""
+        self._meshes.append(ElementTree.Element("mesh", {"name": name, "vertex": _written(uservert)}))
 
     def compile(self) -> Any:
         """Return the compiled ``MjModel``; raises ValueError as MuJoCo does."""
@@ -147,6 +152,8 @@ class Mjcf:
             ElementTree.SubElement(option, "flag", dict.fromkeys(names, "disable"))
         if self.stat.meaninertia is not None:
             ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
+        if self._meshes:
+            ElementTree.SubElement(self._root, "asset").extend(self._meshes)
         self.worldbody.finish()
         self._root.append(self.worldbody.element)
         if len(self._contact):
@@ -182,6 +189,8 @@ class _Body:
     def add_geom(self, *, type: Any, **attributes: Any) -> None:
         """Add a geom."""
         kind = self._mujoco.mjtGeom(type).name.removeprefix("mjGEOM_").lower()
+        if "meshname" in attributes:
+            attributes["mesh"] = attributes.pop("meshname")
         ElementTree.SubElement(self.element, "geom", {"type": kind, **_text(attributes)})
 
     def finish(self) -> None:
@@ -203,7 +212,9 @@ def _text(attributes: dict[str, Any]) -> dict[str, str]:
 def _written(value: Any) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, int) and not isinstance(value, bool):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
         return repr(value)

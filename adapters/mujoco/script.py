@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from adapters.engine import EngineError
+from adapters.mujoco.moving import is_moved_face, script_lines
 from adapters.mujoco.profiles import check_settings
 from adapters.mujoco.releases import Mjcf
-from adapters.mujoco.spec import Spec, mean_inertia, start
+from adapters.mujoco.spec import Spec, has_joint, mean_inertia, start
 from adapters.scene import Scene
-from adapters.script import constants, literal, stepped, text
+from adapters.script import constants, imports, literal, stepped, text, velocity
 
 
 def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
@@ -19,11 +20,13 @@ def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> st
     Raises
     ------
     EngineError
-        For an external load: a model has no word for one.
+        For an external load or a course: a model has no word for them.
     """
     for body in scene.bodies:
         if body.motion == "free" and any((*body.force, *body.torque)):
             raise EngineError(f"{body.name}.force: MJCF has no word for an external load; python has")
+        if body.course is not None or any(body.surface_velocity) or is_moved_face(body):
+            raise EngineError(f"{body.name}: MJCF has no word for a course, a face that moves or a surface that runs")
     return _model(scene, dt, settings, True)
 
 
@@ -35,27 +38,42 @@ def _model(scene: Scene, dt: float, settings: Mapping[str, Any], key: bool) -> s
     Spec(scene, dt, settings, written)
     written.stat.meaninertia = mean_inertia(scene)
     if key:
-        qpos, qvel = start(scene)
+        qpos, qvel = start(scene, dt)
         written.add_key(name="start", qpos=qpos, qvel=qvel)
     return written.text()
 
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with mujoco; see `adapters.engine.Writer`."""
-    qpos, qvel = start(scene)
-    lines = ["import json", "", "import mujoco", "import numpy as np", "", *constants(dt, steps), 'MODEL = """']
+    qpos, qvel = start(scene, dt)
+    lines = [*imports(scene, "import mujoco", "import numpy as np"), *constants(dt, steps), 'MODEL = """']
     lines += [*_model(scene, dt, settings, False).splitlines(), '"""']
     lines.append("# Names and poses; of bodies that move the pose is the one at the start.")
     lines.append("BODIES = {")
     lines += [f"    {body.name!r}: {literal(body.pose)}," for body in scene.bodies]
-    moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+    moving = [i for i, body in enumerate(scene.bodies) if has_joint(body)]
     lines += ["}", f"MOVING = {moving}", "", "model = mujoco.MjModel.from_xml_string(MODEL)"]
     lines += ["data = mujoco.MjData(model)", f"data.qpos[:] = {qpos}", f"data.qvel[:] = {qvel}"]
     for i, body in enumerate(scene.bodies):
         if body.motion == "free" and any((*body.force, *body.torque)):
             load = literal((*body.force, *body.torque))
             lines.append(f'data.xfrc_applied[model.body("body{i}").id] = {load}')
-    return text(lines + _STATE + stepped(["mujoco.mj_step(model, data)"]))
+    drives = []
+    for row, i in enumerate(moving):
+        if scene.bodies[i].course is not None:
+            drives.append(f"data.qvel[{6 * row} : {6 * row + 3}] = {velocity(scene.bodies[i])}")
+    before, step = script_lines(scene, dt)
+    return text(lines + _state(scene) + before + stepped([*drives, *step]))
+
+
+def _state(scene: Scene) -> list[str]:
+    """Lines of the function that reads all bodies, with the places of faces that move."""
+    faces = [
+        f'    pose[{i}, :3], twist[{i}, :3] = data.mocap_pos[model.body("body{i}").mocapid[0]], faces[{i}]'
+        for i, body in enumerate(scene.bodies)
+        if is_moved_face(body)
+    ]
+    return [*_STATE[:-1], *faces, _STATE[-1]]
 
 
 #: Lines of the function that reads all bodies: MuJoCo keeps angular velocity in body axes.

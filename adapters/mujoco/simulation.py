@@ -12,9 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
+from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
-from adapters.mujoco.spec import Spec, rotation, start
+from adapters.mujoco.spec import Spec, has_joint, rotation, start
 from adapters.scene import Scene
 
 
@@ -30,7 +32,11 @@ class MujocoSimulation(Simulation):
         self._settings = dict(settings)
         self._model = Spec(scene, dt, settings).compile()
         self._data = mujoco.MjData(self._model)
-        self._moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
+        self._moving = [i for i, body in enumerate(scene.bodies) if has_joint(body)]
+        driven = [(row, scene.bodies[i]) for row, i in enumerate(self._moving)]
+        self._driven = [(6 * row, body) for row, body in driven if body.course is not None]
+        self._moved = Moved(mujoco, scene, dt, self._model, self._data) if moved(scene) else None
+        self._made = 0
         self._poses = np.array([body.pose for body in scene.bodies], dtype=float)
         self._twists = np.zeros((len(scene.bodies), 6))
         names = [self._model.geom(g).name for g in range(self._model.ngeom)]
@@ -39,7 +45,7 @@ class MujocoSimulation(Simulation):
 
     def _set_start(self) -> None:
         """Start state and loads."""
-        self._data.qpos[:], self._data.qvel[:] = start(self._scene)
+        self._data.qpos[:], self._data.qvel[:] = start(self._scene, self._dt)
         for index in self._moving:
             body = self._scene.bodies[index]
             if body.motion == "free":
@@ -54,17 +60,33 @@ class MujocoSimulation(Simulation):
         EngineError
             If MuJoCo dropped contacts for want of memory.
         """
-        self._mujoco.mj_step(self._model, self._data, nstep=steps)
+        if self._driven or self._moved:
+            for _ in range(steps):
+                self._drive()
+        else:
+            self._mujoco.mj_step(self._model, self._data, nstep=steps)
         check_state(self._mujoco, self._data)
         kinds = self._mujoco.mjtWarning
         for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
             if self._data.warning[kind].number:
                 raise EngineError("memory: MuJoCo's arena is too small, it dropped contacts")
 
+    def _drive(self) -> None:
+        """Make a step in which bodies move by a course, faces move or surfaces run."""
+        for row, body in self._driven:
+            self._data.qvel[row : row + 3] = velocity_over(body, self._dt, self._made)
+        if self._moved:
+            self._moved.step(self._made)
+        else:
+            self._mujoco.mj_step(self._model, self._data)
+        self._made += 1
+
     def pose(self) -> Array:
         """Poses at the end of the last step."""
         if self._moving:
             self._poses[self._moving] = self._data.qpos.reshape(-1, 7)
+        if self._moved:
+            self._moved.state(self._poses, self._twists)
         return self._poses.copy()
 
     def twist(self) -> Array:
@@ -74,6 +96,8 @@ class MujocoSimulation(Simulation):
             turns = rotation(self._data.qpos.reshape(-1, 7)[:, 3:])
             self._twists[self._moving, :3] = velocity[:, :3]
             self._twists[self._moving, 3:] = np.einsum("nij,nj->ni", turns, velocity[:, 3:])
+        if self._moved:
+            self._moved.state(self._poses, self._twists)
         return self._twists.copy()
 
     def contacts(self) -> Contacts:

@@ -8,20 +8,29 @@ from typing import Any
 
 import numpy as np
 
+from adapters.drives import velocity_over
 from adapters.engine import Array, EngineError
+from adapters.mujoco.moving import is_moved_face
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
-from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
 #: below the round-off that every check allows.
 PRESCRIBED_MASS = 1e15
+#: MuJoCo's capsules and cylinders lie along their z axis, ours along the body's x.
+Z_TO_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 
 
 def moments(body: Body) -> tuple[float, float, float]:
     """Principal moments of a body [kg m^2]."""
     assert isinstance(body.inertia, tuple), "MuJoCo is spatial: planar scenes arrive lifted"
     return body.inertia
+
+
+def has_joint(body: Body) -> bool:
+    """Whether MuJoCo moves a body: free ones, and prescribed ones but half-spaces."""
+    return body.motion != "fixed" and not is_moved_face(body)
 
 
 def rotation(quaternion: Array) -> Array:
@@ -58,6 +67,7 @@ class Spec:
         self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
         one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
         self.shared = materials.pop() if one else None
+        self.hulls: list[str] = []
         self._options()
         free = [body for body in scene.bodies if body.motion == "free"]
         self.heavy = PRESCRIBED_MASS * max((b.mass for b in free), default=1.0)
@@ -84,9 +94,13 @@ class Spec:
 
     def _body(self, index: int, body: Body) -> None:
         world = self.spec.worldbody
-        half_space = isinstance(body.shape, HalfSpace)
-        made = world if half_space else world.add_body(name=f"body{index}", pos=body.pose[:3], quat=body.pose[3:])
-        if body.motion != "fixed":
+        if is_moved_face(body):
+            made = world.add_body(name=f"body{index}", mocap=True)
+        elif isinstance(body.shape, HalfSpace):
+            made = world
+        else:
+            made = world.add_body(name=f"body{index}", pos=body.pose[:3], quat=body.pose[3:])
+        if has_joint(body):
             made.add_freejoint()
             made.explicitinertial = True
             made.ipos, made.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)  # undefined ones become pos and quat
@@ -106,6 +120,14 @@ class Spec:
             return {"type": kinds.mjGEOM_SPHERE, "size": [shape.radius, 0.0, 0.0]}
         if isinstance(shape, Box):
             return {"type": kinds.mjGEOM_BOX, "size": list(shape.half_extents)}
+        if isinstance(shape, Capsule | Cylinder):
+            kind = kinds.mjGEOM_CAPSULE if isinstance(shape, Capsule) else kinds.mjGEOM_CYLINDER
+            return {"type": kind, "size": [shape.radius, shape.half_length, 0.0], "quat": Z_TO_X}
+        if isinstance(shape, Hull):
+            name = f"hull{len(self.hulls)}"
+            self.hulls.append(name)
+            self.spec.add_mesh(name=name, uservert=[x for vertex in shape.vertices for x in vertex])
+            return {"type": kinds.mjGEOM_MESH, "meshname": name}
         assert isinstance(shape, HalfSpace)
         foot = [shape.offset * n for n in shape.normal]
         plane = {"type": kinds.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}  # 0: without end, and exact
@@ -165,20 +187,20 @@ def mean_inertia(scene: Scene) -> float | None:
 
     The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
     """
-    if not any(body.motion == "prescribed" for body in scene.bodies):
+    if not any(body.motion == "prescribed" and has_joint(body) for body in scene.bodies):
         return None
     free = [b for b in scene.bodies if b.motion == "free"]
     inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
     return sum(inertias) / max(1, len(inertias)) or 1.0
 
 
-def start(scene: Scene) -> tuple[list[float], list[float]]:
+def start(scene: Scene, dt: float) -> tuple[list[float], list[float]]:
     """``qpos`` and ``qvel`` of the moving bodies at the start; MuJoCo keeps angular velocity in body axes."""
     qpos: list[float] = []
     qvel: list[float] = []
     for body in scene.bodies:
-        if body.motion != "fixed":
+        if has_joint(body):
             turn = rotation(np.array([body.pose[3:]]))[0]
             qpos += map(float, body.pose)
-            qvel += map(float, (*body.twist[:3], *(turn.T @ np.array(body.twist[3:]))))
+            qvel += map(float, (*velocity_over(body, dt, 0), *(turn.T @ np.array(body.twist[3:]))))
     return qpos, qvel

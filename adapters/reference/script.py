@@ -14,7 +14,8 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     """Python of a run with `reference_solver`; see `adapters.engine.Writer`."""
     model = solver_model(scene)
     lines = ["import json", "", "from numpy import zeros", ""]
-    lines.append("from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere")
+    kinds = sorted({type(body.shape).__name__ for body in model.bodies})
+    lines.append(f"from reference_solver import Body, {', '.join(kinds)}, Model, Settings, Simulation")
     lines += ["", *constants(dt, steps), "", "bodies = {"]
     lines += [f"    {asked.name!r}: {body!r}," for asked, body in zip(scene.bodies, model.bodies, strict=True)]
     lines += ["}", "n = len(bodies)", "restitution, friction = zeros((n, n)), zeros((n, n))"]

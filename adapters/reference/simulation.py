@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts, Simulation
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Shape, Sphere
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 
 
 def _shape(shape: Shape) -> Any:
@@ -21,6 +21,10 @@ def _shape(shape: Shape) -> Any:
         return model.Sphere(shape.radius)
     if isinstance(shape, Box):
         return model.Box(shape.half_extents)
+    if isinstance(shape, Capsule):
+        return model.Capsule(shape.half_length, shape.radius)
+    if isinstance(shape, Polygon):
+        return model.Polygon(shape.vertices)
     assert isinstance(shape, HalfSpace)
     return model.HalfSpace(shape.normal, shape.offset)
 

@@ -6,7 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from adapters.scene import Body, Box, Disc, Scene, Sphere
+from adapters.scene import HalfSpace, Scene
+from adapters.shapes import reach
 
 
 def overlap_at_the_start(scene: Scene) -> str | None:
@@ -19,13 +20,13 @@ def overlap_at_the_start(scene: Scene) -> str | None:
     from reference_solver.certification.geometry import gap
 
     limit = next(gate.limit for gate in GATES if gate.name == "start_overlap")
-    reach = [_reach(body) for body in scene.bodies]
+    around = [np.inf if isinstance(body.shape, HalfSpace) else reach(body.shape) for body in scene.bodies]
     place = np.array([body.pose[: scene.dimension] for body in scene.bodies])
     for i, j in combinations(range(len(scene.bodies)), 2):
         first, second = scene.bodies[i], scene.bodies[j]
         if "free" not in (first.motion, second.motion):
             continue
-        if float(np.linalg.norm(place[i] - place[j])) > reach[i] + reach[j]:
+        if float(np.linalg.norm(place[i] - place[j])) > around[i] + around[j]:
             continue
         poses = (np.array([first.pose]), np.array([second.pose]))
         depth = -float(np.atleast_1d(gap(first.shape, poses[0], second.shape, poses[1]))[0])
@@ -34,10 +35,3 @@ def overlap_at_the_start(scene: Scene) -> str | None:
                 f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid bodies have no solution"
             )
     return None
-
-
-def _reach(body: Body) -> float:
-    """Distance of the outermost point from the centre [m]."""
-    if isinstance(body.shape, Box):
-        return float(np.linalg.norm(body.shape.half_extents))
-    return body.shape.radius if isinstance(body.shape, Disc | Sphere) else np.inf

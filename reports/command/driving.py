@@ -46,9 +46,9 @@ def frontier(
 ) -> None:
     """Bisect how far each engine and profile can be driven until a scene no longer happens.
 
-    Largest step, stack height, mass ratio, spin and impact speed, fewest iterations: each as a bracket of one cell
-    that survives and one that does not, with how it ended and the commands that run both again. SCENES that declare
-    no such axis are refused. Exits with 4 if a named engine is not here.
+    Largest step, stack height, mass ratio, overlap, spin and impact speed, fewest iterations: each as a bracket of one
+    cell that survives and one that does not, with how it ended and the commands that run both again. SCENES that
+    declare no such axis are refused. Exits with 4 if a named engine is not here.
     """
     names = list(dict.fromkeys(scene.name for pattern in scenes for scene in matching(pattern)))
     known = dict.fromkeys(name for name, _ in axes())

@@ -19,7 +19,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Sphere
+from adapters.shapes import reach
 from reports.page import figures
 from reports.page.figures import Figure
 from reports.page.source import Source
@@ -143,22 +144,15 @@ def _view(
     """Corners of what the camera shows: bodies at start, the exact motion, and engines as far as they are followed."""
     d = scene.dimension
     start = np.array([scene.bodies[i].pose[:d] for i in free])
-    reach = max(_reach(scene, i) for i in free)
+    around = max(reach(scene.bodies[i].shape) for i in free)
     known = start if exact is None else np.concatenate([start, exact])
-    low, high = known.min(0) - reach, known.max(0) + reach
+    low, high = known.min(0) - around, known.max(0) + around
     room = FOLLOWED * (high - low)
     for _, recording in members:
         seen = recording.pose[:, free, :d].reshape(-1, d)
-        low = np.minimum(low, np.maximum(seen.min(0) - reach, low - room))
-        high = np.maximum(high, np.minimum(seen.max(0) + reach, high + room))
+        low = np.minimum(low, np.maximum(seen.min(0) - around, low - room))
+        high = np.maximum(high, np.minimum(seen.max(0) + around, high + room))
     return low, high
-
-
-def _reach(scene: Scene, i: int) -> float:
-    shape = scene.bodies[i].shape
-    if isinstance(shape, Box):
-        return float(np.linalg.norm(shape.half_extents))
-    return shape.radius if isinstance(shape, Disc | Sphere) else 0.0
 
 
 def _body(scene: Scene, i: int) -> dict[str, Any]:
@@ -169,7 +163,26 @@ def _body(scene: Scene, i: int) -> dict[str, Any]:
         return plain | {"type": "box", "half": list(shape.half_extents)}
     if isinstance(shape, HalfSpace):
         return plain | {"type": "face", "normal": list(shape.normal), "offset": shape.offset}
-    return plain | {"type": "ball", "radius": shape.radius, "dimension": d}
+    if isinstance(shape, Disc | Sphere):
+        return plain | {"type": "ball", "radius": shape.radius, "dimension": d}
+    return plain | {"type": "corners", "corners": [_plain(np.array(corner)) for corner in _corners(shape, d)]}
+
+
+def _corners(shape: Capsule | Cylinder | Polygon | Hull, dimension: int) -> list[tuple[float, ...]]:
+    """Points whose hull is the shape, or looks like it: of what is round about its axis, some of its outline."""
+    if isinstance(shape, Polygon | Hull):
+        return [*shape.vertices]
+    turns = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    if isinstance(shape, Cylinder):
+        ring = [(shape.radius * np.cos(a), shape.radius * np.sin(a)) for a in turns]
+        return [(x, y, z) for x in (-shape.half_length, shape.half_length) for y, z in ring]
+    outline: list[tuple[float, ...]] = [
+        (float(np.copysign(shape.half_length, np.cos(a))) + shape.radius * np.cos(a), shape.radius * np.sin(a))
+        for a in turns + np.pi / 32
+    ]
+    if dimension == 2:
+        return outline
+    return [(x, y * np.cos(a), y * np.sin(a)) for x, y in outline for a in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)]
 
 
 def _pose_levels(pose: NDArray[np.float64], dimension: int, unit: float) -> NDArray[np.int16]:

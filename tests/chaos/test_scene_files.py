@@ -7,6 +7,7 @@ import os
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+from generated_scenes import mutated
 
 from adapters.plain import is_visible
 from adapters.scene import SceneError
@@ -37,43 +38,6 @@ SPATIAL = {
     ],
     "pairs": [{"a": "ball", "b": "floor", "restitution": 1.0}],
 }  # fmt: skip
-#: Values that are put where others were expected.
-STRANGE = [
-    None, True, False, 0, -1, 1, 2, 7, 1e308, -1e308, 1e-320, -0.0, math.nan, math.inf, -math.inf, 10**400, 10**4000,
-    "", "*", "x" * 200, "<script>alert(1)</script>", "=1+1", "[red]", "[/]", "a|b", "\x1b[2J", "\x00", "\ud800",
-    "\u202e", "ball", [], {}, [[]], [0.0], [0.0] * 3, [0.0] * 7, ["x"], {"type": "disc"}, {"a": {"b": 1}},
-    [math.nan, 0.0],
-]  # fmt: skip
-
-
-def places(value, path=()):
-    """Every place in nested data."""
-    yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in items:
-        yield from places(item, (*path, key))
-
-
-def mutated(data, dice):
-    """The same data with one to three things wrong, or merely different."""
-    data = copy.deepcopy(data)
-    for _ in range(dice.choice((1, 1, 1, 2, 3))):
-        path = dice.choice(list(places(data))[1:])
-        owner = data
-        for key in path[:-1]:
-            owner = owner[key]
-        what, key = dice.random(), path[-1]
-        if what < 0.45:
-            owner[key] = copy.deepcopy(dice.choice(STRANGE))  # a list of ours would grow from file to file
-        elif what < 0.6:
-            del owner[key]
-        elif what < 0.7 and isinstance(owner, list):
-            owner.append(copy.deepcopy(owner[key]))
-        elif what < 0.8 and isinstance(owner, dict):
-            owner[dice.choice(["mass", "extra", "friction", "\x1b", "type", ""])] = owner[key]
-        elif isinstance(owner[key], float):
-            owner[key] *= 10.0 ** dice.uniform(-3.0, 3.0) * dice.choice((1.0, 1.0, -1.0))
-    return data
 
 
 def written(data, dice, folder, number):

@@ -115,6 +115,108 @@ def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values
     assert_same_bits(slot, tmp_path, allowed=("reference_solver",) if engine == registry.solver() else ())
 
 
+DRIVEN = """
+name = "driven"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.25
+[[bodies]]
+name = "belt"
+shape = { type = "half_space", angle = 0.0 }
+motion = "%s"
+surface_velocity = [%s, 0.0]
+%s
+[[bodies]]
+name = "box"
+shape = { type = "box", half_extents = [0.5, 0.25] }
+pose = [0.0, 0.25, 0.0]
+[[bodies]]
+name = "hammer"
+shape = { type = "box", half_extents = [0.5, 0.25] }
+motion = "prescribed"
+pose = [1.2, 0.35, 0.1]
+twist = [-0.2, 0.0, 0.5]
+%s
+[[pairs]]
+friction = 0.5
+"""
+COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
+
+
+@pytest.mark.parametrize(("engine", "runs", "shaken"), [
+    ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
+    ("mujoco", False, True), ("reference", True, False),
+])  # fmt: skip
+def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
+    found = registry.find(engine).engine
+    if found is None:
+        pytest.skip(f"{engine} is not installed")
+    from validation.posed import pinned
+
+    path, course = tmp_path / "driven.toml", COURSE if shaken else ""
+    moved = ("fixed", 1.0, "") if runs else ("prescribed", 0.0, COURSE)
+    path.write_text(DRIVEN % (*moved, course))
+    slot = slot_of(engine, pinned(str(path)), {}, found.facts.profile("textbook") or "tuned", 2)
+    allowed = ("reference_solver",) if engine == registry.solver() else ()
+    pose, twist = printed(slot, tmp_path, allowed)
+    expected = ended(slot)
+    standing = [1, 2] if runs else [0, 1, 2]  # a script's conveyor may be a half-space that moves along itself
+    assert np.array_equal(pose[standing], expected[0][standing])
+    assert np.array_equal(twist[standing], expected[1][standing])
+
+
+SHAPES = """
+name = "shapes"
+dimension = {d}
+gravity = {gravity}
+duration = 0.1
+[[bodies]]
+name = "floor"
+shape = {{ type = "half_space", angle = 0.0 }}
+motion = "fixed"
+[[bodies]]
+name = "capsule"
+shape = {{ type = "capsule", half_length = 0.4, radius = 0.3 }}
+pose = {first}
+[[bodies]]
+name = "other"
+shape = {{ type = {other} }}
+pose = {second}
+[[pairs]]
+friction = 0.5
+"""
+IN_THE_PLANE = {"d": 2, "gravity": [1.0, -9.81], "first": [0.0, 0.31, 0.1], "second": [3.0, 0.41, 0.2],
+                "other": '"polygon", vertices = [[0, 0], [1, 0], [0.5, 1]]'}  # fmt: skip
+CYLINDER = {"d": 3, "gravity": [1.0, 0.0, -9.81], "first": [0.0, 0.0, 0.31, 1, 0, 0, 0],
+            "second": [3.0, 0.0, 0.41, 1, 0, 0, 0], "other": '"cylinder", half_length = 0.5, radius = 0.4'}  # fmt: skip
+HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]'}
+
+
+@pytest.mark.parametrize(("engine", "values"), [
+    ("chipmunk", IN_THE_PLANE), ("reference", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
+    ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL),
+])  # fmt: skip
+def test_so_does_one_of_other_shapes(engine, values, tmp_path):
+    found = registry.find(engine).engine
+    if found is None:
+        pytest.skip(f"{engine} is not installed")
+    from validation.posed import pinned
+
+    path = tmp_path / "shapes.toml"
+    path.write_text(SHAPES.format(**values))
+    slot = slot_of(engine, pinned(str(path)), {}, found.facts.profile("textbook") or "tuned", values["d"])
+    assert_same_bits(slot, tmp_path, ("reference_solver",) if engine == registry.solver() else ())
+    if engine == "mujoco":
+        import mujoco
+
+        model = mujoco.MjModel.from_xml_string(written(slot, "mjcf"))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+        mujoco.mj_step(model, data, nstep=24)
+        pose = data.qpos.reshape(-1, 7)
+        assert np.array_equal(lower_pose(pose)[0] if values["d"] == 2 else pose, ended(slot)[0][1:])
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimension, profile):

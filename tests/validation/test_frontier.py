@@ -95,6 +95,9 @@ def test_a_cell_without_an_answer_did_not_survive(outcome, word):
     assert word in fate_of(one.frontier, Observation(slot, "c", 1, "1", outcome, "why"))
 
 
+APART = {"thrown": (0.9, ""), "centre_moved": (0.04, ""), "grown": (0.02, ""), "left": (0.5, "")}
+
+
 @pytest.mark.parametrize(
     ("scene", "name", "good", "changes", "word"),
     [
@@ -109,6 +112,10 @@ def test_a_cell_without_an_answer_did_not_survive(outcome, word):
          "changed its spin"),
         ("tumble", "spin", {"momentum_drift": (0.4, ""), "energy_drift": (0.4, "")}, {"momentum_drift": (2.0, "")},
          "exploded"),
+        ("overlap", "overlap", APART, {"thrown": (1.1, "")}, "flew apart"),
+        ("overlap", "overlap", APART, {"centre_moved": (0.06, "")}, "drove off"),
+        ("overlap", "overlap", APART, {"grown": (0.03, "")}, "sank in"),
+        ("overlap", "overlap", APART, {"thrown": (None, "gone")}, "no answer"),
     ],
 )  # fmt: skip
 def test_each_way_to_end_has_its_word(scene, name, good, changes, word):

@@ -81,6 +81,18 @@ def test_a_missing_file_is_named(tmp_path):
         load_scene(tmp_path / "nowhere.toml")
 
 
+def test_the_published_schema_is_that_of_the_format():
+    """`crosscheck schema -o validation/scene.schema.json` writes it anew."""
+    from click.testing import CliRunner
+
+    from reports.command import main
+
+    done = CliRunner().invoke(main, ["schema"])
+    assert done.exit_code == 0
+    assert done.stdout == (Path(__file__).parents[2] / "validation" / "scene.schema.json").read_text()
+    assert json.loads(done.stdout)["$id"].endswith(":1")
+
+
 def test_the_schema_names_every_field():
     assert {"name", "dimension", "gravity", "duration", "bodies", "pairs"} <= set(json_schema()["properties"])
 

@@ -20,7 +20,7 @@ import numpy as np
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Variation
 from validation.geometry import overlap
 from validation.scenes.parts import along, at, ball, mass_of, states, upward
 
@@ -91,6 +91,18 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     return (None, reason) if value is None else (value * dt / (scene.params["depth"] * RADIUS), "")
 
 
+def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
+    """How it ended, if an overlap was more than a start that cannot be: one word, or nothing."""
+    thrown, moved, grown = (found[name][0] for name in ("thrown", "centre_moved", "grown"))
+    if thrown is None or moved is None or grown is None:
+        return "no answer"
+    if thrown > scene.params["v"]:
+        return "flew apart"
+    if moved > 0.1 * RADIUS:
+        return "drove off"
+    return "sank in" if grown > 0.1 * scene.params["depth"] * RADIUS else ""
+
+
 SCENE = CanonicalScene(
     name="overlap",
     family="hard",
@@ -122,6 +134,19 @@ SCENE = CanonicalScene(
         lambda dt: [{}],
         error,
         "the two balls coming apart",
+    ),
+    frontiers=(
+        Frontier(
+            "overlap",
+            "radii",
+            "depth",
+            1e-4,
+            1.0,
+            1.0,
+            fate,
+            "came apart more slowly than both move on (1 m/s), their centre within a tenth of a radius, no deeper by a "
+            "tenth of the overlap",
+        ),
     ),
     words={
         "thrown": "throws them apart with {value}",

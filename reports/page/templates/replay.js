@@ -84,6 +84,13 @@
   }
   function corners(body, pose, plane) {
     const [place, turn] = pose, signs = [-1, 1];
+    if (body.corners) {
+      if (turn.length === 1) {
+        const c = Math.cos(turn[0]), s = Math.sin(turn[0]);
+        return body.corners.map(([x, y]) => [place[0] + c * x - s * y, place[1] + s * x + c * y]);
+      }
+      return hull(body.corners.map((p) => rotated(turn, p)).map((v) => plane.map((c) => place[c] + v[c])));
+    }
     if (body.half.length === 2) {
       const c = Math.cos(turn[0]), s = Math.sin(turn[0]), [a, b] = body.half;
       return [[-a, -b], [a, -b], [a, b], [-a, b]].map(([x, y]) => [place[0] + c * x - s * y, place[1] + s * x + c * y]);

@@ -1,0 +1,110 @@
+"""What moves bodies from outside: surfaces that run, courses that are prescribed, and what of it an adapter can honour.
+
+A conveyor is a body that stays where it is while its surface runs along itself. Of a half-space that is the same as a
+half-space that moves along itself, and engines without a surface velocity get it so (`as_moving`).
+
+A course adds an oscillation to the constant twist of a prescribed body:
+
+    x(t) = x0 + v t + A (sin(2 pi f t + phase) - sin(phase))
+
+Engines move a body by a velocity. Over each step they are given the mean one, ``(x(t + dt) - x(t)) / dt``, so that the
+body is where its course says at the end of every step; what touches it meets that velocity, not the one at an instant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from adapters.shapes import HalfSpace, SceneError, check_finite, check_length, check_positive
+
+if TYPE_CHECKING:
+    from adapters.scene import Body, Scene
+
+#: What a scene may ask for beyond discs, balls, boxes, fixed half-spaces and constant twists. An adapter names what it
+#: honours (`adapters.engine.EngineFacts.abilities`); the rest is refused before the adapter sees it.
+Ability = Literal["surface velocity", "moving half-space", "course", "capsule", "polygon", "cylinder", "hull"]
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Oscillation of a prescribed body: ``amplitude`` [m] along the world axes, ``frequency`` [Hz], ``phase`` [rad]."""
+
+    amplitude: tuple[float, ...]
+    frequency: float
+    phase: float = 0.0
+
+    @property
+    def top_speed(self) -> float:
+        """Fastest that the oscillation alone moves [m/s]."""
+        return 2.0 * math.pi * self.frequency * math.hypot(*self.amplitude)
+
+
+def velocity_over(body: Body, dt: float, step: int) -> tuple[float, ...]:
+    """Velocity [m/s] that takes a prescribed body through step number ``step`` (0 is the first) of ``dt`` [s]."""
+    velocity, course = body.twist[: len(body.force)], body.course
+    if course is None:
+        return velocity
+    rate = 2.0 * math.pi * course.frequency
+    late, early = (math.sin(rate * (k * dt) + course.phase) for k in (step + 1, step))
+    return tuple(v + a * ((late - early) / dt) for v, a in zip(velocity, course.amplitude, strict=True))
+
+
+def top_speed(body: Body) -> float:
+    """Fastest that a body moves by what is prescribed, or its surface runs [m/s]; of a free body at the start."""
+    own = math.hypot(*body.twist[: len(body.force)]) + (body.course.top_speed if body.course else 0.0)
+    return own + math.hypot(*body.surface_velocity)
+
+
+def check_drive(body: Body, dimension: int) -> None:
+    """Raise `SceneError` for a surface or a course that is none; the body's pose and twist are checked already."""
+    check_finite(f"{body.name}.surface_velocity", body.surface_velocity)
+    check_length(f"{body.name}.surface_velocity", body.surface_velocity, dimension)
+    if any(body.surface_velocity):
+        if body.motion == "free":
+            raise SceneError(f"{body.name}.surface_velocity: only the surface of a body that is not free can run")
+        if isinstance(body.shape, HalfSpace):
+            lifting = sum(v * n for v, n in zip(body.surface_velocity, body.shape.normal, strict=True))
+            if abs(lifting) > 1e-9 * math.hypot(*body.surface_velocity):
+                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} leaves the face")
+    course = body.course
+    if course is None:
+        return
+    if not isinstance(course, Harmonic):
+        raise SceneError(f"{body.name}.course: {course!r} is no course")
+    if body.motion != "prescribed":
+        raise SceneError(f"{body.name}.course: only a prescribed body has a course")
+    check_finite(f"{body.name}.course.amplitude", course.amplitude)
+    check_length(f"{body.name}.course.amplitude", course.amplitude, dimension)
+    check_positive(f"{body.name}.course.frequency", course.frequency)
+    check_finite(f"{body.name}.course.phase", course.phase)
+
+
+def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:
+    """What a scene asks for beyond the common ground: the field that asks, and what."""
+    kinds: dict[str, Ability] = {"Capsule": "capsule", "Polygon": "polygon", "Cylinder": "cylinder", "Hull": "hull"}
+    for body in scene.bodies:
+        kind = type(body.shape).__name__
+        if kind in kinds:
+            yield f"{body.name}.shape", kinds[kind]
+        if any(body.surface_velocity):
+            yield f"{body.name}.surface_velocity", "surface velocity"
+        if body.course is not None:
+            yield f"{body.name}.course", "course"
+        if isinstance(body.shape, HalfSpace) and body.motion == "prescribed":
+            yield f"{body.name}.motion", "moving half-space"
+
+
+def as_moving(scene: Scene) -> Scene:
+    """The same physics with half-spaces that move along themselves in place of fixed ones whose surface runs."""
+    bodies = tuple(_moving(body) for body in scene.bodies)
+    return scene if bodies == scene.bodies else replace(scene, bodies=bodies)
+
+
+def _moving(body: Body) -> Body:
+    if not any(body.surface_velocity) or not isinstance(body.shape, HalfSpace) or body.motion != "fixed":
+        return body
+    spin = (0.0,) * (len(body.twist) - len(body.force))
+    return replace(body, motion="prescribed", twist=(*body.surface_velocity, *spin), surface_velocity=())

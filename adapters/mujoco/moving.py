@@ -1,0 +1,103 @@
+"""Faces that move and surfaces that run, which MuJoCo has no word for: their velocity enters the contacts of a step.
+
+A constraint asks for the acceleration ``aref = -b v - k r``, where v is the velocity of the bodies that MuJoCo moves. A
+face that is moved from outside (a mocap body, which has no velocity in contacts) adds its own, row by row, between the
+two halves of a step: ``aref -= b (v of the face along the row)``.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+
+from adapters.drives import velocity_over
+from adapters.scene import Body, HalfSpace, Scene
+from adapters.script import literal, velocity
+
+
+def is_moved_face(body: Body) -> bool:
+    """Whether a body is a half-space that is moved from outside."""
+    return isinstance(body.shape, HalfSpace) and body.motion == "prescribed"
+
+
+def moved(scene: Scene) -> dict[int, Body]:
+    """Bodies by index whose contacts need a velocity that MuJoCo does not know of."""
+    return {i: b for i, b in enumerate(scene.bodies) if is_moved_face(b) or any(b.surface_velocity)}
+
+
+def motions(scene: Scene, dt: float, step: int) -> dict[int, tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Velocity of the face over step number ``step`` and velocity of its surface, by index of the body [m/s]."""
+    still = (0.0, 0.0, 0.0)
+    return {
+        i: (velocity_over(body, dt, step) if is_moved_face(body) else still, body.surface_velocity)
+        for i, body in moved(scene).items()
+    }
+
+
+def enter_motions(model, data, motions):
+    """Let contacts with geoms that move, by their numbers, know of it; after ``mj_step1``, before ``mj_step2``."""
+    for k in range(data.ncon):
+        contact = data.contact[k]
+        row, frame = contact.efc_address, contact.frame.reshape(3, 3)
+        if row < 0:
+            continue
+        away = np.zeros(3)
+        for side, geom in ((-1.0, contact.geom[0]), (1.0, contact.geom[1])):
+            face, surface = motions.get(int(geom), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+            run = frame @ np.array(surface)
+            run[0] = 0.0  # what runs along itself neither lifts nor sinks
+            away += side * (frame @ np.array(face) + run)
+        if contact.dim == 1:
+            rows = away[:1]
+        elif model.opt.cone == 1:  # elliptic: the normal, then the tangents
+            rows = np.concatenate([away, np.zeros(contact.dim - 3)])
+        else:  # pyramid: the normal plus and minus each tangent by its friction
+            sides = ((away[t] if t < 3 else 0.0) * contact.friction[t - 1] for t in range(1, contact.dim))
+            rows = np.array([away[0] + sign * side for side in sides for sign in (1.0, -1.0)])
+        data.efc_aref[row : row + len(rows)] -= data.efc_KBIP[row : row + len(rows), 1] * rows
+
+
+def script_lines(scene: Scene, dt: float) -> tuple[list[str], list[str]]:
+    """Lines that a script needs before its loop, and the lines of a step."""
+    if not moved(scene):
+        return [], ["mujoco.mj_step(model, data)"]
+    first = {i: face for i, (face, _) in motions(scene, dt, 0).items()}
+    faces = ["# Velocities of faces that move, by the numbers of their bodies.", f"faces = {first}"]
+    pairs, before, after = [], [], []
+    for i, body in moved(scene).items():
+        pairs.append(f'model.geom("geom{i}").id: (faces[{i}], {literal(body.surface_velocity)})')
+        if is_moved_face(body):
+            before.append(f"faces[{i}] = {velocity(body)}")
+            after.append(f'data.mocap_pos[model.body("body{i}").mocapid[0]] += DT * np.array(faces[{i}])')
+    step = [*before, "mujoco.mj_step1(model, data)", f"enter_motions(model, data, {{{', '.join(pairs)}}})"]
+    return (
+        ["", "", *inspect.getsource(enter_motions).splitlines(), "", "", *faces],
+        [*step, "mujoco.mj_step2(model, data)", *after],
+    )
+
+
+class Moved:
+    """Moves the faces of one model and lets its contacts know."""
+
+    def __init__(self, mujoco: Any, scene: Scene, dt: float, model: Any, data: Any) -> None:
+        self._mujoco, self._scene, self._dt, self._model, self._data = mujoco, scene, dt, model, data
+        self.faces = {i: int(model.body(f"body{i}").mocapid[0]) for i, b in moved(scene).items() if is_moved_face(b)}
+        self._geoms = {i: int(model.geom(f"geom{i}").id) for i in moved(scene)}
+        self._given = motions(scene, dt, 0)
+
+    def step(self, step: int) -> None:
+        """Make step number ``step``."""
+        given = motions(self._scene, self._dt, step)
+        self._mujoco.mj_step1(self._model, self._data)
+        enter_motions(self._model, self._data, {self._geoms[i]: motion for i, motion in given.items()})
+        self._mujoco.mj_step2(self._model, self._data)
+        for i, row in self.faces.items():
+            self._data.mocap_pos[row] += self._dt * np.array(given[i][0])
+        self._given = given
+
+    def state(self, poses: Any, twists: Any) -> None:
+        """Write where the faces are and how they move over the last step (the first, before any)."""
+        for i, row in self.faces.items():
+            poses[i, :3], twists[i, :3] = self._data.mocap_pos[row], self._given[i][0]

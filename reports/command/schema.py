@@ -1,0 +1,28 @@
+"""``schema``: what a scene file may hold, for editors and programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from reports.command.group import main
+
+
+@main.command()
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write instead of the terminal."
+)
+def schema(output: Path | None) -> None:
+    """Print the JSON Schema of scene files.
+
+    An editor that knows it completes and checks what you write; `format` in a file is the schema's version.
+    """
+    from validation.scene_files import json_schema
+
+    text = json.dumps(json_schema(), indent=2, sort_keys=True) + "\n"
+    if output is None:
+        click.echo(text, nl=False)
+    else:
+        output.write_text(text)

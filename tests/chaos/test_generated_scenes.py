@@ -1,0 +1,67 @@
+"""Generated scene files: valid ones run ten steps on every engine, spoilt ones parse or are refused with the field."""
+
+import json
+import os
+from collections import Counter
+
+import jsonschema
+import pytest
+from generated_scenes import mutated, valid
+
+from adapters import registry
+from adapters.plain import is_visible, one_line
+from adapters.scene import SceneError
+from validation.cells import Outcome
+from validation.plan import Request, slots
+from validation.scene_files import json_schema, stated_from_text
+from validation.scene_format import SceneModel
+from validation.workers import run_cells
+
+STEPS, DT = 10, 1.0 / 240.0
+
+
+def fields_of(data):
+    """What the path of a field may begin with: fields of the format, keys of the file, names of its bodies, a pair."""
+    yield from (*SceneModel.model_fields, "file", "pair ")
+    if isinstance(data, dict):
+        yield from (one_line(key) for key in data if key)
+        for body in data["bodies"] if isinstance(data.get("bodies"), list) else ():
+            if isinstance(body, dict) and isinstance(body.get("name"), str) and body["name"]:
+                yield one_line(body["name"], 60).rstrip(" .")
+
+
+@pytest.mark.timeout(7200)
+def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own(dice, soak, tmp_path):
+    engines = [name for name in registry.names() if registry.find(name).engine is not None]
+    cells, files = [], int(os.environ.get("CROSSCHECK_FILES", 500)) if soak else 8
+    for number in range(files):
+        path = tmp_path / f"scene-{number}.json"
+        path.write_text(json.dumps(valid(dice, STEPS, DT)))
+        cells += slots(Request([str(path)], engines, dts=[DT]))
+    found = list(run_cells(cells, jobs=2, timeout=300.0))
+    assert sorted(o.slot.key() for o in found) == sorted(slot.key() for slot in cells)
+    ended = Counter((o.slot.engine, str(o.outcome)) for o in found)
+    print(ended)
+    crashed = [(o.slot.engine, o.slot.profile, o.slot.scene, o.reason) for o in found if o.outcome is Outcome.CRASHED]
+    assert not crashed, crashed[:5]
+    assert sum(o.outcome is Outcome.OK for o in found) > len(found) // 3
+
+
+def test_valid_scenes_parse_and_spoilt_ones_are_refused_with_the_path_of_the_field(dice, soak, tmp_path):
+    """The schema says of a valid file that it is; of every refusal the field is named."""
+    checker = jsonschema.Draft202012Validator(json_schema())
+    parsed = refused = 0
+    for _ in range(10_000 if soak else 300):
+        data = valid(dice, STEPS, DT)
+        assert not [error.message for error in checker.iter_errors(json.loads(json.dumps(data)))]
+        stated_from_text(json.dumps(data), tmp_path / "valid.json")
+        spoilt = mutated(data, dice)
+        try:
+            stated_from_text(json.dumps(spoilt), tmp_path / "spoilt.json")
+            parsed += 1
+        except SceneError as error:
+            said = str(error)
+            assert is_visible(said) and len(said.splitlines()) == 1 and len(said) < 6000
+            assert said.partition(": ")[2].startswith(tuple(fields_of(spoilt))), said
+            refused += 1
+    assert parsed and refused
