@@ -15,7 +15,7 @@ from typing import Any
 import pyb2d3
 
 from adapters.engine import EngineError
-from adapters.scene import Body, Box, HalfSpace
+from adapters.scene import Body, Box, Disc, HalfSpace
 
 #: Point and unit normal of a contact that touches or pushed.
 Point = tuple[tuple[float, float], tuple[float, float]]
@@ -104,6 +104,7 @@ def _farthest(body: Body, place: tuple[float, float, float, float], nx: float, n
     x, y, c, s = place
     centre = nx * x + ny * y
     if not isinstance(shape, Box):
+        assert isinstance(shape, Disc)  # what else this engine is asked for
         return centre + shape.radius
     a, b = shape.half_extents
     return centre + a * abs(nx * c + ny * s) + b * abs(ny * c - nx * s)
@@ -117,6 +118,7 @@ def _distance(body: Body, place: tuple[float, float, float, float], x: float, y:
     px, py, c, s = place
     u, v = x - px, y - py
     if not isinstance(shape, Box):
+        assert isinstance(shape, Disc)
         return math.hypot(u, v) - shape.radius
     a = abs(c * u + s * v) - shape.half_extents[0]
     b = abs(c * v - s * u) - shape.half_extents[1]
