@@ -33,7 +33,14 @@ from reference_solver.planar.jam import weigh_clusters
 from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, row_key
-from reference_solver.planar.midpoint import close_gaps, keep_change, levers_of_start, misses_end, take_back
+from reference_solver.planar.midpoint import (
+    close_gaps,
+    deepest,
+    keep_change,
+    levers_of_start,
+    misses_end,
+    take_back,
+)
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.press import cut_work
 from reference_solver.planar.rocking import rest
@@ -69,6 +76,7 @@ from reference_solver.stepping.clock import (
     weigh_event,
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.midpoint import CLOSINGS, PUSHED_INTO
 from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
 from reference_solver.stepping.options import BLOCK, Options
 from reference_solver.stepping.phase import SHORTENED
@@ -242,11 +250,15 @@ def settle(
     keep_state(sub.journal, bodies.pose, bodies.twist)
     moved = close_gaps(bodies, rows, sub, options)
     if moved:
-        if not detect(bodies, pairs, rows, options):
-            return False
-        keep_loaded(bodies, pairs, rows)
-        if options.solver == BLOCK:
-            prepare_blocks(bodies, rows)
+        for k in range(CLOSINGS):
+            if not detect(bodies, pairs, rows, options):
+                return False
+            keep_loaded(bodies, pairs, rows)
+            if options.solver == BLOCK:
+                prepare_blocks(bodies, rows)
+            if k == CLOSINGS - 1 or deepest(bodies, rows) <= PUSHED_INTO:
+                break
+            close_gaps(bodies, rows, sub, options)
     time = sub.clock[UNSETTLED]
     misses = misses_end(bodies, rows, options, time)
     if misses:

@@ -20,6 +20,7 @@ from reference_solver.planar.columns import (
     ARM_A,
     ARM_B,
     COS,
+    EXTENT,
     FORCE_N,
     FORCE_T,
     FRICTION,
@@ -165,6 +166,16 @@ def closable(bodies: Bodies, rows: Rows, c: int) -> float:
     """What of the gap of row c is closed at a time [m]."""
     most = LEFT_OVER * min(bodies.real[rows.integer[c, A], REACH], bodies.real[rows.integer[c, B], REACH])
     return min(max(rows.real[c, GAP], -most), most)
+
+
+@inner_kernel
+def deepest(bodies: Bodies, rows: Rows) -> float:
+    """Largest overlap of all rows, as a share of the smaller half width."""
+    worst = 0.0
+    for c in range(rows.counts[CONTACTS]):
+        extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
+        worst = max(worst, -rows.real[c, GAP] / extent)
+    return worst
 
 
 @inner_kernel

@@ -24,6 +24,7 @@ from reference_solver.spatial.ledger import enter_contacts, enter_impulses
 from reference_solver.spatial.manifolds import pair_key
 from reference_solver.spatial.midpoint import (
     close_gaps,
+    deepest,
     exchange_levers,
     keep_change,
     levers_of_start,
@@ -79,6 +80,7 @@ from reference_solver.stepping.clock import (
 )
 from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
 from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.midpoint import CLOSINGS, PUSHED_INTO
 from reference_solver.stepping.noise import EVENT_BUDGET, NOTHING_LEFT, SHORT
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.phase import SHORTENED
@@ -270,9 +272,13 @@ def settle(
     keep_state(sub.journal, bodies.pose, bodies.twist)
     moved = close_gaps(bodies, room[:found], options)
     if moved:
-        found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
-        if found < 0:
-            return False
+        for k in range(CLOSINGS):
+            found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
+            if found < 0:
+                return False
+            if k == CLOSINGS - 1 or deepest(bodies, room[:found]) <= PUSHED_INTO:
+                break
+            close_gaps(bodies, room[:found], options)
     manifolds, time = room[:found], sub.clock[UNSETTLED]
     misses = misses_end(bodies, manifolds, options, time)
     if misses:

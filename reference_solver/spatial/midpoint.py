@@ -284,6 +284,17 @@ def closable(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 
 
 @inner_kernel
+def deepest(bodies: Bodies, manifolds: Manifolds) -> float:
+    """Largest overlap of all points, as a share of the smaller half width."""
+    worst = 0.0
+    for m in range(len(manifolds)):
+        extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+        for p in range(manifolds.points[m]):
+            worst = max(worst, -manifolds.gap[m, p] / extent)
+    return worst
+
+
+@inner_kernel
 def close_gaps(bodies: Bodies, manifolds: Manifolds, options: Options) -> bool:
     """Move bodies until the gaps of all points are closed, by M^-1 J^T; whether rows are not what they were.
 

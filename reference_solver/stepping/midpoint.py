@@ -12,5 +12,8 @@ LEFT_OVER = 1e-3
 #: Residual of the solve that closes gaps, and the sweeps it may take: impulses count from a thousand times what the
 #: widest gap takes, so that it leaves some 1e-6 of that, and what is left is measured anew after the next sub-step.
 CLOSED, CLOSING_SWEEPS = 1e-8, 400
+#: Overlap, as a share of the smaller half width, that closing gaps may leave by pushing a body into one that it did not
+#: touch; and how often gaps are closed to undo that.
+PUSHED_INTO, CLOSINGS = 1e-5, 4
 #: Farthest that closing gaps may move a body, in multiples of the widest: a lever of a slender body.
 LEVERAGE = 100.0
