@@ -12,6 +12,7 @@ from generated_scenes import mutated
 from adapters.plain import is_visible
 from adapters.scene import SceneError
 from reports import exports
+from validation.cells import LONGEST_DT
 from validation.plan import Request, slots
 from validation.posed import pinned, resolve
 from validation.rows import rows_of
@@ -174,9 +175,16 @@ def test_a_step_that_makes_too_many_steps_is_refused_before_anything_runs(tmp_pa
 
 def test_a_step_longer_than_the_run_is_one_step_and_can_be_shown(tmp_path):
     path = tmp_path / "scene.json"
+    path.write_text(json.dumps({**BASE, "duration": 0.05}))
+    judged(slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[LONGEST_DT])))
+
+
+@pytest.mark.parametrize("dt", [3.0, 1.7e308])
+def test_a_step_in_which_nothing_can_be_measured_is_refused_by_name(tmp_path, dt):
+    path = tmp_path / "scene.json"
     path.write_text(json.dumps(BASE))
-    cells = slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[3.0, 1.7e308]))
-    judged(cells)
+    with pytest.raises(SceneError, match=r"dt: .* s is longer than 0\.1 s"):
+        slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[dt]))
 
 
 def test_a_value_that_is_not_finite_is_missing_with_its_reason(tmp_path):

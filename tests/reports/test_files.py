@@ -52,5 +52,5 @@ def test_a_folder_may_have_a_dot_in_its_name(tmp_path):
 @pytest.mark.parametrize("command", sorted(main.commands))
 def test_every_command_speaks_json(command):
     options = [name for p in main.commands[command].params for name in p.opts]
-    # What run-cell reads and writes is JSON in any case.
-    assert "--json" in options or command == "run-cell"
+    # What run-cell reads and writes is JSON in any case, and so is a schema.
+    assert "--json" in options or command in ("run-cell", "schema")

@@ -51,6 +51,11 @@ def test_a_cell_runs_with_the_setting_and_says_so():
     assert math.isinf(reading(wrong, "penetration").badness)
 
 
+#: Limits of an engine that no setting takes out: their reasons give the figures that settings change them by. Open: a
+#: prediction of their size.
+MEASURED_ONLY = {"mujoco": {"kane-convex-cone", "rack-impedance"}}
+
+
 @pytest.mark.parametrize("engine", OURS)
 def test_every_family_has_an_experiment_and_every_experiment_a_family_that_covers_it(engine):
     """A reason that nobody can prove or refute is not one."""
@@ -59,7 +64,9 @@ def test_every_family_has_an_experiment_and_every_experiment_a_family_that_cover
     experiments = experiments_of(engine)
     # Where nothing is measured there is nothing to switch: such a reason is proven by a test of its engine.
     members = findings.members.values() if findings else ()
-    silent = set(families) - {member.family.id for member in members if member.value is not None or member.diverged}
+    silent = MEASURED_ONLY.get(engine, set()) | set(families) - {
+        member.family.id for member in members if member.value is not None or member.diverged
+    }
     assert {experiment.family for experiment in experiments} == set(families) - silent
     for experiment in experiments:
         family = families[experiment.family]
