@@ -1,12 +1,8 @@
 """A law: a leaning box that lands on one corner, with friction, pressed halfway between that corner and the floor.
 
-    found at the first step at which it overlaps, by ``depth``      \\
-                                                                     \\      the blow acts here:
-    ================================================================= \\ =   depth/2 below the floor,
-                                                                       \\    not at the corner
-
-Newton's law of restitution and Coulomb's law of friction hold at that point, whose arm is shorter by half the depth than
-the corner's. Nothing is said with a skin, and where the corner comes to the floor just at a step.
+The corner is found at the first step at which it overlaps, by ``depth``, and the blow acts ``depth/2`` above it.
+Newton's law of restitution and Coulomb's law of friction hold at that point, whose arm is shorter by half the depth.
+Nothing is said with a skin, and where the corner comes to the floor just at a step.
 """
 
 from __future__ import annotations

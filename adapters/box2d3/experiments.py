@@ -139,3 +139,18 @@ EXPERIMENTS += (
         idle=({"push_speed": 0.3},),
     ),
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "rack-rebound-once",
+        "where nothing rebounds left and right differ by less than a hundredth; more small steps or no sweeping ahead "
+        "do not help",
+        profile,
+        "rack",
+        "asymmetry",
+        {"restitution_threshold": 1000.0},
+        idle=({"substeps": 64}, {"continuous": False}),
+        within=1e-2,
+    )
+    for profile in ("default", "tuned")
+)
