@@ -9,7 +9,7 @@ import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
-from adapters.scene import Body, Box, HalfSpace, Scene
+from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.single_precision import ROUNDINGS, UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
@@ -71,7 +71,7 @@ def corner_law(metric: str, chosen: Chosen, threshold: float) -> Law:
             e = 0.0
         if e > 0.0 and skin > 0.0:
             return None
-        lever, below = _lowest(box)
+        lever, below = lowest(box)
         landing = (box.pose[1] - below) / speed
         blow = (1.0 + e) * speed / (1.0 / box.mass + lever**2 / box.inertia)
         if not 0.0 < landing < scene.duration - dt:
@@ -102,7 +102,7 @@ def _falls_on_a_corner(scene: Scene) -> bool:
     return on_the_floor and plain and tilted and vx == 0.0 and spin == 0.0 and vy < 0.0
 
 
-def _lowest(box: Body) -> tuple[float, float]:
+def lowest(box: Body) -> tuple[float, float]:
     """The lowest corner against the centre: along +x, and below it [m]."""
     assert isinstance(box.shape, Box)
     a, b = box.shape.half_extents
@@ -126,3 +126,23 @@ def _landed(scene: Scene, dt: float, landing: float, blow: float, lever: float) 
     rows = Contacts.from_rows([(0, 1, np.zeros(2), (0.0, 1.0), (0.0, blow), 0.0)], 2)
     record = ContactRecord(np.array([int(np.argmax(hit))]), np.array([0, 1], np.int64), rows)
     return Trajectory(t, pose, twist, record, dt, "completed")
+
+
+def kept_law(metric: str) -> Law:
+    """What blows between balls keep, whatever they share it by: nothing is lost but the roundings of one blow a pair.
+
+    For metrics that are shares and 0 in exact numbers, of an engine that solves each blow as far as its numbers tell;
+    balls alone, without gravity or load, friction or loss.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        balls = all(isinstance(body.shape, Disc | Sphere) and body.motion == "free" for body in scene.bodies)
+        pairs = list(scene.contact_pairs())
+        plain = all(pair.restitution == 1.0 and pair.friction == 0.0 for _, _, pair in pairs)
+        loads = any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies)
+        if not balls or not plain or loads:
+            return None
+        # By energy no ball of these is faster than the first; one touches at most six others, half a pair each.
+        return 0.0, ROUNDINGS * UNIT * 3.0 * len(scene.bodies)
+
+    return law

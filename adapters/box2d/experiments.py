@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.box2d.experiments_on_rods import ON_RODS
 from adapters.experiment import Experiment
 
 CANDIDATES: dict[str, tuple[Any, ...]] = {
@@ -158,3 +159,5 @@ EXPERIMENTS += (
         )
     ),
 )
+
+EXPERIMENTS += ON_RODS

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.box2d.profiles import PROFILES
+from adapters.box2d.rod_on_its_end import halfway_law
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
 from adapters.scene import Scene
-from adapters.single_motions import Chosen, corner_law, standstill_law
+from adapters.single_motions import Chosen, corner_law, kept_law, standstill_law
 from adapters.single_precision import Method, Threshold, rounded_law
 
 #: Metrics of blows in free space, by scene.
@@ -99,4 +100,37 @@ DEVIATIONS += tuple(
     )
     for profile in PROFILES
     for metric in ("rise", "spin", "impulse")
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d",
+        ("tuned",),
+        "kane",
+        metric,
+        halfway_law(metric, _chosen("tuned"), VELOCITY_THRESHOLD),
+        "a blow acts halfway between the corner and the floor that it is in by then, on an arm shorter by that",
+        "b2Collision.cpp, b2WorldManifold: 0.5 (cA + cB); motion in adapters/box2d/rod_on_its_end.py",
+        CHECKED_ON,
+    )
+    for metric in ("rise", "ahead", "spin", "gain")
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "box2d",
+        (profile,),
+        "rack",
+        metric,
+        kept_law(metric),
+        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "b2Settings.h, float32; band in adapters/single_motions.py",
+        CHECKED_ON,
+    )
+    # What the threshold takes of the energy as shipped is no rounding: that is a finding.
+    for profile, metrics in (
+        ("default", ("momentum_defect", "asymmetry")),
+        ("tuned", ("momentum_defect", "energy_defect", "asymmetry")),
+    )
+    for metric in metrics
 )

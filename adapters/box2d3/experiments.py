@@ -139,3 +139,18 @@ EXPERIMENTS += (
         idle=({"push_speed": 0.3},),
     ),
 )
+
+EXPERIMENTS += tuple(
+    Experiment(
+        "rack-rebound-once",
+        "where nothing rebounds left and right differ by less than a hundredth; other springs or no sweeping ahead do "
+        "not help. 64 small steps move it to either side: to 0.005 as shipped, to 0.13 in tuned",
+        profile,
+        "rack",
+        "asymmetry",
+        {"restitution_threshold": 1000.0},
+        idle=({"hertz": 240.0}, {"continuous": False}),
+        within=1e-2,
+    )
+    for profile in ("default", "tuned")
+)
