@@ -131,6 +131,7 @@ def spatial_scene(**changes: object) -> Scene:
         "force": (6.0, 0.0, 7.0), "torque": (0.0, 8.0, 0.0),
     } | changes  # fmt: skip
     floor = Body("floor", HalfSpace((0.6, 0.0, 0.8), 0.25), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    # A dictionary of fields of several types: the checker knows none of them.
     box = Body("box", Box((0.5, 0.3, 0.2)), 2.0, (0.1, 0.2, 0.3), **values)  # type: ignore[arg-type]
     return Scene("solid", 1, 3, (floor, box), (Pair(),), (1.0, 0.0, -9.0), 1.0)
 

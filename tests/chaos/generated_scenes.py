@@ -21,7 +21,10 @@ def attitude(dice, dimension):
 
 def shape(dice, dimension):
     """A shape within 1 m of its centre."""
-    size = lambda: round(dice.uniform(0.05, 0.4), 3)  # noqa: E731
+
+    def size():
+        return round(dice.uniform(0.05, 0.4), 3)
+
     kind = dice.choice(("round", "box", "capsule", "corners") if dimension == 2 else
                        ("round", "box", "capsule", "cylinder", "corners"))  # fmt: skip
     if kind == "round":

@@ -86,7 +86,10 @@ def test_mass_properties_by_integration():
     whole, (xx, yy, zz) = integral(within(0.3, 0.4), (-0.7, -0.3, -0.3), (0.7, 0.3, 0.3), 3, 120)
     assert volume(solid, 3) == pytest.approx(whole, rel=5e-3)
     assert moments(solid, 2.0, 3) == pytest.approx([2.0 * m / whole for m in (yy + zz, zz + xx, xx + yy)], rel=5e-3)
-    inside = lambda p: (np.abs(p[:, 0]) <= 0.4) & (np.hypot(p[:, 1], p[:, 2]) <= 0.3)  # noqa: E731
+
+    def inside(p):
+        return (np.abs(p[:, 0]) <= 0.4) & (np.hypot(p[:, 1], p[:, 2]) <= 0.3)
+
     whole, (xx, yy, zz) = integral(inside, (-0.4, -0.3, -0.3), (0.4, 0.3, 0.3), 3, 120)
     assert volume(Cylinder(0.4, 0.3)) == pytest.approx(whole, rel=5e-3)
     found = moments(Cylinder(0.4, 0.3), 2.0, 3)
