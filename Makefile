@@ -105,4 +105,4 @@ mutants-check: $(STAMP)
 
 # What every check and receipt can see, from planted faults.
 detection: $(STAMP)
-	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity --engine chipmunk --profile tuned > validation/detection.txt
+	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity --engine chipmunk --profile tuned > validation/questions/detection.txt

@@ -10,8 +10,8 @@
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
         experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
         findings/         families.toml and members.csv (`validation.findings`)
-        decisive.csv      which settings of its cures matter, as measured (`validation.decisive`)
-        cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.cures`)
+        decisive.csv      which settings of its cures matter, as measured (`validation.settings.decisive`)
+        cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.settings.cures`)
 
 All but the first may be missing; an entry point that names a plain module brings an adapter only. Ours stand in
 ``adapters/<engine>/`` and are found in the same way.

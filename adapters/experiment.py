@@ -1,8 +1,8 @@
 """Experiments on engines, as data: what tuning tries, what proves a reason, what cures.
 
 An experiment switches off the mechanism that a reason names and says what must come of it; where nothing can be
-switched, a deviation law predicts the value independently. `validation.tuning`, `validation.proofs` and
-`validation.decisive` run them.
+switched, a deviation law predicts the value independently. `tuning`, `proofs` and `decisive` in `validation.settings`
+run them.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Cured:
-    """What fails as shipped and passes with a better profile: `validation.decisive` finds out by which settings.
+    """What fails as shipped and passes with a better profile; `validation.settings.decisive` finds by which settings.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Faults of a given size that any engine can be given from outside.
 
-`validation.detection` computes from them what every check and every receipt can see. Those of a toy engine, with what
-must catch each, stand in `adapters.conformance.faults`.
+`validation.questions.detection` computes from them what every check and every receipt can see. Those of a toy engine,
+with what must catch each, stand in `adapters.conformance.faults`.
 """
 
 from __future__ import annotations

@@ -211,7 +211,7 @@ class Scene:
 
 
 def scene_from_dict(data: Mapping[str, Any]) -> Scene:
-    """Inverse of `Scene.as_dict`; the file boundary (`validation.scene_files`) checks types before."""
+    """Inverse of `Scene.as_dict`; the file boundary (`validation.files.scene_files`) checks types before."""
     bodies = [body_from_dict(raw) for raw in data["bodies"]]
     rest = {key: _as_tuple(value) for key, value in data.items() if key not in ("bodies", "pairs", "params")}
     pairs = tuple(Pair(**pair) for pair in data["pairs"])

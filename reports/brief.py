@@ -21,9 +21,9 @@ from typing import Any
 import validation
 from validation.canonical import Primary
 from validation.cells import Observation, Slot
-from validation.plan import QUICK_DT
+from validation.judging.rows import ALARMING_OUTCOMES, Row, rows_of
 from validation.posed import is_file, resolve
-from validation.rows import ALARMING_OUTCOMES, Row, rows_of
+from validation.running.plan import QUICK_DT
 
 FILE = "dashboard.sqlite"
 #: Outcomes that say something of an engine's physics.

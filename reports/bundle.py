@@ -27,7 +27,7 @@ from reports import exports, speed
 from reports.page import load_source, render
 from reports.page.source import Source
 from reports.wording import cell
-from validation.store import Run, Store
+from validation.records.store import Run, Store
 
 README = """contact-crosscheck, run {run}
 

@@ -13,11 +13,11 @@ from typing import Any
 from reports.wording import markdown, number, plural, reproduce
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
-from validation.comparison import Change, Kind, families
+from validation.judging.comparison import Change, Kind, families
+from validation.judging.rows import rows_of
+from validation.records.store import RELEASE_TITLE, MissingError, Store
 from validation.releases.history import told as told_by_releases
 from validation.releases.history import versions
-from validation.rows import rows_of
-from validation.store import RELEASE_TITLE, MissingError, Store
 
 #: A release of an engine as a side of a comparison: ``myengine==3.2.7``.
 _RELEASE = re.compile(r"[^=/]+==[^=/]+")

@@ -11,11 +11,11 @@ from adapters.engine_folder import belongs_of
 from reports.wording import number, params_text
 from validation.cells import Observation, Slot
 from validation.cells import settings_of as settings_in
-from validation.cures import Cure, cures_of
-from validation.decisive import ALONE, COMPLETES, NEEDED, decisive
-from validation.plan import QUICK_DT
 from validation.posed import resolve
-from validation.switching import switched
+from validation.running.plan import QUICK_DT
+from validation.settings.cures import Cure, cures_of
+from validation.settings.decisive import ALONE, COMPLETES, NEEDED, decisive
+from validation.settings.switching import switched
 
 #: What a setting's part in a cure is called.
 ROLES = {
@@ -87,7 +87,7 @@ def changes(
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
-    """Settings that decide a cure, as `validation.decisive` measured them; empty if nobody did with this release.
+    """What decides a cure, as `validation.settings.decisive` measured it; empty if nobody did with this release.
 
     What was measured in one dimension is said with it where rows of another fail as well.
     """

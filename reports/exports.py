@@ -15,8 +15,8 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from reports.findings import ALARMING, finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
-from validation.rows import Row, frame, rows_of
-from validation.store import Store
+from validation.judging.rows import Row, frame, rows_of
+from validation.records.store import Store
 
 Plain = Mapping[str, Any]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from reports.releases import PACE, as_table
 from reports.wording import plural
-from validation.comparison import Kind
+from validation.judging.comparison import Kind
+from validation.records.store import RELEASE_TITLE, Store
 from validation.releases import history
 from validation.releases.history import Step
 from validation.releases.notes import explanations
-from validation.store import RELEASE_TITLE, Store
 
 HEAD = """# Physics over engine releases
 

@@ -15,8 +15,8 @@ from adapters.plain import one_line
 from adapters.scene import SceneError
 from validation.catalogue import CATALOGUE, broken
 from validation.identity import commit, machine
-from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.running.plan import QUICK_DT
 
 
 def scenes() -> list[dict[str, Any]]:

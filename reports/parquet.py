@@ -19,8 +19,8 @@ import pyarrow.parquet as pq
 
 from adapters.trajectory import load_trajectory
 from validation.cells import Observation
-from validation.rows import frame, rows_of
-from validation.store import Run, Store
+from validation.judging.rows import frame, rows_of
+from validation.records.store import Run, Store
 
 #: Columns of a pose and a twist; planar ones have no z, and one angle.
 POSE = {3: ("x", "y", "angle"), 7: ("x", "y", "z", "qw", "qx", "qy", "qz")}

@@ -13,8 +13,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from reports.stages import stage, warm_up
 from reports.wording import plural
 from validation.cells import Slot
-from validation.store import Run, Store
-from validation.tracks import representatives
+from validation.records.store import Run, Store
+from validation.running.tracks import representatives
 from validation.workers import TIMEOUT, run_cells
 from validation.workers.cluster import run_cells_on
 

@@ -11,10 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from reports.wording import markdown, number, plural
-from validation.comparison import Change, Kind
+from validation.judging.comparison import Change, Kind
+from validation.judging.verdicts import Physics
 from validation.releases.bisection import Found
 from validation.releases.history import Step, Told, cell_of, mended, sentence
-from validation.verdicts import Physics
 
 #: Most families of changes that the terminal shows of one release; --json and --markdown have all.
 SHOWN = 6

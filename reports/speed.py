@@ -18,9 +18,9 @@ from adapters import registry
 from reports.wording import cell, number
 from validation.bench import agreement, reading, work
 from validation.cells import Observation, Outcome, format_dt
+from validation.judging.verdicts import judge_physics
 from validation.posed import primary_of, resolve
-from validation.store import Run, Store
-from validation.verdicts import judge_physics
+from validation.records.store import Run, Store
 
 Tables = dict[str, pd.DataFrame]
 #: Levels that fit a terminal.

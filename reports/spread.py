@@ -1,4 +1,4 @@
-"""How far engines are apart on a scene from a file, in lines for the terminal (`validation.spread`)."""
+"""How far engines are apart on a scene from a file, in lines for the terminal (`validation.questions.spread`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from reports.wording import quantity
-from validation.spread import Spread
+from validation.questions.spread import Spread
 
 
 def spread_lines(found: Sequence[Spread]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from validation.cells import Slot
-from validation.warming import Warming
+from validation.running.warming import Warming
 
 
 def clock(seconds: float) -> str:

@@ -21,11 +21,11 @@ from adapters.scene import SceneError
 from reports.wording import measured, plural, quantity, reproduce
 from validation.catalogue import matching
 from validation.cells import Slot, slot_from_dict
-from validation.plan import Request, slots
+from validation.judging.rows import Row, rows_of
+from validation.judging.verdicts import Physics, Standing
 from validation.posed import resolve
 from validation.releases.history import finding_of, mended
-from validation.rows import Row, rows_of
-from validation.verdicts import Physics, Standing
+from validation.running.plan import Request, slots
 from validation.workers import run_cells
 
 

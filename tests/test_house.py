@@ -46,6 +46,34 @@ def test_each_package_imports_only_what_stands_to_its_left(package):
         assert not forbidden & set(imported(path)), path
 
 
+#: Rooms of `validation`, each of which imports only what stands to its left; on the ground floor stands what all share.
+ROOMS = ["truths", "scenes", "files", "running", "records", "workers", "bench"]
+ROOMS += ["findings", "judging", "questions", "settings", "releases", "field"]
+#: What stands in a room further right and is imported all the same.
+LOW = {
+    ("truths", "validation.scenes.parts"): "parts of which scenes are made, which name none",
+    ("records", "validation.bench.timing"): "what a time is, which a store keeps",
+}
+
+
+def test_the_rooms_of_validation_stand_in_a_line():
+    folders = {path.name for path in (ROOT / "validation").iterdir() if (path / "__init__.py").is_file()}
+    assert folders == set(ROOMS)
+    upwards = set()
+    for room in ROOMS:
+        right = {f"validation.{other}" for other in ROOMS[ROOMS.index(room) + 1 :]}
+        for path in (ROOT / "validation" / room).rglob("*.py"):
+            named = {name for name in whole_imports(path) if name and ".".join(name.split(".")[:2]) in right}
+            upwards |= {(room, name) for name in named}
+    assert upwards == set(LOW)
+
+
+def test_what_a_scene_from_outside_leans_on_stays_where_it_is():
+    """Their packages import these; a room may be divided, the ground floor not without an heir at its old name."""
+    ground = {path.stem for path in (ROOT / "validation").glob("*.py")} - {"__init__"}
+    assert ground == {"canonical", "catalogue", "posed", "bounds", "metrics", "geometry", "solids", "cells", "identity"}
+
+
 def test_only_an_engine_s_own_folder_imports_it():
     for package in LINE:
         for path in (ROOT / package).rglob("*.py"):
@@ -169,7 +197,7 @@ def whole_imports(path):
             yield node.module
 
 
-@pytest.mark.parametrize("module", ["adapters", "validation.rows", "reports.command"])
+@pytest.mark.parametrize("module", ["adapters", "validation.judging.rows", "reports.command"])
 def test_importing_the_vocabulary_imports_no_engine_and_no_compiler(module):
     code = f"import sys, {module}; print(*(set({[*ENGINES, 'numba']!r}) & set(sys.modules)))"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

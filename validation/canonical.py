@@ -227,7 +227,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Searched:
-    """What tuning runs of a scene (`validation.tuning`).
+    """What tuning runs of a scene (`validation.settings.tuning`).
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ class Restitution:
 
 @dataclass(frozen=True)
 class Frontier:
-    """How far a scene can be driven until an engine gives up on it (`validation.frontier`).
+    """How far a scene can be driven until an engine gives up on it (`validation.questions.frontier`).
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ class CanonicalScene:
     representative
         The cell that stands for the scene: its noise floor is measured and its motion is kept for the replay.
     planted
-        Cells in which faults are planted (`validation.detection`): each check is stated by at least one of them.
+        Cells in which faults are planted (`validation.questions.detection`): at least one of them states each check.
     primary, steps
         The error by which a bench compares engines, and what it runs for it.
     size

@@ -93,7 +93,7 @@ class Slot:
     ulp
         Units in the last place by which the start height is moved (measures the noise floor).
     switched
-        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.switching`).
+        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.settings.switching`).
     """
 
     scene: str

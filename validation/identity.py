@@ -57,7 +57,7 @@ def adapter_hash(engine: str) -> str:
 #: The solver of ours, which an adapter of it answers with.
 SOLVER = "reference_solver"
 #: What runs and measures a cell of any scene.
-RUNNING = ("validation.execution", "validation.certification")
+RUNNING = ("validation.running.execution", "validation.running.certification")
 
 
 @cache
@@ -66,7 +66,7 @@ def scene_code(scene: str) -> str:
 
     All scene files share one: their text is part of their name.
     """
-    module = module_of(scene) if scene in CATALOGUE else "validation.scene_files"
+    module = module_of(scene) if scene in CATALOGUE else "validation.files.scene_files"
     # Of the solver only what is imported itself: its geometry measures.
     own = _closure(module, {"validation", module.partition(".")[0]}, {SOLVER})
     return _hash_files([*own, *(path for path in map(located, RUNNING) if path)])

@@ -41,7 +41,7 @@ def is_known(argument: str) -> bool:
 def pinned(argument: str, drop: bool = False) -> str:
     """Name of a scene that stays what it is: a file's name gets the hash of its text.
 
-    A model's text is what `validation.model_files` makes of it; with ``drop`` what has no place in a scene is left out.
+    A model's text is what `validation.files.model_files` makes of it; with ``drop`` what has no place is left out.
 
     Raises
     ------
@@ -51,14 +51,14 @@ def pinned(argument: str, drop: bool = False) -> str:
     found = _FILE.fullmatch(argument)
     if argument in CATALOGUE or argument in _texts or argument in _stated or found is None:
         return argument
-    from validation.scene_text import read_text
+    from validation.files.scene_text import read_text
 
     path, wanted = found["path"], found["digest"]
     if not is_visible(path):
         raise SceneError(f"scene: the name of {one_line(path)} has characters that steer a terminal; rename the file")
     text = read_text(Path(path))
     if Path(path).suffix.lower() not in _OWN:
-        from validation import model_files
+        from validation.files import model_files
 
         text = model_files.text_of(text, Path(path).suffix, drop)
     digest = _digest(text)
@@ -91,7 +91,7 @@ def remember(texts: Mapping[str, str]) -> None:
 
 def stated_of(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
     """What those scenes that are files state, as plain data by pinned name: for a process that cannot read files."""
-    from validation.scene_files import stated_from_text
+    from validation.files.scene_files import stated_from_text
 
     paths = {name: Path(name.rpartition("@")[0]) for name in texts_of(scenes)}
     return {name: stated_from_text(_texts[name], path).as_dict() for name, path in paths.items()}
@@ -121,11 +121,11 @@ def resolve(argument: str) -> CanonicalScene:
         If there is no such scene, or the file is not a valid scene.
     """
     if argument in _stated:
-        from validation.stated import canonical_of, stated_from_dict
+        from validation.files.stated import canonical_of, stated_from_dict
 
         return canonical_of(stated_from_dict(_stated[argument]), "")
     if is_file(argument):
-        from validation.scene_files import canonical_from_text
+        from validation.files.scene_files import canonical_from_text
 
         name = pinned(argument)
         return canonical_from_text(_texts[name], Path(name.rpartition("@")[0]))

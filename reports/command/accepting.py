@@ -18,12 +18,12 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.progress import run_plan
 from reports.terminal import terminal
 from reports.wording import number, plural
-from validation.acceptance import Change, Proposal, accepted, propose, slots_to_move
 from validation.cells import Observation, prepare
 from validation.findings import Family, FindingsError, files
 from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
-from validation.rows import Row, rows_of
-from validation.store import SCATTER_TITLE, Store
+from validation.judging.acceptance import Change, Proposal, accepted, propose, slots_to_move
+from validation.judging.rows import Row, rows_of
+from validation.records.store import SCATTER_TITLE, Store
 
 #: Refused rows that are printed; the rest is counted.
 SHOWN = 12

@@ -14,7 +14,7 @@ from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import Finding, ask, matching
-from validation.switching import Reading
+from validation.settings.switching import Reading
 
 
 @main.command("field")

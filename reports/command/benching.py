@@ -34,7 +34,7 @@ from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
 from validation.bench.units import Unit, prepared
 from validation.cells import Outcome, Slot, parse_dt
 from validation.posed import primary_of
-from validation.store import MissingError, Run, Store
+from validation.records.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
 #: Two bench runs on one machine must agree within their intervals on this share of their ratios.

@@ -9,7 +9,7 @@ import click
 
 from reports import changes as rendering
 from reports.command.group import AS_JSON, OUT, main
-from validation.comparison import FAIL_ON, Kind, by_seriousness, compare_rows, compare_speeds, failing
+from validation.judging.comparison import FAIL_ON, Kind, by_seriousness, compare_rows, compare_speeds, failing
 
 
 @main.command()

@@ -21,7 +21,7 @@ from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
 from validation.catalogue import matching
-from validation.cures import Changes, Cure, cures_of, search, write
+from validation.settings.cures import Changes, Cure, cures_of, search, write
 
 
 @main.command()

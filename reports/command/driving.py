@@ -19,7 +19,7 @@ from reports.command.selection import missing
 from reports.terminal import terminal
 from reports.wording import reproduce
 from validation.catalogue import matching
-from validation.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
+from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
 
 #: So few brackets have their commands below them without being asked.
 FEW = 6

@@ -18,9 +18,9 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
 from reports.command.selection import parameter
 from validation.cells import MOST_ITERATIONS, Slot, parse_dt
-from validation.plan import QUICK_DT
 from validation.posed import is_file, pinned, resolve
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.plan import QUICK_DT
 
 
 @main.command()

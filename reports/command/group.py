@@ -16,7 +16,7 @@ from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports.command import statuses
 from validation.findings import FindingsError
-from validation.store import MissingError, StoreError
+from validation.records.store import MissingError, StoreError
 from validation.workers import LimitError
 
 #: Everything a wrong call can raise; the command turns each into one line and exit code 2.

@@ -15,8 +15,8 @@ from reports.command.selection import parameter
 from reports.terminal import terminal
 from reports.wording import number, params_text
 from validation.catalogue import matching
-from validation.nulls import NULLS, nulls_of
-from validation.plan import QUICK_DT
+from validation.questions.nulls import NULLS, nulls_of
+from validation.running.plan import QUICK_DT
 
 
 @main.command("nulls")

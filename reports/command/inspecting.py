@@ -18,8 +18,8 @@ from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
-from validation.detection import Seen, detection, lines, only_by_receipts
-from validation.store import Store
+from validation.questions.detection import Seen, detection, lines, only_by_receipts
+from validation.records.store import Store
 
 
 @main.command("list")

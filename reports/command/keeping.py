@@ -10,9 +10,9 @@ import click
 from adapters.scene import SceneError
 from reports.command.group import AS_JSON, OUT, main
 from reports.wording import plural
-from validation.keeping import Rules, doomed, prune
-from validation.keeping import merge as merge_stores
-from validation.store import Store
+from validation.records.keeping import Rules, doomed, prune
+from validation.records.keeping import merge as merge_stores
+from validation.records.store import Store
 
 
 @main.command()

@@ -16,9 +16,9 @@ from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.invariance import FACTOR, MOVES, RELATIONS, Change, compare
-from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.questions.invariance import FACTOR, MOVES, RELATIONS, Change, compare
+from validation.running.plan import QUICK_DT
 
 
 def cells_of(slots: Iterable[Slot], named: bool) -> list[Slot]:

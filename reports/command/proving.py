@@ -18,8 +18,8 @@ from reports.terminal import terminal
 from reports.wording import number, params_text, reproduce
 from validation.findings import FindingsError
 from validation.findings.files import findings_of
-from validation.proofs import Proof, prove
-from validation.switching import Reading
+from validation.settings.proofs import Proof, prove
+from validation.settings.switching import Reading
 
 
 def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:

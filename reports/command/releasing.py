@@ -24,11 +24,11 @@ from reports.stages import say
 from reports.terminal import terminal
 from reports.wording import plural
 from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
+from validation.records.store import Store
 from validation.releases import environments, history
 from validation.releases.bisection import Unchanged, bisect
 from validation.releases.choosing import Release, chosen
 from validation.releases.driving import Effort, drive, planned, time
-from validation.store import Store
 from validation.workers import TIMEOUT
 
 Command = Callable[..., None]

@@ -16,7 +16,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.stages import say, stage
 from reports.terminal import terminal
 from reports.wording import missing_text, plural
-from validation.store import MissingError, Store
+from validation.records.store import MissingError, Store
 
 
 @main.command()

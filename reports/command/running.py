@@ -28,11 +28,11 @@ from reports.terminal import terminal
 from reports.wording import plural
 from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
-from validation.plan import slots
+from validation.judging.rows import Row, rows_of
 from validation.posed import is_file, pinned, resolve
-from validation.rows import Row, rows_of
-from validation.spread import spreads
-from validation.store import Store
+from validation.questions.spread import spreads
+from validation.records.store import Store
+from validation.running.plan import slots
 from validation.workers import TIMEOUT, run_cells
 
 

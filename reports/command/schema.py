@@ -19,7 +19,7 @@ def schema(output: Path | None) -> None:
 
     An editor that knows it completes and checks what you write; `format` in a file is the schema's version.
     """
-    from validation.scene_files import json_schema
+    from validation.files.scene_files import json_schema
 
     text = json.dumps(json_schema(), indent=2, sort_keys=True) + "\n"
     if output is None:

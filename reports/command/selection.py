@@ -12,8 +12,8 @@ from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
-from validation.plan import Request
 from validation.posed import is_file, pinned
+from validation.running.plan import Request
 
 
 class _Seconds(click.ParamType):

@@ -37,9 +37,9 @@ from reports.wording import (
 )
 from validation.bench import reading
 from validation.cells import Observation
-from validation.nulls import skill_of
-from validation.rows import rows_of
-from validation.store import Store
+from validation.judging.rows import rows_of
+from validation.questions.nulls import skill_of
+from validation.records.store import Store
 
 Plain = Mapping[str, Any]
 #: How far off a row is, for those that have no tolerance in units of which to say it.

@@ -19,9 +19,9 @@ from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import terminal
 from reports.wording import plural
-from validation.rows import rows_of
-from validation.store import Store
-from validation.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
+from validation.judging.rows import rows_of
+from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
+from validation.records.store import Store
 from validation.workers import TIMEOUT
 
 

@@ -15,8 +15,8 @@ from adapters.engine_folder import DECISIVE, candidates_of, cured_of, folder_of
 from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
-from validation.decisive import measure_all, measured_of, write
-from validation.tuning import Score, Search, groups, search
+from validation.settings.decisive import measure_all, measured_of, write
+from validation.settings.tuning import Score, Search, groups, search
 
 
 def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -14,9 +14,9 @@ from reports.command.posing import cells_of
 from reports.command.selection import request_from, selection
 from reports.terminal import terminal
 from reports.wording import number, reproduce
-from validation.apart import Apart
-from validation.plan import slots
-from validation.residuals import LAWS, Residuals, ask
+from validation.questions.residuals import LAWS, Residuals, ask
+from validation.running.apart import Apart
+from validation.running.plan import slots
 
 
 @main.command("residuals")

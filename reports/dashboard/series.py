@@ -14,11 +14,11 @@ from reports.dashboard.steps import ERROR, TIME, Rule, Step, steps
 from reports.page.charts import EXACT
 from validation.bench import reading
 from validation.bench.agreement import ratios
-from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
 from validation.releases import history
 from validation.releases.timing import CALLED
-from validation.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
+from validation.running.plan import QUICK_DT
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
 from reports.speed import busy, duration
 from reports.wording import mark_of, number
 from validation.cells import format_dt
-from validation.plan import QUICK_DT
+from validation.running.plan import QUICK_DT
 
 #: Scene, dimension.
 Line = tuple[str, int]

@@ -31,8 +31,8 @@ from reports.page.charts import (
 from reports.speed import duration
 from reports.wording import number
 from validation.cells import format_dt
-from validation.convergence import Convergence
 from validation.posed import primary_of
+from validation.questions.convergence import Convergence
 
 #: Said of charts in which marks were moved.
 DODGED = "Marks that coincide stand side by side; below 1e-6 an error counts as exact."

@@ -3,7 +3,7 @@
     header (JSON): times, bodies, series      16-bit integers, differenced along time, low bytes first, deflated
 
 The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
-`validation.tracks` were computed from the full trajectory when the cell ran.
+`validation.running.tracks` were computed from the full trajectory when the cell ran.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from reports.palette import colours_of, dash_of
 from reports.wording import params_text, reproduce
 from validation.cells import Slot, format_dt
 from validation.posed import resolve
-from validation.tracks import Recording
+from validation.running.tracks import Recording
 
 #: Levels of a length over the largest extent of the scene: half a pixel of a screen 8000 pixels wide.
 LENGTHS = 16000

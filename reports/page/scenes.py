@@ -17,9 +17,9 @@ from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
 from reports.wording import number
 from validation.canonical import CanonicalScene, Primary
 from validation.cells import Observation, format_dt
-from validation.convergence import Convergence, Extrapolation, convergence, declared_errors, extrapolations
-from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.questions.convergence import Convergence, Extrapolation, convergence, declared_errors, extrapolations
+from validation.running.plan import QUICK_DT
 
 
 @dataclass(frozen=True)

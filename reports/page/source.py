@@ -12,9 +12,9 @@ import pandas as pd
 from reports import speed
 from validation.bench import reading
 from validation.cells import Observation, Slot
-from validation.rows import rows_of
-from validation.store import Run, Store
-from validation.tracks import Recording
+from validation.judging.rows import rows_of
+from validation.records.store import Run, Store
+from validation.running.tracks import Recording
 
 Plain = Mapping[str, Any]
 

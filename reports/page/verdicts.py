@@ -14,7 +14,7 @@ from reports.matrix import UNJUDGED, Field, Matrix
 from reports.page.source import Source
 from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
-from validation.nulls import skill_of
+from validation.questions.nulls import skill_of
 
 Plain = Mapping[str, Any]
 #: Mark -> how a cell of the page says it: a sign and a word, so that no meaning hangs on colour.

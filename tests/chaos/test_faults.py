@@ -16,9 +16,9 @@ from adapters.plain import REASON
 from reports import exports
 from reports.progress import run_plan
 from validation.cells import Outcome, Slot, observation_from_dict
-from validation.execution import execute
-from validation.rows import rows_of
-from validation.store import Store
+from validation.judging.rows import rows_of
+from validation.records.store import Store
+from validation.running.execution import execute
 from validation.workers import run_cells
 from validation.workers.pool import MOST_TIMEOUTS
 

@@ -12,9 +12,9 @@ from adapters import registry
 from adapters.plain import is_visible, one_line
 from adapters.scene import SceneError
 from validation.cells import Outcome
-from validation.plan import Request, slots
-from validation.scene_files import json_schema, stated_from_text
-from validation.scene_format import SceneModel
+from validation.files.scene_files import json_schema, stated_from_text
+from validation.files.scene_format import SceneModel
+from validation.running.plan import Request, slots
 from validation.workers import run_cells
 
 STEPS, DT = 10, 1.0 / 240.0

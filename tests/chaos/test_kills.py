@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from reports import exports
-from validation.store import Store
+from validation.records.store import Store
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="kills processes and reads /proc")
 ROOT = Path(__file__).resolve().parents[2]

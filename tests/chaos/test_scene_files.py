@@ -13,10 +13,10 @@ from adapters.plain import is_visible
 from adapters.scene import SceneError
 from reports import exports
 from validation.cells import LONGEST_DT
-from validation.plan import Request, slots
+from validation.files.scene_text import MOST_BODIES, MOST_BYTES
+from validation.judging.rows import rows_of
 from validation.posed import pinned, resolve
-from validation.rows import rows_of
-from validation.scene_text import MOST_BODIES, MOST_BYTES
+from validation.running.plan import Request, slots
 from validation.workers import run_cells
 
 BASE = {

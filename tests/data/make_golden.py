@@ -18,8 +18,8 @@ from pathlib import Path
 
 from adapters.registry import names
 from reports.exports import load_rows
-from validation.plan import Request, slots
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.plan import Request, slots
 from validation.workers import run_cells
 
 HERE = Path(__file__).parent

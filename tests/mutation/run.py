@@ -34,12 +34,12 @@ COLUMNS = ("function", "change", "reason")
 SCORE_COLUMNS = ("module", "mutants", "killed", "cpu_seconds", "of")
 #: Module -> the tests that must notice, each file below `tests`. In the order of what a verdict hangs on.
 SUBJECTS = {
-    "validation/verdicts.py": ("validation/test_verdicts.py",),
+    "validation/judging/verdicts.py": ("validation/test_verdicts.py",),
     "validation/findings/__init__.py": ("validation/test_findings.py", "validation/test_acceptance.py"),
     "validation/findings/files.py": ("validation/test_findings.py",),
-    "validation/acceptance.py": ("validation/test_acceptance.py",),
+    "validation/judging/acceptance.py": ("validation/test_acceptance.py",),
     "validation/bounds.py": ("validation/test_worked_bounds.py", "validation/test_tolerances.py"),
-    "validation/columns.py": ("validation/test_worked_bounds.py", "validation/scenes/test_columns.py"),
+    "validation/truths/columns.py": ("validation/test_worked_bounds.py", "validation/scenes/test_columns.py"),
     "validation/scenes/impact.py": (
         "validation/scenes/test_impact.py",
         "validation/test_worked_bounds.py",
@@ -52,20 +52,20 @@ SUBJECTS = {
     ),
     "validation/scenes/stack.py": ("validation/scenes/test_stack.py", "validation/test_worked_bounds.py"),
     "validation/scenes/incline.py": ("validation/scenes/test_incline.py", "validation/test_worked_bounds.py"),
-    "validation/pivoting.py": ("validation/scenes/test_pivoting.py",),
-    "validation/sliding.py": ("validation/scenes/test_standing.py",),
+    "validation/truths/pivoting.py": ("validation/scenes/test_pivoting.py",),
+    "validation/truths/sliding.py": ("validation/scenes/test_standing.py",),
     "validation/scenes/tilt_table.py": ("validation/scenes/test_tilting.py",),
     "validation/scenes/rocker.py": ("validation/scenes/test_rocker.py",),
     "validation/scenes/seam.py": ("validation/scenes/test_seams.py",),
     "validation/scenes/overlap.py": ("validation/scenes/test_overlaps.py",),
     "validation/scenes/closing_wall.py": ("validation/scenes/test_moved_blows.py",),
-    "validation/nulls.py": ("validation/test_nulls.py",),
-    "validation/residuals.py": ("validation/test_residuals.py",),
-    "validation/keeping.py": ("validation/test_keeping.py",),
+    "validation/questions/nulls.py": ("validation/test_nulls.py",),
+    "validation/questions/residuals.py": ("validation/test_residuals.py",),
+    "validation/records/keeping.py": ("validation/test_keeping.py",),
     "validation/releases/history.py": ("validation/releases/test_history.py",),
     "validation/releases/bisection.py": ("validation/releases/test_bisection.py",),
     "validation/metrics.py": ("validation/test_metrics.py",),
-    "validation/quantities.py": ("validation/test_quantities.py", "validation/test_scene_files.py"),
+    "validation/files/quantities.py": ("validation/test_quantities.py", "validation/test_scene_files.py"),
     "adapters/law.py": (
         "validation/test_verdicts.py",
         "validation/test_deviations_chipmunk.py",
@@ -77,12 +77,12 @@ SUBJECTS = {
     "reports/findings.py": ("reports/test_findings_shown.py", "reports/test_what_is_shown.py"),
     "reports/matrix.py": ("reports/test_matrix.py", "reports/test_what_is_shown.py"),
     "reports/command/statuses.py": ("reports/test_statuses.py",),
-    "validation/rows.py": (
+    "validation/judging/rows.py": (
         "validation/test_rows.py",
         "validation/test_findings.py",
         "validation/test_acceptance.py",
     ),
-    "validation/comparison.py": ("validation/test_comparison.py",),
+    "validation/judging/comparison.py": ("validation/test_comparison.py",),
     "adapters/lift.py": ("adapters/test_lift.py",),
     "adapters/plain.py": ("adapters/test_plain.py",),
     "adapters/needs.py": ("adapters/test_needs.py",),
@@ -93,9 +93,9 @@ SUBJECTS = {
     "adapters/stepping.py": ("adapters/test_stepping.py",),
     "adapters/receipts.py": ("adapters/test_receipts.py",),
     "validation/geometry.py": ("validation/test_geometry.py", "validation/test_metrics.py"),
-    "validation/invariants.py": ("validation/test_invariants.py",),
-    "validation/mass_properties.py": ("validation/test_invariants.py",),
-    "validation/convergence.py": ("validation/test_convergence.py",),
+    "validation/files/invariants.py": ("validation/test_invariants.py",),
+    "validation/files/mass_properties.py": ("validation/test_invariants.py",),
+    "validation/questions/convergence.py": ("validation/test_convergence.py",),
     "validation/bench/statistics.py": ("validation/test_bench_statistics.py",),
 }
 PACKAGES = ("validation", "adapters", "reports")
@@ -310,7 +310,7 @@ def known_by_form(change: str) -> str:
 
 
 def module_of(function: str) -> str:
-    """Module of a function as it is listed: ``validation.verdicts.x_judge`` stands in validation/verdicts.py."""
+    """Module of a function as it is listed: ``validation.metrics.x_apexes`` stands in validation/metrics.py."""
     path = function.rpartition(".x")[0].replace(".", "/")
     return f"{path}.py" if (ROOT / f"{path}.py").is_file() else f"{path}/__init__.py"
 

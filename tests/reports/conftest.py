@@ -11,10 +11,10 @@ import pytest
 from adapters.trajectory import load_trajectory
 from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot, prepare
-from validation.execution import execute
 from validation.posed import primary_of
-from validation.store import Store
-from validation.tracks import record, representatives
+from validation.records.store import Store
+from validation.running.execution import execute
+from validation.running.tracks import record, representatives
 
 #: A name that a page must show and never run.
 EVIL = "<script>window.hacked=1</script><img src=x onerror=window.hacked=2>"

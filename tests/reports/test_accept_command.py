@@ -127,7 +127,7 @@ def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findi
 
 
 def test_a_run_fails_on_a_planned_cell_that_left_nothing(tmp_path, monkeypatch):
-    from validation.store import Store
+    from validation.records.store import Store
 
     kept = Store.observations
     monkeypatch.setattr(Store, "observations", lambda self, run: kept(self, run)[1:])

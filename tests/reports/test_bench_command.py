@@ -11,7 +11,7 @@ from reports import speed
 from reports.command import main
 from validation.bench import reading
 from validation.bench.lane import QUICK
-from validation.store import Store
+from validation.records.store import Store
 
 ONE = ["bench", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--dt", "1/60", "--dt", "1/240"]
 

@@ -13,7 +13,7 @@ from reports.command import benching
 from validation.bench import timing as timings
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import primary_of, resolve
-from validation.store import Store
+from validation.records.store import Store
 
 DT, STEPS = 1 / 240, 100
 #: Cost of a simulated second [s] on three engines: the interval of the second reaches that of the first, of the third

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from reports.bundle import citation
 from reports.command import main
 from validation.cells import Slot
-from validation.execution import execute
 from validation.posed import pinned
-from validation.store import Run, Store
+from validation.records.store import Run, Store
+from validation.running.execution import execute
 
 SCENE = """name = "drop"
 dimension = 2

@@ -9,8 +9,8 @@ from reports import changes
 from reports.changes import Side, as_json, as_markdown, as_text, header, headline, load_side
 from reports.wording import reproduce
 from validation.cells import Observation, Outcome, Slot
-from validation.comparison import Change, Kind
-from validation.store import MissingError, Store
+from validation.judging.comparison import Change, Kind
+from validation.records.store import MissingError, Store
 
 SLOT = {"scene": "stack", "params": {"n": 5.0}, "dimension": 2, "engine": "bullet", "profile": "tuned",
         "dt": 1 / 240, "iterations": None, "ulp": 0}  # fmt: skip

@@ -14,8 +14,8 @@ from reports import exports
 from reports.findings import finding_line
 from reports.matrix import legend
 from validation.cells import Observation, Outcome, Slot
-from validation.rows import Row
-from validation.store import Store, StoreError
+from validation.judging.rows import Row
+from validation.records.store import Store, StoreError
 
 ROW = Row(
     "run", "chipmunk", "7.3.1", "tuned", "impact", 2, {"e": 0.8, "v": 6.0}, 1 / 240, None, "impact/rebound_ratio",

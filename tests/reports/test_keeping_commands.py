@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from adapters.trajectory import load_trajectory
 from reports.command import main
-from validation.store import Store
+from validation.records.store import Store
 
 pytest.importorskip("pyarrow", reason="pip install 'contact-crosscheck[parquet]'")
 pytest.importorskip("pymunk")

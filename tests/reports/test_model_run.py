@@ -14,10 +14,10 @@ from reports.command import main
 from reports.spread import spread_lines
 from validation import posed
 from validation.cells import Observation, Outcome, Slot
-from validation.model_files import canonical_from_text, momentum_drift
-from validation.spread import spreads
-from validation.store import Store
-from validation.tracks import Recording
+from validation.files.model_files import canonical_from_text, momentum_drift
+from validation.questions.spread import spreads
+from validation.records.store import Store
+from validation.running.tracks import Recording
 
 pytest.importorskip("mujoco")
 MODELS = Path(__file__).parents[1] / "models"

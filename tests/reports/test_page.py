@@ -26,8 +26,8 @@ from reports.page.replay import replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import slug
 from validation.cells import Slot
-from validation.execution import execute
-from validation.store import Run, Store
+from validation.records.store import Run, Store
+from validation.running.execution import execute
 
 GOLDEN = Path(__file__).parent.parent / "data" / "golden"
 EVIL = "<script>window.hacked=1</script>"

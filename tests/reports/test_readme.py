@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 from reports.command import main
 from validation.cells import Slot
-from validation.execution import execute
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.execution import execute
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 COMMANDS = sorted({line.strip() for line in re.findall(r"^ +(?:\.venv/bin/)?(crosscheck [^#\n]+)", README, re.M)})

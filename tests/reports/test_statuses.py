@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from reports.command import main, statuses
-from validation.store import FILE, VERSION
+from validation.records.store import FILE, VERSION
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ["run", "impact", "--param", "v=6", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--jobs", "1"]

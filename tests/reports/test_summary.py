@@ -15,8 +15,8 @@ from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity
 from validation.cells import Slot
-from validation.execution import execute
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.execution import execute
 
 PROFILES = {"reference": ("classical", "reference"), "chipmunk": ("default", "tuned"),
             "bullet": ("default", "tuned", "one"), "mujoco": ("default", "tuned")}  # fmt: skip

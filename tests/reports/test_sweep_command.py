@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from reports.command import main
-from validation.plan import Request
-from validation.store import Store
-from validation.sweeping import MOST_CELLS, Range, Study, grid, listed, points, study_slots
+from validation.questions.sweeping import MOST_CELLS, Range, Study, grid, listed, points, study_slots
+from validation.records.store import Store
+from validation.running.plan import Request
 
 pytest.importorskip("pymunk")
 CELL = ("sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2")
@@ -107,7 +107,7 @@ def test_a_sweep_has_a_line_per_cell_and_the_same_command_makes_it_again(tmp_pat
 
 def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
     words = (*CELL, "--grid", "e=0:1:4", "--jobs", 1, "--out", tmp_path)
-    from validation import store
+    from validation.records import store
 
     kept, add = [], store.Store.add
 

@@ -11,9 +11,9 @@ import reports
 from reports import listing
 from reports.command import main
 from validation.cells import Slot
-from validation.execution import execute
 from validation.posed import pinned
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.execution import execute
 
 NAME = "[bold]x[/bold] [red"
 FILE_NAME = "[bold]x[bold] [red.toml"
@@ -142,8 +142,8 @@ def test_a_compilation_is_remembered_by_its_cpu_time(monkeypatch):
     """Waiting is what a busy machine adds; it must not make the next estimate longer."""
     import time
 
-    from validation import execution, warming
     from validation.cells import Slot
+    from validation.running import execution, warming
 
     monkeypatch.setattr(execution, "execute", lambda slot: time.sleep(0.5))
     assert warming._compile([Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240).as_dict()]) < 0.25

@@ -12,7 +12,7 @@ from reports import exports
 from reports.findings import finding_line, grouped
 from reports.matrix import Field, matrix_of
 from reports.wording import MARKS, mark_of, markdown, number
-from validation.rows import Row
+from validation.judging.rows import Row
 
 VALUE, TRUTH = 0.12345678901234567, 0.8
 ROW = Row(

@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 from adapters.law import Deviation
-from validation import acceptance
-from validation.acceptance import MOVES, accepted, band, propose, slots_to_move
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import Family, Finding, Findings, row_key
-from validation.rows import rows_of
+from validation.judging import acceptance
+from validation.judging.acceptance import MOVES, accepted, band, propose, slots_to_move
+from validation.judging.rows import rows_of
 
 SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)
 SLIDES = replace(SLOT, params=())
@@ -131,7 +131,7 @@ def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
-    monkeypatch.setattr("validation.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
     (why,) = refusals(propose(rows(), "nameless", listed(FAMILY)))
     assert "a deviation law speaks about it and misses" in why
     # What the law predicts is explained and needs no entry.
@@ -326,7 +326,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
-    monkeypatch.setattr("validation.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
     ((_, why),) = propose(rows(), "nameless", listed(FAMILY)).refused
     assert why == "a deviation law speaks about it and misses: the law or the engine has changed"
 

@@ -13,9 +13,9 @@ from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.timing import Timing
 from validation.bench.work import COST_LEVELS, ERROR_LEVELS, error_at_equal_time, time_at_equal_error, work_points
 from validation.cells import Observation, Outcome, Slot
-from validation.plan import Request
 from validation.posed import primary_of, resolve
-from validation.store import Store
+from validation.records.store import Store
+from validation.running.plan import Request
 
 STEPS = (1 / 60, 1 / 240, 1 / 960)
 

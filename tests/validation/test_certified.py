@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from reference_solver import Settings
 from validation.cells import Outcome, Slot
-from validation.execution import execute
-from validation.rows import rows_of
+from validation.judging.rows import rows_of
+from validation.running.execution import execute
 
 COLUMN = Slot("stack", (("n", 10.0),), 2, "reference", "reference", 1 / 60)
 

@@ -17,7 +17,7 @@ from adapters.scene import SceneError
 from reports import exports
 from reports.command import main
 from validation.cells import Observation, Outcome, Slot, prepare
-from validation.store import Store, StoreError
+from validation.records.store import Store, StoreError
 from validation.workers import LimitError
 from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _Driver, checked, run_cells_on
 

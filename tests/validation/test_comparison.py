@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from validation.cells import Slot
-from validation.comparison import (
+from validation.judging.comparison import (
     PRACTICAL,
     Change,
     Kind,

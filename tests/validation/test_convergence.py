@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
-from validation.convergence import Limit, convergence, extrapolations, limit_of, observed_order, richardson
+from validation.questions.convergence import Limit, convergence, extrapolations, limit_of, observed_order, richardson
 from validation.scenes.parts import PHASES
 
 DTS = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))

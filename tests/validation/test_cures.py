@@ -7,10 +7,10 @@ import pytest
 from adapters.engine_folder import CURES, inside
 from adapters.registry import find, names
 from reports.cures import cure_paste, cure_text, decided_by, told_cures
-from validation import cures
-from validation.cures import Cure, _best, _Trials, asked_of, cures_of, read, search, write
 from validation.posed import resolve
-from validation.switching import readings
+from validation.settings import cures
+from validation.settings.cures import Cure, _best, _Trials, asked_of, cures_of, read, search, write
+from validation.settings.switching import readings
 
 CURE = Cure(
     "mujoco", "4.0.1", "default", "pinch", 2, ({}, {"margin": 1.05}), 5, 0, 12, "creep", "m/s", {"margin": 1.05}, 0.0,

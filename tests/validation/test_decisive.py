@@ -7,8 +7,8 @@ import pytest
 from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
 from adapters.experiment import Cured
 from adapters.registry import find, names, profile_of
-from validation import decisive
-from validation.decisive import (
+from validation.settings import decisive
+from validation.settings.decisive import (
     ALONE,
     COMPLETES,
     NEEDED,

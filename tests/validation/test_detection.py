@@ -8,7 +8,7 @@ from adapters.needs import Needs, needs
 from adapters.planted_faults import REPORTED, SIZED, Planted
 from adapters.receipts import receipts
 from validation.catalogue import CATALOGUE
-from validation.detection import SIZES, detection, lines, only_by_receipts
+from validation.questions.detection import SIZES, detection, lines, only_by_receipts
 
 DT = 1 / 240
 NEEDS = {

@@ -16,7 +16,7 @@ from adapters.engine_folder import covering
 from adapters.law import Deviation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.execution import execute
+from validation.running.execution import execute
 
 ENGINE = BulletEngine()
 VERSION = "3.2.7"

@@ -5,7 +5,7 @@ import pytest
 from adapters.engine_folder import covering
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.execution import execute
+from validation.running.execution import execute
 
 pytest.importorskip("mujoco")
 DT = 1 / 240

@@ -12,8 +12,9 @@ from adapters.engine_folder import DECISIVE, belongs_of, candidates_of, cured_of
 from reports import palette
 from reports.command import main
 from reports.listing import doctor
-from validation import decisive, identity
+from validation import identity
 from validation.findings import files, solutions_of
+from validation.settings import decisive
 
 pytest.importorskip("pymunk")
 

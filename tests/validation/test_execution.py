@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 
 from adapters.receipts import Receipt
-from validation import execution
 from validation.cells import Outcome, Slot
-from validation.execution import execute
-from validation.rows import rows_of
+from validation.judging.rows import rows_of
+from validation.running import execution
+from validation.running.execution import execute
 
 pytest.importorskip("pymunk")
 SLOT = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from adapters.scene import SceneError
-from validation.expressions import LONGEST, FormulaError, value_of
-from validation.scene_files import canonical_from_text, stated_from_text
+from validation.files.expressions import LONGEST, FormulaError, value_of
+from validation.files.scene_files import canonical_from_text, stated_from_text
 
 NAMES = {"pi": math.pi, "g": 9.81, "t": 0.5, "mu": 0.3}
 
@@ -72,7 +72,7 @@ def test_a_check_s_value_and_tolerance_are_formulas_in_the_file_s_constants(tmp_
     for dt in (0.1, 0.001):
         (judged,) = [c for c in canonical.checks(canonical.scene(2), dt) if c.metric == "final[ball.y]"]
         assert judged.truth == found.checks[0].value and judged.bound == pytest.approx(9.81 * 0.5 * dt)
-    from validation.stated import stated_from_dict
+    from validation.files.stated import stated_from_dict
 
     assert stated_from_dict(found.as_dict()) == found
 

@@ -8,7 +8,7 @@ from adapters.registry import find
 from validation.cells import Observation, Outcome
 from validation.field import ABSENT, CURED, NOT_SEEN, REPRODUCED, Note, ask, matching, notes
 from validation.posed import resolve
-from validation.switching import readings
+from validation.settings.switching import readings
 
 HERE = [note for note in notes() if find(note.engine).engine is not None]
 

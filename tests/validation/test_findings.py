@@ -10,8 +10,8 @@ from adapters import registry
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, parse_dt
 from validation.findings import Family, Finding, FindingsError, Known, Unsupported, files, known_of, row_key
-from validation.plan import in_quick_suite
-from validation.rows import rows_of
+from validation.judging.rows import rows_of
+from validation.running.plan import in_quick_suite
 
 ENGINES = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
 SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)

@@ -6,8 +6,8 @@ import pytest
 
 from validation.canonical import Frontier
 from validation.cells import LONGEST_DT, Observation, Outcome, Slot
-from validation.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, fate_of, search, slot_at
 from validation.posed import resolve
+from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, fate_of, search, slot_at
 
 BACK = {"rebound_ratio": (0.5, ""), "beyond": (0.0, "")}
 THROUGH = {"rebound_ratio": (-1.0, ""), "beyond": (9.0, "")}

@@ -7,7 +7,8 @@ import pytest
 
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import Trajectory
-from validation import invariants, metrics
+from validation import metrics
+from validation.files import invariants
 from validation.geometry import deepest, least_gap, overlap, separation
 
 COUNT = 10_000

@@ -11,7 +11,7 @@ from adapters.scene import Body, Box, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.invariance import RELATIONS, Change, compare, floor, judged, measured, unit_of
+from validation.questions.invariance import RELATIONS, Change, compare, floor, judged, measured, unit_of
 
 BY_NAME = {relation.name: relation for relation in RELATIONS}
 LINES = [(name, d) for name, scene in CATALOGUE.items() for d in scene.dimensions]
@@ -143,7 +143,7 @@ def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
 def test_a_dependence_on_order_and_on_the_side_is_found(monkeypatch):
     """An engine that pushes the body that is listed last to the right: order and mirror show it, place does not."""
     from adapters.registry import load
-    from validation import invariance
+    from validation.questions import invariance
 
     pytest.importorskip("pymunk")
     real = invariance.run

@@ -7,8 +7,8 @@ import pytest
 
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import Trajectory
-from validation import invariants
-from validation.mass_properties import moments, volume
+from validation.files import invariants
+from validation.files.mass_properties import moments, volume
 
 DT = 1 / 240
 

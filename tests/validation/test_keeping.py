@@ -5,10 +5,10 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from validation import store as storing
 from validation.cells import Observation, Outcome, Slot
-from validation.keeping import TABLES, Rules, doomed, merge, prune
-from validation.store import Run, Store, StoreError
+from validation.records import store as storing
+from validation.records.keeping import TABLES, Rules, doomed, merge, prune
+from validation.records.store import Run, Store, StoreError
 
 SLOTS = [Slot("impact", (("v", float(v)),), 2, "chipmunk", "tuned", 1 / 240) for v in range(1, 5)]
 

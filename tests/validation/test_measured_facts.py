@@ -3,7 +3,7 @@
 import pytest
 
 from validation.cells import Outcome, Slot
-from validation.execution import execute
+from validation.running.execution import execute
 
 
 def measure(scene, engine, profile, dt, dimension=2, iterations=None, **params):

@@ -7,7 +7,16 @@ import pytest
 
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
 from validation.catalogue import CATALOGUE
-from validation.nulls import NULLS, Null, did_nothing, free_flight, nulls_of, perfectly_inelastic, skill, skill_of
+from validation.questions.nulls import (
+    NULLS,
+    Null,
+    did_nothing,
+    free_flight,
+    nulls_of,
+    perfectly_inelastic,
+    skill,
+    skill_of,
+)
 
 DT = 1 / 240
 

@@ -5,8 +5,8 @@ import pytest
 from adapters import registry
 from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
-from validation import plan
-from validation.plan import FULL_DT, Request, slots
+from validation.running import plan
+from validation.running.plan import FULL_DT, Request, slots
 
 
 @pytest.mark.parametrize("engine", [name for name in registry.names() if registry.find(name).engine is not None])

@@ -8,8 +8,8 @@ import pytest
 from adapters.engine import Contacts
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import ContactRecord, Trajectory
+from validation.files.quantities import force_window, quantity, unit
 from validation.metrics import UNAVAILABLE
-from validation.quantities import force_window, quantity, unit
 
 
 def scene_of(dimension, duration=4.0):

@@ -9,9 +9,9 @@ import pytest
 from adapters.engine import Contacts
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
 from adapters.trajectory import ContactRecord, Trajectory
-from validation.apart import Apart
 from validation.cells import Slot
-from validation.residuals import LAWS, ask, measured, residuals
+from validation.questions.residuals import LAWS, ask, measured, residuals
+from validation.running.apart import Apart
 
 DT, MASS, G, MU = 0.01, 2.0, 10.0, 0.5
 WEIGHT = MASS * G * DT

@@ -7,11 +7,11 @@ import pytest
 
 from adapters.engine import EngineError
 from adapters.law import Deviation
-from validation import rows
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import FindingsError
-from validation.rows import Row, frame, predictions_of, rows_of
+from validation.judging import rows
+from validation.judging.rows import Row, frame, predictions_of, rows_of
 
 #: A box below the edge of the friction cone: one check, its creep.
 SLOT = Slot("incline", (("ratio", 0.99),), 3, "nameless", "soft", 1 / 240, 7)

@@ -12,8 +12,8 @@ from adapters.scene import SceneError
 from adapters.trajectory import ContactRecord, Trajectory
 from reports.findings import refusals
 from validation.cells import Observation, Outcome, Slot
-from validation.rows import rows_of
-from validation.scene_files import canonical_from_file, json_schema, load_scene
+from validation.files.scene_files import canonical_from_file, json_schema, load_scene
+from validation.judging.rows import rows_of
 
 GOOD = """
 name = "drop"
@@ -82,14 +82,14 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_the_published_schema_is_that_of_the_format():
-    """`crosscheck schema -o validation/scene.schema.json` writes it anew."""
+    """`crosscheck schema -o validation/files/scene.schema.json` writes it anew."""
     from click.testing import CliRunner
 
     from reports.command import main
 
     done = CliRunner().invoke(main, ["schema"])
     assert done.exit_code == 0
-    assert done.stdout == (Path(__file__).parents[2] / "validation" / "scene.schema.json").read_text()
+    assert done.stdout == (Path(__file__).parents[2] / "validation" / "files" / "scene.schema.json").read_text()
     assert json.loads(done.stdout)["$id"].endswith(":1")
 
 
@@ -245,7 +245,7 @@ def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
 
 
 def test_a_body_may_have_a_slash_in_its_name():
-    from validation.scene_format import parts_of
+    from validation.files.scene_format import parts_of
 
     names = ["a/b", "b", "a"]
     assert parts_of("a/b.y", names) == (None, "a/b", "y")

@@ -4,7 +4,7 @@ import pytest
 
 from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE
-from validation.plan import QUICK_DT
+from validation.running.plan import QUICK_DT
 
 DT = QUICK_DT
 

@@ -86,7 +86,7 @@ def test_the_recipe_s_scene_is_described_run_judged_benched_and_reported_by_its_
 def test_a_fault_fails_the_recipe_s_check(drop):
     from adapters import registry
     from adapters.planted_faults import Planted
-    from validation.detection import _watchers
+    from validation.questions.detection import _watchers
 
     pytest.importorskip("pymunk")
     engine = registry.load("chipmunk")

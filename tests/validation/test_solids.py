@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from adapters.scene import Box, Capsule, Cylinder, HalfSpace, Hull, Polygon, SceneError, Sphere
+from validation.files.mass_properties import moments, volume
+from validation.files.scene_files import stated_from_text
 from validation.geometry import deepest, overlap, separation
-from validation.mass_properties import moments, volume
-from validation.scene_files import stated_from_text
 from validation.solids import hull_properties
 
 BRICK = Hull(tuple(itertools.product((-0.5, 0.5), (-0.4, 0.4), (-0.3, 0.3))))

@@ -3,7 +3,7 @@
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
-from validation.store import SCATTER_TITLE, Store, StoreError
+from validation.records.store import SCATTER_TITLE, Store, StoreError
 
 SLOTS = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", 1 / 240) for v in (1.0, 2.0, 3.0)]
 
@@ -48,7 +48,7 @@ def test_the_same_plan_of_other_code_is_another_run(tmp_path, monkeypatch):
     store = Store(tmp_path)
     first, _ = store.start("test", SLOTS)
     store.add(first, observed(SLOTS[0]))
-    monkeypatch.setattr("validation.store.code_hash", lambda asked: "other code")
+    monkeypatch.setattr("validation.records.store.code_hash", lambda asked: "other code")
     second, done = store.start("test", SLOTS)
     assert second.id != first.id
     assert done == set()

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from validation import posed, store
+from validation import posed
 from validation.cells import Observation, Outcome, Slot
-from validation.plan import Request, slots
+from validation.judging.rows import rows_of
 from validation.posed import pinned, resolve
-from validation.rows import rows_of
-from validation.store import FILE, MissingError, Store, StoreError
+from validation.records import store
+from validation.records.store import FILE, MissingError, Store, StoreError
+from validation.running.plan import Request, slots
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOTS = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", 1 / 240) for v in (1.0, 2.0, 3.0)]
@@ -143,7 +144,7 @@ def test_results_that_cannot_be_written_can_be_read(public):
     """As a user who may read the folder and no more: an archive, somebody else's results."""
     filled(public)
     code = (
-        "import os, sys; from pathlib import Path; from validation.store import Store\n"
+        "import os, sys; from pathlib import Path; from validation.records.store import Store\n"
         "if os.getuid() == 0: os.setgid(65534), os.setuid(65534)\n"  # root may write anywhere
         "try: open(Path(sys.argv[1], 'probe'), 'w'); sys.exit('the folder can be written')\n"
         "except PermissionError: pass\n"
@@ -169,7 +170,7 @@ START = """
 import sys
 from pathlib import Path
 from validation.cells import Slot
-from validation.store import Store
+from validation.records.store import Store
 slots = [Slot("impact", (("v", float(v)),), 2, "chipmunk", "tuned", 1 / 240) for v in range(1, 4)]
 sys.stdin.readline()
 run, _ = Store(Path(sys.argv[1])).start("test", slots, fresh=True)

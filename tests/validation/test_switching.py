@@ -11,10 +11,10 @@ from adapters.experiment import Experiment
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of
-from validation.plan import QUICK_DT, in_quick_suite
-from validation.proofs import Proof
-from validation.switching import Reading, reading, readings, side_by_side, switched
-from validation.tuning import Score, broken, score
+from validation.running.plan import QUICK_DT, in_quick_suite
+from validation.settings.proofs import Proof
+from validation.settings.switching import Reading, reading, readings, side_by_side, switched
+from validation.settings.tuning import Score, broken, score
 
 pymunk = pytest.importorskip("pymunk", reason="pymunk is an optional engine")
 

@@ -8,7 +8,7 @@ import pytest
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.tracks import record, recording_from_bytes, representatives
+from validation.running.tracks import record, recording_from_bytes, representatives
 
 DT = 1.0 / 240.0
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from validation import tuning
-from validation.tuning import search
+from validation.settings import tuning
+from validation.settings.tuning import search
 
 pytest.importorskip("pymunk", reason="pymunk is an optional engine")
 

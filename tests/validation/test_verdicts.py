@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from adapters.law import Deviation
 from validation.canonical import Check
 from validation.findings import Family, Finding, Known
-from validation.verdicts import Physics, Standing, is_marginal, judge, judge_divergence, judge_physics, predicted
+from validation.judging.verdicts import (
+    Physics,
+    Standing,
+    is_marginal,
+    judge,
+    judge_divergence,
+    judge_physics,
+    predicted,
+)
 
 CHECK = Check("m", "1", 1.0, 0.1, "because", "source")
 FAMILY = Family("f", ("p",), "s", ("m",), "a reason", "source", ">=0")

@@ -16,7 +16,7 @@ from validation.bench.reading import POINT, identity, table_of
 from validation.bench.statistics import spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
-from validation.store import Run, Store
+from validation.records.store import Run, Store
 
 
 def ratios(store: Store, run: Run) -> pd.DataFrame:

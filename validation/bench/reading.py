@@ -19,7 +19,7 @@ import pandas as pd
 from validation.bench.statistics import DRIFT, drift, power_law, spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
-from validation.store import RELEASE_TITLE, Run, Store
+from validation.records.store import RELEASE_TITLE, Run, Store
 
 #: What a series is: an engine with a profile on a scene.
 SERIES = ["scene", "dimension", "engine", "profile"]

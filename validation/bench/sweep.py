@@ -21,8 +21,8 @@ from validation.bench.work import accuracy
 from validation.canonical import Suite
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Slot, slot_from_dict
-from validation.plan import Request, slots
 from validation.posed import primary_of, resolve
+from validation.running.plan import Request, slots
 
 #: Step at which cost with every step sampled is timed as well.
 SAMPLED_DT = 1.0 / 240.0

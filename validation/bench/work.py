@@ -17,7 +17,7 @@ from validation.bench.reading import POINT, SERIES, grouped, identity, table_of,
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import primary_of, resolve
-from validation.store import Run, Store
+from validation.records.store import Run, Store
 
 #: Errors at which costs are compared.
 ERROR_LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)

@@ -22,9 +22,9 @@ from typing import Any
 
 from adapters.registry import find
 from validation.cells import Slot, parse_dt
-from validation.plan import QUICK_DT
 from validation.posed import resolve
-from validation.switching import Reading, observe, reading, switched
+from validation.running.plan import QUICK_DT
+from validation.settings.switching import Reading, observe, reading, switched
 
 #: What a run can say of a note.
 REPRODUCED, NOT_SEEN, CURED = "reproduced", "not seen", "cured"

@@ -22,7 +22,7 @@ from packaging.version import InvalidVersion
 
 from adapters import registry
 from validation.cells import Slot, format_dt
-from validation.plan import in_quick_suite
+from validation.running.plan import in_quick_suite
 
 #: Identity of a row within its engine: profile, scene, dimension, params, dt, iterations, metric.
 Key = tuple[str, ...]

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 from validation.cells import Slot, slot_from_dict
-from validation.comparison import Change, Kind, by_seriousness, compare_rows
+from validation.judging.comparison import Change, Kind, by_seriousness, compare_rows
 from validation.releases.history import ANSWERS, Told
 
 #: What a release says of the rows in question; None if it cannot be asked.

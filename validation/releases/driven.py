@@ -22,8 +22,8 @@ from typing import Any, TextIO
 from adapters import registry
 from validation import posed
 from validation.cells import Slot, slot_from_dict
-from validation.plan import Request, slots
 from validation.releases.timing import laps
+from validation.running.plan import Request, slots
 from validation.workers import run_cells
 
 

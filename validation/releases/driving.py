@@ -18,12 +18,12 @@ from adapters.plain import lines, one_line
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, observation_from_dict, slot_from_dict
 from validation.identity import adapter_hash, scene_code
-from validation.plan import Request, slots
+from validation.records.store import RELEASE_TITLE, Run, Store
 from validation.releases.carried import code
 from validation.releases.choosing import Release
 from validation.releases.environments import BuildError, Environment, build
 from validation.releases.timing import kept, timed_cells
-from validation.store import RELEASE_TITLE, Run, Store
+from validation.running.plan import Request, slots
 from validation.workers import TIMEOUT
 
 #: Seconds beyond a cell's own limit after which an environment that says nothing is given up: it starts a worker.

@@ -12,12 +12,12 @@ from packaging.version import Version
 
 from validation.bench.agreement import ratios
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.comparison import Change, Family, Kind, compare_rows, families
 from validation.findings import Finding, row_key
 from validation.findings.files import findings_of
-from validation.rows import Row, rows_of
-from validation.store import RELEASE_TITLE, Store
-from validation.verdicts import Physics
+from validation.judging.comparison import Change, Family, Kind, compare_rows, families
+from validation.judging.rows import Row, rows_of
+from validation.judging.verdicts import Physics
+from validation.records.store import RELEASE_TITLE, Store
 
 #: Outcomes that are an answer of the engine; the others are the reason why there is none.
 ANSWERS = (Outcome.OK.value, Outcome.DIVERGED.value, Outcome.CRASHED.value, Outcome.TIMED_OUT.value)

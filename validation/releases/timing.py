@@ -20,8 +20,8 @@ from validation.bench.timing import Timing
 from validation.bench.units import work_unit
 from validation.canonical import Suite
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.plan import QUICK_DT
 from validation.posed import is_file, resolve
+from validation.running.plan import QUICK_DT
 
 #: Rounds, each in a process of its own: two that were disturbed are outvoted by three.
 ROUNDS = 5

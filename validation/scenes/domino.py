@@ -24,8 +24,8 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.pivoting import WORDS, Pivot, fall_checks
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, states, upward
+from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
 #: Share of the angle of the hit at which the first domino is told, and the angle [rad] at which the second is.
 TOLD, STRUCK = 0.9, math.radians(3.0)

@@ -23,8 +23,8 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.corners import AFTERMATH, landing_corner, lands_again
 from validation.scenes.parts import PHASES, block, delay, floor, mass_of, phases, states_and_impulses, tilted, upward
+from validation.truths.corners import AFTERMATH, landing_corner, lands_again
 
 HEIGHT = 1.0
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from adapters.scene import Body, Box, Pair, Scene
-from validation import sliding
 from validation.canonical import CanonicalScene, Check, Parameter, Params, Primary, Variation
 from validation.scenes.parts import along, mass_of, pose_at, standard_gravity, states, upward
+from validation.truths import sliding
 
 HEIGHT, THICKNESS = 0.5, 1.0
 

@@ -13,9 +13,9 @@ units of the light box's own mass, squeezes it out or lets the heavy one sink in
 from __future__ import annotations
 
 from adapters.scene import Pair, Scene
-from validation import columns
 from validation.canonical import CanonicalScene, Frontier, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
+from validation.truths import columns
 
 SIDE = 1.0
 

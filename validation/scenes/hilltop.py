@@ -21,8 +21,8 @@ from adapters.scene import Body, Disc, Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.rolling import gyration
 from validation.scenes.parts import at, ball, pose_at, states, upward
+from validation.truths.rolling import gyration
 
 K = gyration(2)
 #: Runs on for this share of the time until it leaves.

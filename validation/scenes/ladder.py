@@ -21,8 +21,8 @@ from adapters.scene import Body, HalfSpace, Pair, Scene, SceneError
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.leaning import Turn, turn
 from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, tilted, upward
+from validation.truths.leaning import Turn, turn
 
 #: Turn at which a ladder that slides is told [rad], and how long it goes on [s]: whoever is late by what a step of
 #: 1/60 s may cost is told as well.

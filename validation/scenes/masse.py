@@ -21,8 +21,8 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.rolling import gyration, of_the_arm, on_a_late_arm
 from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states, upward
+from validation.truths.rolling import gyration, of_the_arm, on_a_late_arm
 
 K = gyration(3)
 #: Runs for this many times the time until it rolls.

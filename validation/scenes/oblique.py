@@ -29,7 +29,6 @@ from validation.canonical import (
     Track,
     Variation,
 )
-from validation.rolling import forward, gyration, launched, on_a_late_arm, struck
 from validation.scenes.parts import (
     PHASES,
     ball,
@@ -42,6 +41,7 @@ from validation.scenes.parts import (
     states,
     upward,
 )
+from validation.truths.rolling import forward, gyration, launched, on_a_late_arm, struck
 
 #: Runs for this long after the contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35

@@ -15,9 +15,10 @@ from collections.abc import Mapping
 
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds, columns
+from validation import bounds
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import at, block, floor, upward
+from validation.truths import columns
 
 LENGTH, HEIGHT = 2.0, 0.5
 

@@ -24,10 +24,10 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.corners import landing_corner
-from validation.leaning import Turn, turn
-from validation.pivoting import WORDS, Pivot, fall_checks
 from validation.scenes.parts import block, floor, mass_of, standard_gravity, states, tilted, upward
+from validation.truths.corners import landing_corner
+from validation.truths.leaning import Turn, turn
+from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
 #: Turn at which the rod is told [rad], to either side.
 TOLD = math.radians(3.0)

@@ -22,8 +22,8 @@ from adapters.scene import Body, HalfSpace, Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.rolling import gyration, launched, struck
 from validation.scenes.parts import PHASES, along, at, ball, delay, floor, mass_of, phases, states, upward
+from validation.truths.rolling import gyration, launched, struck
 
 RADIUS, GAP, LANE = 0.5, 1.0, 5.0
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.

@@ -22,8 +22,8 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.pivoting import WORDS, Pivot, fall_checks
 from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, states, tilted, upward
+from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
 #: Runs on for this long after the angle should be passed [s]: a step of 1/30 s at least.
 AFTERMATH = 0.05

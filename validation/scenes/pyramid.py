@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from adapters.scene import Body, Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import columns
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import along, at, cube, floor, mass_of, standard_gravity, upward
+from validation.truths import columns
 
 SIDE = 1.0
 #: Distance of the boxes of a row: a box stands on 0.45 of its width at either end.

@@ -24,8 +24,8 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.pivoting import Pivot
 from validation.scenes.parts import block, floor, mass_of, standard_gravity, states, tilted, upward
+from validation.truths.pivoting import Pivot
 
 #: Landings that are judged, and the amplitudes after them.
 LANDINGS = 3

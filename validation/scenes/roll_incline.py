@@ -17,8 +17,8 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.rolling import forward, gyration, of_the_arm
 from validation.scenes.parts import along, ball, floor, mass_of, standard_gravity, states
+from validation.truths.rolling import forward, gyration, of_the_arm
 
 
 def angle(params: Params, dimension: int) -> float:

@@ -18,8 +18,8 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.rolling import forward, gyration, launched, on_a_late_arm, struck
 from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
+from validation.truths.rolling import forward, gyration, launched, on_a_late_arm, struck
 
 
 def make(dimension: int, params: Params) -> Scene:

@@ -18,9 +18,10 @@ from dataclasses import replace
 
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds, metrics, sliding
+from validation import bounds, metrics
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import along, at, ball, floor, states, upward
+from validation.truths import sliding
 
 #: In units of L: radius and drop of the ball, size of the box, and how far apart they are.
 RADIUS, DROP, SIDE, APART = 0.5, 2.0, 1.0, 5.0
@@ -29,7 +30,7 @@ E, MU, SPEED = 0.5, 0.3, 2.0
 
 
 def _sliding(p: Params) -> dict[str, float]:
-    """What `validation.sliding` asks of a scene, in metres."""
+    """What `validation.truths.sliding` asks of a scene, in metres."""
     return {"v": SPEED * p["length"], "mu": MU, "g": GRAVITY * p["length"], "mass": p["mass"]}
 
 

@@ -12,9 +12,9 @@ pyramid brakes less along its diagonals or turns the path.
 from __future__ import annotations
 
 from adapters.scene import Pair, Scene
-from validation import sliding
 from validation.canonical import CanonicalScene, Parameter, Params, Primary, Variation
 from validation.scenes.parts import floor, mass_of, standard_gravity, states, upward
+from validation.truths import sliding
 
 HEIGHT = 0.5
 

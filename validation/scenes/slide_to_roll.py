@@ -20,8 +20,8 @@ from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
-from validation.rolling import forward, gyration, launched, of_the_arm, on_a_late_arm
 from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
+from validation.truths.rolling import forward, gyration, launched, of_the_arm, on_a_late_arm
 
 #: Runs for this many times the time until it rolls: two thirds of the run it rolls.
 RUNS = 3.0

@@ -12,7 +12,6 @@ It starts exactly touching: whatever moves afterwards, the engine made.
 from __future__ import annotations
 
 from adapters.scene import Pair, Scene
-from validation import columns
 from validation.canonical import (
     CanonicalScene,
     Frontier,
@@ -25,6 +24,7 @@ from validation.canonical import (
     Variation,
 )
 from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
+from validation.truths import columns
 
 SIDE = 1.0
 HEIGHTS = (1, 2, 5, 10, 20)

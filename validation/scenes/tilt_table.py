@@ -21,8 +21,8 @@ from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
-from validation.pivoting import WORDS, Pivot, fall_checks
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, states, upward
+from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
 #: What a toppling block turns until it is told [rad], and the time that the run goes on [s].
 TOLD, AFTERMATH = math.radians(15.0), 0.05

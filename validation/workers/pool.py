@@ -16,7 +16,7 @@ from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare
-from validation.tracks import Recording, recording_from_bytes
+from validation.running.tracks import Recording, recording_from_bytes
 from validation.workers import limits
 from validation.workers.process import READY, serve
 

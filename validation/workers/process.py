@@ -23,7 +23,7 @@ READY = b"ready"
 
 def serve(connection: Connection) -> None:
     """Run what is asked until the other end closes."""
-    from validation.execution import perform  # noqa: F401  (loaded before the first cell's clock starts)
+    from validation.running.execution import perform  # noqa: F401  (loaded before the first cell's clock starts)
 
     registry.load_engines_here()
     connection.send_bytes(READY)
@@ -60,7 +60,7 @@ def _answer(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _cell(slot: Slot, job: Mapping[str, Any]) -> tuple[Observation, str | None]:
-    from validation.execution import perform
+    from validation.running.execution import perform
 
     keep = Path(job["keep"]) if job["keep"] else None
     observation, recording = perform(slot, keep, job["record"])

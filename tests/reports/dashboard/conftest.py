@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from reports.dashboard.series import panels
-from validation import store as storing
 from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot
-from validation.store import Store
+from validation.records import store as storing
+from validation.records.store import Store
 
 RUNS = 60
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))

@@ -13,7 +13,7 @@ from reports.dashboard import events
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
 from validation.cells import Outcome, Slot
-from validation.store import Store
+from validation.records.store import Store
 
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
 

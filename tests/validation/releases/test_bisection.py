@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
-from validation.comparison import Kind
+from validation.judging.comparison import Kind
 from validation.releases.bisection import Found, Unchanged, bisect, search
 from validation.releases.history import told_by
 

@@ -12,13 +12,13 @@ import pytest
 
 from adapters import registry
 from validation.cells import Outcome, Slot
-from validation.plan import Request
+from validation.judging.rows import rows_of
 from validation.posed import pinned
+from validation.records.store import Store
 from validation.releases import environments, history
 from validation.releases.choosing import RegistryError, chosen, offered
 from validation.releases.driving import Effort, answered, drive, planned
-from validation.rows import rows_of
-from validation.store import Store
+from validation.running.plan import Request
 
 ONE = Effort(jobs=1)
 REQUEST = Request(scenes=["impact"], engines=["toy"], dimensions=[2], params={"e": 0.5, "v": 4.0})
@@ -167,7 +167,7 @@ from pathlib import Path
 from validation.cells import Slot
 from validation.releases.choosing import chosen
 from validation.releases.driving import Effort, drive
-from validation.store import Store
+from validation.records.store import Store
 
 slots = [Slot("impact", (("e", 0.5), ("v", 1.0 + k)), 2, "toy", "default", 1 / 240) for k in range(2)]
 drive(Store(Path(sys.argv[1])), chosen("toy", "1.0.0")[0], slots, Effort(jobs=1))

@@ -6,8 +6,8 @@ import pytest
 
 from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
-from validation.comparison import Kind
 from validation.findings import Family, Finding, FindingsError
+from validation.judging.comparison import Kind
 from validation.releases import history, notes
 from validation.releases.history import steps, told_by
 
@@ -64,7 +64,7 @@ def test_rows_that_end_without_an_answer_are_counted_apart_from_those_that_fail(
 
 
 def test_a_missing_answer_never_replaces_one(tmp_path):
-    from validation.store import RELEASE_TITLE, Store
+    from validation.records.store import RELEASE_TITLE, Store
 
     store = Store(tmp_path)
     for outcome in (Outcome.OK, Outcome.NOT_INSTALLED):
@@ -78,7 +78,7 @@ def test_a_missing_answer_never_replaces_one(tmp_path):
 
 
 def test_versions_are_in_the_order_of_versions(tmp_path):
-    from validation.store import RELEASE_TITLE, Store
+    from validation.records.store import RELEASE_TITLE, Store
 
     store = Store(tmp_path)
     for version in ("3.10.0", "3.9.0", "3.9.0", "4.0.0rc1", "4.0.0"):

@@ -11,9 +11,9 @@ from reports.command import main
 from reports.dashboard.series import panels
 from validation.bench.stopwatch import Lap
 from validation.cells import Observation, Outcome, Slot
+from validation.records.store import RELEASE_TITLE, Store
 from validation.releases import history, timing
 from validation.releases.history import Told
-from validation.store import RELEASE_TITLE, Store
 
 DT = 1 / 240
 SLOT = Slot("impact", (("e", 0.5),), 2, "toy", "default", DT)

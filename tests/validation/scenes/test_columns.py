@@ -9,8 +9,8 @@ import pytest
 from adapters.engine import Contacts
 from adapters.scene import Box, Disc, Sphere
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
-from validation import columns
 from validation.catalogue import CATALOGUE
+from validation.truths import columns
 
 DT, G = 1 / 64, 8.0  # powers of two: sums and quotients below are exact
 STEPS = 192  # three seconds

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
-from validation.leaning import turn
 from validation.scenes.painleve import critical
+from validation.truths.leaning import turn
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
-from validation.pivoting import Pivot
+from validation.truths.pivoting import Pivot
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from validation.canonical import Check
 from validation.cells import Slot, slot_from_dict
 from validation.findings import Family, Finding, Findings, Key, row_key, solutions_of
-from validation.plan import in_quick_suite
-from validation.rows import Row, predictions_of
-from validation.studies import study_of
-from validation.verdicts import is_marginal
+from validation.judging.rows import Row, predictions_of
+from validation.judging.studies import study_of
+from validation.judging.verdicts import is_marginal
+from validation.running.plan import in_quick_suite
 
 #: Starts moved by so many units in the last place show how far a value scatters.
 MOVES = (1, -1, 2, -2)

@@ -21,7 +21,7 @@ from validation import posed
 from validation.bench.timing import Timing, timing_from_dict
 from validation.cells import Observation, Slot, observation_from_dict, slot_from_dict
 from validation.identity import code_hash, commit, machine
-from validation.tracks import Recording, recording_from_bytes
+from validation.running.tracks import Recording, recording_from_bytes
 
 FILE = "results.sqlite"
 #: Version of the tables, kept as ``user_version``; 0 is a store from before versions, which had no scenes.
@@ -145,7 +145,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Tables themselves, in one transaction: for work on many runs (`validation.keeping`)."""
+        """Tables themselves, in one transaction: for work on many runs (`validation.records.keeping`)."""
         with self._guarded("write"), self._transaction():
             yield self._db
 

@@ -16,12 +16,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
 from adapters.shapes import MOST_VERTICES, check_length
-from validation.centring import centre
-from validation.expressions import FUNCTIONS, FormulaError, value_of
-from validation.mass_properties import HOW, moments, volume
-from validation.quantities import QUANTITIES, parts_of
-from validation.scene_text import listed
-from validation.stated import Stated, StatedCheck
+from validation.files.centring import centre
+from validation.files.expressions import FUNCTIONS, FormulaError, value_of
+from validation.files.mass_properties import HOW, moments, volume
+from validation.files.quantities import QUANTITIES, parts_of
+from validation.files.scene_text import listed
+from validation.files.stated import Stated, StatedCheck
 
 
 class SceneErrors(SceneError):
@@ -145,8 +145,8 @@ class PairModel(_Strict):
 class CheckModel(_Strict):
     """A number that the scene's author knows: PASS if |measured - value| <= tolerance.
 
-    Value and tolerance are numbers or formulas (`validation.expressions`) in ``pi``, ``g`` (size of the gravity), ``t``
-    (time of the check [s]) and the file's constants; a tolerance in the step ``dt`` [s] as well.
+    Value and tolerance are numbers or formulas (`validation.files.expressions`) in ``pi``, ``g`` (size of the gravity),
+    ``t`` (time of the check [s]) and the file's constants; a tolerance in the step ``dt`` [s] as well.
 
     Parameters
     ----------

@@ -4,9 +4,9 @@
     shipped profile + all changes but one  does it fail without that?
     shipped profile + fewer and fewer      where no change is enough alone: what cannot be left out any more
 
-Every number is the worst of the same checks of the same cells, run by `validation.switching`. What came out stands
-beside the engine's experiments as data (``decisive.csv``), with the release that it was measured with; ``crosscheck
-tune ENGINE --decisive`` measures it again.
+Every number is the worst of the same checks of the same cells, run by `validation.settings.switching`. What came out
+stands beside the engine's experiments as data (``decisive.csv``), with the release that it was measured with;
+``crosscheck tune ENGINE --decisive`` measures it again.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
 from adapters.experiment import Cured
 from adapters.registry import find, load
 from validation.cells import Observation, Slot, prepare, settings_of
-from validation.plan import QUICK_DT
-from validation.switching import observe, readings, switched
+from validation.running.plan import QUICK_DT
+from validation.settings.switching import observe, readings, switched
 
 #: How a setting decides: it is enough by itself; or the check fails without it; or it completes a set that is enough,
 #: in which another might stand for it.

@@ -1,6 +1,6 @@
 """Scene files (TOML or JSON): checked completely before anything else sees them.
 
-Their format is `validation.scene_format`; what a file states becomes a canonical scene in `validation.stated`.
+Their format is `scene_format`; what a file states becomes a canonical scene in `stated`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from pydantic import ValidationError
 
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
-from validation import model_files
 from validation.canonical import CanonicalScene
-from validation.scene_format import SceneModel, stated
-from validation.scene_text import parsed, read_text, said
-from validation.stated import Stated, canonical_of
+from validation.files import model_files
+from validation.files.scene_format import SceneModel, stated
+from validation.files.scene_text import parsed, read_text, said
+from validation.files.stated import Stated, canonical_of
 
 #: Names of the schema's own language and of itself; the number is that of `SceneModel.format`.
 DIALECT, SCHEMA_ID = "https://json-schema.org/draft/2020-12/schema", "urn:contact-crosscheck:scene:1"

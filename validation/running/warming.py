@@ -84,7 +84,7 @@ def _groups(slots: Sequence[Slot]) -> dict[tuple[str, int], dict[tuple[str, str]
 def _compile(slots: Sequence[dict[str, object]]) -> float:
     """Run cells for what they leave in the cache; return the CPU time that took [s]."""
     from validation.cells import slot_from_dict
-    from validation.execution import execute
+    from validation.running.execution import execute
 
     started = time.process_time()
     for slot in slots:

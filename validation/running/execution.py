@@ -22,9 +22,9 @@ from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
 from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
-from validation.certification import fully_certified
 from validation.posed import resolve
-from validation.tracks import Recording, record
+from validation.running.certification import fully_certified
+from validation.running.tracks import Recording, record
 
 
 def execute(slot: Slot, keep: Path | None = None) -> Observation:

@@ -28,9 +28,9 @@ from adapters.registry import load
 from adapters.scene import Scene
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Measured, Trajectory
-from validation.apart import Apart
 from validation.cells import Slot, settings_of
 from validation.posed import resolve
+from validation.running.apart import Apart
 
 #: Indices, as contact records have them.
 Whole = NDArray[np.int64]

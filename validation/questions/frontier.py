@@ -22,12 +22,12 @@ from types import TracebackType
 from adapters.foreign import checked_refusal, said_by
 from adapters.registry import find, load
 from adapters.stepping import posed_for, run
-from validation.apart import Apart
 from validation.canonical import Frontier
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, format_dt, settings_of
-from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
+from validation.running.apart import Apart
+from validation.running.plan import QUICK_DT, has_iterations
 from validation.workers import TIMEOUT
 
 #: Ratio of the two ends of a bracket at which a search stops, quick and full.

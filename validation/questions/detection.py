@@ -18,8 +18,8 @@ from adapters.planted_faults import SIZED, Planted
 from adapters.receipts import receipts
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
-from validation.plan import QUICK_DT
-from validation.verdicts import Physics, judge_physics
+from validation.judging.verdicts import Physics, judge_physics
+from validation.running.plan import QUICK_DT
 
 #: Ten per cent, one, and one in a thousand.
 SIZES = (0.1, 0.01, 0.001)

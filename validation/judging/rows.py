@@ -17,9 +17,8 @@ from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.findings import Findings, FindingsError, Known, known_of
 from validation.findings.files import brought_by_ours, findings_of
-from validation.posed import is_file, resolve
-from validation.studies import StudyResult, results
-from validation.verdicts import (
+from validation.judging.studies import StudyResult, results
+from validation.judging.verdicts import (
     Physics,
     Prediction,
     Standing,
@@ -29,6 +28,7 @@ from validation.verdicts import (
     judge_physics,
     predicted,
 )
+from validation.posed import is_file, resolve
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")

@@ -23,8 +23,8 @@ from adapters.scene import Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import CanonicalScene
 from validation.cells import Slot
-from validation.plan import QUICK_DT
 from validation.posed import resolve
+from validation.running.plan import QUICK_DT
 
 #: Frames per second: what a screen shows.
 RATE = 60.0

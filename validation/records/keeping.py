@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from adapters.plain import one_line
-from validation.store import Run, Store, StoreError
+from validation.records.store import Run, Store, StoreError
 
 #: Tables whose rows belong to a run, and what names a row there.
 TABLES = {

@@ -23,9 +23,9 @@ import pandas as pd
 from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
 from validation.cells import Slot
-from validation.plan import Request, slots
+from validation.judging.rows import Row
 from validation.posed import pinned, resolve
-from validation.rows import Row
+from validation.running.plan import Request, slots
 
 #: Most cells of a sweep: their plan takes half a gigabyte of memory, and their rows some ten.
 MOST_CELLS = 200_000

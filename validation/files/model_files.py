@@ -22,10 +22,11 @@ from adapters.model import PROFILE, Model, model_from_dict
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Sampling, Trajectory
-from validation import metrics, stated
+from validation import metrics
 from validation.bounds import ROUND_OFF
 from validation.canonical import Brought, CanonicalScene, Check, Measured, Parameter
-from validation.stated import Stated
+from validation.files import stated
+from validation.files.stated import Stated
 
 #: Longest time that a model is run [s]: contacts of every step are kept.
 LONGEST = 60.0

@@ -1,8 +1,8 @@
 """A scene that somebody states, in a file: what it is once its file has been read and checked.
 
 It has no closed form: its final places, angles, velocities and forces are shown without a truth, unless its author
-states a number for one; what must hold in any scene (`validation.invariants`) is judged. Nothing here reads files, so
-that a scene can be handed as plain data (`Stated.as_dict`) to where nothing is installed that checks them.
+states a number for one; what must hold in any scene (`validation.files.invariants`) is judged. Nothing here reads
+files, so that a scene can be handed as plain data (`Stated.as_dict`) to where nothing is installed that checks them.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from typing import Any
 
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
-from validation import invariants
 from validation.canonical import CanonicalScene, Check, Measured
-from validation.expressions import value_of
-from validation.quantities import force_window, quantity, shown_quantities, unit
+from validation.files import invariants
+from validation.files.expressions import value_of
+from validation.files.quantities import force_window, quantity, shown_quantities, unit
 
 
 @dataclass(frozen=True)
 class StatedCheck:
-    """A number that the author of a scene knows; see `validation.scene_format.CheckModel`.
+    """A number that the author of a scene knows; see `validation.files.scene_format.CheckModel`.
 
     A tolerance may be a formula in the step `dt`; ``names`` holds what else it may name.
     """

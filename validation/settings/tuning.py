@@ -23,9 +23,9 @@ from adapters.needs import needs
 from adapters.registry import load, profile_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Slot, settings_of
-from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
-from validation.switching import Reading, observe, readings, switched
+from validation.running.plan import QUICK_DT, has_iterations
+from validation.settings.switching import Reading, observe, readings, switched
 
 Cells = tuple[tuple[str, Mapping[str, float]], ...]
 #: Least gain of the summed decades of error over tolerance that counts: a tenth of a decade is a quarter of an error.

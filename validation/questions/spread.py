@@ -19,7 +19,7 @@ import numpy as np
 from adapters.registry import profile_of, solver
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import resolve
-from validation.tracks import Recording
+from validation.running.tracks import Recording
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from adapters.experiment import Experiment
 from validation.cells import Observation, Slot
-from validation.plan import QUICK_DT
+from validation.judging.studies import results_of, study_of
 from validation.posed import resolve
-from validation.studies import results_of, study_of
-from validation.switching import Reading, observe, reading, readings, switched
+from validation.running.plan import QUICK_DT
+from validation.settings.switching import Reading, observe, reading, readings, switched
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ from adapters.scene import Body, HalfSpace, Hull, Pair, Polygon, Scene, Shape
 from adapters.shapes import reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
-from validation.apart import Apart
 from validation.cells import Slot, settings_of
 from validation.posed import resolve
+from validation.running.apart import Apart
 
 #: Units in the last place by which starts are moved, up and down.
 MOVES = (1, 2, 4, 8, 16)

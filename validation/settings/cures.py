@@ -30,10 +30,10 @@ from validation.bench.lane import Lane
 from validation.bench.units import Unit
 from validation.canonical import Params
 from validation.cells import Outcome, Slot, prepare, settings_of
-from validation.decisive import changes_of
-from validation.plan import QUICK_DT, has_iterations
 from validation.posed import resolve
-from validation.switching import Reading, observe, readings, switched
+from validation.running.plan import QUICK_DT, has_iterations
+from validation.settings.decisive import changes_of
+from validation.settings.switching import Reading, observe, readings, switched
 
 #: Most cells that a search asks: beyond them the scene's representative, planted and searched ones stand for it.
 MOST_CELLS = 6

@@ -1,0 +1,1 @@
+"""What is kept: stores of runs with observations, recordings and times, which merge and age."""

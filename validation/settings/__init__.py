@@ -1,0 +1,1 @@
+"""What a setting does: switched alone, searched for, proven as a reason, decisive in a cure."""
