@@ -126,13 +126,13 @@ def curve(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array) -> float:
 
     Bodies are where the sub-step began afterwards, with the velocities of its end.
     """
-    keep(tally, sub.tally[2])
-    go_back(tally, sub.tally[1])
+    keep(tally, sub.saved)
+    go_back(tally, sub.struck)
     copy_vectors(sub.start, bodies.twist)
     length, outcome = phase.find_phase(bodies, sub.lasting, sub.clock[LEFT])
     sub.clock[OUTCOME] = outcome
     if outcome == phase.FAILED:
-        keep(sub.tally[2], tally)
+        keep(sub.saved, tally)
         restore(bodies, sub)
         return 0.0
     for c in range(rows.counts[CONTACTS]):

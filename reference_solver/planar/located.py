@@ -1,119 +1,190 @@
-"""The step that is cut where bodies meet and where slides end, and the loop over such steps (E19 to E27).
-
-sub-step:  detect -> keep what touches -> impacts -> force phase up to the first end of a slide -> next impact -> move
-
-What is left of the step after a cut is the next sub-step. A step without events is one sub-step.
-"""
+"""What a located step asks of the plane (`stepping.operations`), from the instant an island is gathered to its end."""
 
 from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel, spliced_kernel
-from reference_solver.direct.problem import Problem
-from reference_solver.journal import keep_state
-from reference_solver.model import Array
+from reference_solver.compilation import inner_kernel
+from reference_solver.direct.problem import problem_part
+from reference_solver.journal import journal_part
+from reference_solver.planar import curve, flight, impact, jam, midpoint, press, rocking, slide, time_of_impact
 from reference_solver.planar.block import prepare_blocks
+from reference_solver.planar.broadphase import pair_bodies
 from reference_solver.planar.certificate import certify, open_solve
+from reference_solver.planar.certificate import is_finite as twists_are_finite
 from reference_solver.planar.columns import (
+    BODY_INTEGERS,
+    BODY_REALS,
+    COS,
+    EXTENT,
     FORCE_N,
     FORCE_T,
     LOAD,
     MOTION,
     PN,
     PT,
+    REACH,
     RELEASE,
+    SIN,
 )
-from reference_solver.planar.curve import curve, enter_curve, follow_curve, turns
-from reference_solver.planar.entries import enter_release, enter_settled, enter_sub_step
-from reference_solver.planar.flight import begin_flight, move_along
-from reference_solver.planar.impact import collide_now, end_series, keep_loaded, keep_touching, release
+from reference_solver.planar.entries import enter_release, enter_sub_step
+from reference_solver.planar.entries import enter_settled as enter_settled_piece
 from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.jam import weigh_clusters
 from reference_solver.planar.kinematics import copy_vectors
-from reference_solver.planar.ledger import enter_contacts
-from reference_solver.planar.manifolds import detect, row_key
-from reference_solver.planar.midpoint import (
-    close_gaps,
-    deepest,
-    keep_change,
-    levers_of_start,
-    misses_end,
-    take_back,
-)
+from reference_solver.planar.ledger import copy_ledger, enter_contacts
+from reference_solver.planar.manifolds import detect, keep_remembered, pass_on, row_key
+from reference_solver.planar.meeting import Meeting
 from reference_solver.planar.position import correct_positions
-from reference_solver.planar.press import cut_work
-from reference_solver.planar.rocking import rest
 from reference_solver.planar.rows import warm_start
-from reference_solver.planar.slide import press_until_stick
-from reference_solver.planar.state import CONTACTS, FREE, REMEMBERED, Bodies, Ledger, Pairs, Rows, SubStep
-from reference_solver.planar.step import move
-from reference_solver.planar.time_of_impact import next_impact
-from reference_solver.stepping.accounting import go_back, keep
-from reference_solver.stepping.clock import (
-    BRIEF,
-    CONFINED,
-    CRAWL,
-    ESCAPED,
-    HASTE,
-    HELD,
-    JAMMED,
-    LEFT,
-    MOST_SOFT,
-    OUTCOME,
-    REBOUND,
-    ROCKING,
-    ROCKS,
-    SERIES,
-    UNSETTLED,
-    UNTIL_REST,
-    count_event,
-    end_instant,
-    end_settling,
-    give_up_phase,
-    open_step,
-    open_sub_step,
-    weigh_event,
+from reference_solver.planar.state import (
+    CANDIDATES,
+    CONTACTS,
+    FIXED,
+    FREE,
+    KEPT,
+    REMEMBERED,
+    Bodies,
+    Buffer,
+    Island,
+    Pairs,
+    Rows,
+    SubStep,
+    World,
 )
-from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
-from reference_solver.stepping.midpoint import CLOSINGS, PUSHED_INTO
-from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
-from reference_solver.stepping.options import BLOCK, Options
-from reference_solver.stepping.phase import SHORTENED
-from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
-
-
-@spliced_kernel
-def located_step(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """One step of an island; False if an array is too small, with the step unfinished."""
-    open_step(sub.clock, len(bodies.kind), options.dt, MOST_SOFT)
-    while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
-        if sub.clock[UNSETTLED] > 0.0:
-            if not settle(bodies, pairs, rows, problem, sub, ledger, options, tally):
-                return False
-        elif not sub_step(bodies, pairs, rows, problem, sub, ledger, options, tally):
-            return False
-        if sub.clock[ESCAPED] > 0.0:
-            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
-            return True
-        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
-            end_run(bodies)
-            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
-    return True
+from reference_solver.planar.step import move
+from reference_solver.stepping import operations
+from reference_solver.stepping.clock import HELD, JAMMED, MOST_SOFT, ROCKING, SERIES, UNSETTLED
+from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.lasting import BODIES
+from reference_solver.stepping.noise import SHORT
+from reference_solver.stepping.options import BLOCK
+from reference_solver.stepping.paths import Paths
+from reference_solver.stepping.phase import NO_PHASE
 
 
 @inner_kernel
-def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
-    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+def is_free(island: Island, i: int) -> bool:
+    """Whether forces move body i."""
+    return bool(island.bodies.kind[i, MOTION] == FREE)
+
+
+@inner_kernel
+def patience(island: Island) -> int:
+    """Soft events of a step in the plane, where they cost little."""
+    return MOST_SOFT
+
+
+@inner_kernel
+def find_touching(island: Island) -> bool:
+    """All rows first, as clusters are weighed by what is near: `begin_solve` keeps those that touch."""
+    return bool(detect(island.bodies, island.pairs, island.rows, island.options)) and has_room(island)
+
+
+@inner_kernel
+def has_room(island: Island) -> bool:
+    """Whether the ledger can take all rows."""
+    return island.ledger.used[0] + island.rows.counts[CONTACTS] <= len(island.ledger.real)
+
+
+@inner_kernel
+def weigh_clusters(island: Island) -> None:
+    """Of the rows that are near."""
+    jam.weigh_clusters(island.bodies, island.rows, island.sub, island.options, island.tally)
+
+
+@inner_kernel
+def begin_solve(island: Island) -> None:
+    """Rows that touch, their blocks, and the velocities of the start."""
+    impact.keep_touching(island.bodies, island.pairs, island.rows, island.sub, island.options.dt)
+    if island.options.solver == BLOCK:
+        prepare_blocks(island.bodies, island.rows)
+    copy_vectors(island.bodies.twist, island.sub.before)
+
+
+@inner_kernel
+def levers_of_start(island: Island) -> None:
+    """Rows before they were turned to mid-drift."""
+    midpoint.levers_of_start(island.bodies, island.rows, island.options)
+
+
+@inner_kernel
+def collide_now(island: Island) -> int:
+    """Impacts, from ``sub.before`` to ``sub.start``."""
+    return int(impact.collide_now(island.bodies, island.rows, island.problem, island.sub, island.options, island.tally))
+
+
+@inner_kernel
+def press_until_stick(island: Island, most: float, struck: bool) -> float:
+    """From ``sub.start`` to ``bodies.twist``; rows tell by themselves whether impacts came first."""
+    return float(
+        slide.press_until_stick(
+            island.bodies, island.rows, island.problem, island.sub, island.options, island.tally, most
+        )
+    )
+
+
+@inner_kernel
+def press_for(island: Island, length: float, struck: bool) -> float:
+    """One solve: no slide's end is looked for."""
+    press.press(island.bodies, island.rows, island.problem, island.sub, island.options, island.tally, length)
+    return length
+
+
+@inner_kernel
+def end_series(island: Island, length: float) -> bool:
+    """Rows that are hit again and again."""
+    return bool(impact.end_series(island.bodies, island.rows, island.sub, island.options, length))
+
+
+@inner_kernel
+def end_rocking(island: Island, length: float) -> tuple[float, float]:
+    """Manifolds of two points, hit in turn."""
+    longest, shortest = rocking.end_rocking(island.bodies, island.rows, island.sub, length)
+    return longest, shortest
+
+
+@inner_kernel
+def hop_time(island: Island) -> float:
+    """Uses up the first contact noted."""
+    return float(rocking.hop_time(island.bodies, island.rows, island.sub))
+
+
+@inner_kernel
+def end_solve(island: Island) -> None:
+    """``bodies.twist`` are the velocities of the end."""
+
+
+@inner_kernel
+def enter_path(island: Island, length: float) -> float:
+    """The frozen path, or that of a phase where rows turn along it."""
+    bodies, rows, sub = island.bodies, island.rows, island.sub
+    flight.begin_flight(bodies, rows, sub, length)
+    if sub.clock[HELD] > 0.0 or sub.clock[SERIES] > 0.0 or not curve.turns(bodies, rows, sub, length):
+        return 0.0
+    if sub.clock[ROCKING] > 0.0 or sub.clock[JAMMED] > 0.0:
+        return NO_PHASE
+    curved = curve.curve(bodies, rows, sub, island.tally)
+    return curved if curved > 0.0 else NO_PHASE
+
+
+@inner_kernel
+def return_to_start(island: Island) -> None:
+    """Poses have not changed yet."""
+    copy_vectors(island.sub.before, island.bodies.twist)
+
+
+@inner_kernel
+def next_impact(island: Island, length: float) -> float:
+    """On the paths of ``sub.path``."""
+    return float(
+        time_of_impact.next_impact(island.bodies, island.pairs, island.rows, island.sub, island.options, length)
+    )
+
+
+@inner_kernel
+def leaves_bounds(island: Island, end: float) -> bool:
+    """By the sum of all terms of the path."""
+    bodies, sub = island.bodies, island.sub
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] != FREE:
             continue
@@ -126,178 +197,25 @@ def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
 
 
 @inner_kernel
-def end_run(bodies: Bodies) -> None:
-    """Leave no state that could be taken for an answer."""
-    for i in range(len(bodies.kind)):
-        if bodies.kind[i, MOTION] == FREE:
-            for k in range(3):
-                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
-
-
-@spliced_kernel
-def sub_step(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
-    left = sub.clock[LEFT]
-    if not detect(bodies, pairs, rows, options):
-        return False
-    if sub.clock[LEFT] == options.dt and sub.clock[HELD] == 0.0:
-        weigh_clusters(bodies, rows, sub, options, tally)
-    keep_touching(bodies, pairs, rows, sub, options.dt)
-    if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
-        return False
-    if options.solver == BLOCK:
-        prepare_blocks(bodies, rows)
-    copy_vectors(bodies.twist, sub.before)
-    length = solve_sub_step(bodies, rows, problem, sub, options, tally)
-    if tally[CONTRADICTED_A] > 0.0:
-        return True
-    begin_flight(bodies, rows, sub, length)
-    curved = 0.0
-    if sub.clock[HELD] == 0.0 and sub.clock[SERIES] == 0.0 and turns(bodies, rows, sub, length):
-        if sub.clock[ROCKING] > 0.0:
-            sub.clock[ROCKS] = UNTIL_REST
-        elif sub.clock[JAMMED] == 0.0:
-            curved = curve(bodies, rows, sub, tally)
-        if curved == 0.0:
-            if sub.clock[ROCKING] == 0.0:
-                give_up_phase(sub.clock, tally)
-            go_back(tally, sub.tally[0])
-            copy_vectors(sub.before, bodies.twist)
-            return True
-    length = curved if curved > 0.0 else length
-    end = next_impact(bodies, pairs, rows, sub, options, length)
-    if end < 0.0:
-        copy_vectors(sub.before, bodies.twist)
-        return False
-    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
-        sub.clock[ESCAPED] = 1.0
-        return True
-    if curved > 0.0:
-        end = follow_curve(bodies, pairs, rows, sub, options, length, end)
-        enter_curve(bodies, rows, sub, tally)
+def follow_path(island: Island, length: float, end: float, curved: bool) -> float:
+    """A phase that an impact cuts is made again up to there; a frozen sub-step is cut."""
+    bodies, rows, sub, options, tally = island.bodies, island.rows, island.sub, island.options, island.tally
+    if curved:
+        end = curve.follow_curve(bodies, island.pairs, rows, sub, options, length, end)
+        curve.enter_curve(bodies, rows, sub, tally)
         length = end
-    elif rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
-        move_along(bodies, sub, end, end == length)
-        move(bodies, bodies.pseudo, options.dt)
     else:
-        move_along(bodies, sub, end, end == length)
+        pushed = rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally)
+        flight.move_along(bodies, sub, end, end == length)
+        if pushed:
+            move(bodies, bodies.pseudo, options.dt)
     remember_forces(bodies, rows, length, options.dt)
     if end < length:
-        cut_work(bodies, rows, sub, tally, end, end / length)
+        press.cut_work(bodies, rows, sub, tally, end, end / length)
     sub.clock[UNSETTLED] = end if sub.clock[HELD] > 0.0 and rows.counts[CONTACTS] > 0 else 0.0
-    enter_contacts(bodies, rows, ledger)
-    enter_sub_step(bodies, rows, sub, options, end, curved > 0.0)
-    if options.restitution and release(bodies, rows, problem, options, tally):
-        enter_contacts(bodies, rows, ledger)
-        enter_release(bodies, rows, sub, options, end)
-    haste, shortened = end < SHORT * options.dt, curved == end and sub.clock[OUTCOME] == SHORTENED
-    if sub.clock[BRIEF] > 0.0:
-        end_instant(sub.clock, tally, *gained_speed(bodies, sub, end))
-    if end < left and (haste or not shortened):
-        count_event(sub.clock, tally, (CRAWL if shortened else HASTE) if haste else 1.0)
-    sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
-    return True
-
-
-@inner_kernel
-def gained_speed(bodies: Bodies, sub: SubStep, length: float) -> tuple[float, float]:
-    """Largest change of a velocity in a sub-step, and what loads do in it, over free bodies [m/s]."""
-    gained, loaded = 0.0, 0.0
-    for i in range(len(bodies.kind)):
-        for k in range(2):
-            if bodies.kind[i, MOTION] == FREE:
-                gained = max(gained, abs(bodies.twist[i, k] - sub.start[i, k]))
-                loaded = max(loaded, length * abs(bodies.real[i, LOAD + k]))
-    return gained, loaded
-
-
-@inner_kernel
-def settle(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """Take out what the impulse-level scheme leaves of the gaps and velocities of contacts that it held (E28).
-
-    Gaps first: velocities are those that the closed contacts allow. Their impulses are found anew with the rows of the
-    end, by a solve that starts from them: what was too much is taken back. Otherwise it would be an impact in the
-    sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
-    anew.
-    """
-    if not detect(bodies, pairs, rows, options):
-        return False
-    if not keep_loaded(bodies, pairs, rows):
-        end_settling(sub.clock)
-        return True
-    if ledger.used[0] + rows.counts[CONTACTS] > len(ledger.real):
-        return False
-    if options.solver == BLOCK:
-        prepare_blocks(bodies, rows)
-    keep_state(sub.journal, bodies.pose, bodies.twist)
-    moved = close_gaps(bodies, rows, sub, options)
-    if moved:
-        for k in range(CLOSINGS):
-            if not detect(bodies, pairs, rows, options):
-                return False
-            keep_loaded(bodies, pairs, rows)
-            if options.solver == BLOCK:
-                prepare_blocks(bodies, rows)
-            if k == CLOSINGS - 1 or deepest(bodies, rows) <= PUSHED_INTO:
-                break
-            close_gaps(bodies, rows, sub, options)
-    time = sub.clock[UNSETTLED]
-    misses = misses_end(bodies, rows, options, time)
-    if misses:
-        take_back(bodies, rows, options, tally)
-        open_solve(bodies, 0.0, tally)
-        warm_start(bodies, rows, options)
-        solve_velocities(bodies, rows, problem, options, tally)
-        certify(bodies, rows, options, tally)
-        keep_change(rows, time)
-        enter_contacts(bodies, rows, ledger)
-    if moved or misses:
-        enter_settled(bodies, rows, sub, options)
-    end_settling(sub.clock)
-    return True
-
-
-@spliced_kernel
-def solve_sub_step(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> float:
-    """Impacts and force phase; return the length of the sub-step, `bodies.twist` being the velocities at its end."""
-    left = sub.clock[LEFT]
-    length, found = left, NO_IMPACT
-    sub.clock[ROCKING] = 0.0
-    open_sub_step(sub.clock, options.dt)
-    keep(tally, sub.tally[0])
-    for k in range(SERIES_PASSES):
-        if k > 0:
-            go_back(tally, sub.tally[0])
-            if sub.clock[HELD] > 0.0:
-                levers_of_start(bodies, rows, options)
-        found = collide_now(bodies, rows, problem, sub, options, tally)
-        most = min(left, sub.clock[SERIES]) if sub.clock[SERIES] > 0.0 else left
-        length = press_until_stick(bodies, rows, problem, sub, options, tally, most)
-        if not (found >= LANDED and options.restitution and end_series(bodies, rows, sub, options, length)):
-            break
-    if sub.clock[HELD] == 0.0:
-        length = rest(bodies, rows, problem, sub, options, tally, length)
-    if found >= REBOUNDED:
-        weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
-    return length
+    enter_contacts(bodies, rows, island.ledger)
+    enter_sub_step(bodies, rows, sub, options, end, curved)
+    return end
 
 
 @inner_kernel
@@ -317,3 +235,246 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
             rows.old_impulse[c, 0] = lasts * rows.real[c, PN] / max(length, SHORT * dt)
             rows.old_impulse[c, 1] = lasts * rows.real[c, PT] / max(length, SHORT * dt)
     rows.counts[REMEMBERED] = rows.counts[CONTACTS]
+
+
+@inner_kernel
+def release(island: Island, length: float) -> None:
+    """All rows that were held, together."""
+    bodies, rows = island.bodies, island.rows
+    if impact.release(bodies, rows, island.problem, island.options, island.tally):
+        enter_contacts(bodies, rows, island.ledger)
+        enter_release(bodies, rows, island.sub, island.options, length)
+
+
+@inner_kernel
+def gained_speed(island: Island, length: float) -> tuple[float, float]:
+    """Of both components of each velocity."""
+    bodies, gained, loaded = island.bodies, 0.0, 0.0
+    for i in range(len(bodies.kind)):
+        for k in range(2):
+            if bodies.kind[i, MOTION] == FREE:
+                gained = max(gained, abs(bodies.twist[i, k] - island.sub.start[i, k]))
+                loaded = max(loaded, length * abs(bodies.real[i, LOAD + k]))
+    return gained, loaded
+
+
+@inner_kernel
+def price_of_creeping(island: Island) -> float:
+    """Phases of the plane cost little, however many their contacts."""
+    return 1.0
+
+
+@inner_kernel
+def find_loaded(island: Island) -> int:
+    """Rows of the end, with the forces that they carried."""
+    if not detect(island.bodies, island.pairs, island.rows, island.options):
+        return -1
+    if not impact.keep_loaded(island.bodies, island.pairs, island.rows):
+        return 0
+    if island.options.solver == BLOCK:
+        prepare_blocks(island.bodies, island.rows)
+    return int(island.rows.counts[CONTACTS]) if has_room(island) else -1
+
+
+@inner_kernel
+def close_gaps(island: Island) -> bool:
+    """By displacements of all rows."""
+    return bool(midpoint.close_gaps(island.bodies, island.rows, island.sub, island.options))
+
+
+@inner_kernel
+def deepest_overlap(island: Island) -> float:
+    """Of all rows."""
+    return float(midpoint.deepest(island.bodies, island.rows))
+
+
+@inner_kernel
+def misses_end(island: Island, time: float) -> bool:
+    """Of all rows."""
+    return bool(midpoint.misses_end(island.bodies, island.rows, island.options, time))
+
+
+@inner_kernel
+def solve_end(island: Island, time: float) -> None:
+    """Starts from the impulses of the sub-step."""
+    bodies, rows, options, tally = island.bodies, island.rows, island.options, island.tally
+    midpoint.take_back(bodies, rows, options, tally)
+    open_solve(bodies, 0.0, tally)
+    warm_start(bodies, rows, options)
+    solve_velocities(bodies, rows, island.problem, options, tally)
+    certify(bodies, rows, options, tally)
+    midpoint.keep_change(rows, time)
+    enter_contacts(bodies, rows, island.ledger)
+
+
+@inner_kernel
+def enter_settled(island: Island) -> None:
+    """As a piece of no length."""
+    enter_settled_piece(island.bodies, island.rows, island.sub, island.options)
+
+
+@inner_kernel
+def is_finite(whole: Island) -> bool:
+    """Of all bodies."""
+    return bool(twists_are_finite(whole.bodies))
+
+
+@inner_kernel
+def find_islands(whole: Island, world: World, room: float) -> bool:
+    """By bounding boxes of all that a body may sweep."""
+    bodies, options, limit, bounds = whole.bodies, whole.options, world.islands.limit, whole.pairs.bounds
+    for i in range(len(bodies.kind)):
+        reach = bodies.real[i, REACH] + options.margin * bodies.real[i, EXTENT]
+        for k in range(2):
+            way = abs(bodies.twist[i, k]) * options.dt
+            if bodies.kind[i, MOTION] == FREE:
+                way += 0.5 * options.dt * options.dt * abs(bodies.real[i, LOAD + k])
+                way = room * way + options.margin * bodies.real[i, EXTENT]
+            way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
+            limit[i, k], limit[i, 2 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
+            bounds[i, k], bounds[i, 2 + k] = limit[i, k] - reach, limit[i, 2 + k] + reach
+    if not pair_bodies(bodies, whole.pairs, whole.rows, options):
+        return False
+    join_candidates(whole, world.islands, whole.pairs.candidate, whole.rows.counts[CANDIDATES])
+    return True
+
+
+@inner_kernel
+def begin_islands(whole: Island) -> None:
+    """Counts of what is kept and entered."""
+    whole.rows.counts[KEPT] = whole.ledger.used[0] = 0
+
+
+@inner_kernel
+def gather(whole: Island, world: World, count: int) -> Island:
+    """Bodies in order of their place, and their bounds."""
+    bodies, local, islands = whole.bodies, world.bodies, world.islands
+    for k in range(count):
+        i = islands.member[k]
+        for d in range(3):
+            local.pose[k, d], local.twist[k, d] = bodies.pose[i, d], bodies.twist[i, d]
+        for d in range(BODY_REALS):
+            local.real[k, d] = bodies.real[i, d]
+        for d in range(BODY_INTEGERS):
+            local.kind[k, d] = bodies.kind[i, d]
+        for d in range(4):
+            world.limit[k, d] = islands.limit[i, d]
+        world.order[k] = k
+    whole.sub.lasting.size[BODIES] = count
+    whole.rows.counts[REMEMBERED] = 0
+    laws = whole.pairs
+    pairs = Pairs(laws.restitution, laws.friction, laws.bounds[:count], world.order[:count], laws.candidate)
+    return Island(
+        bodies_part(local, count),
+        pairs,
+        whole.rows,
+        problem_part(whole.problem, count),
+        sub_part(whole.sub, world, count),
+        whole.ledger,
+        whole.options,
+        whole.tally,
+    )
+
+
+@inner_kernel
+def bodies_part(local: Bodies, count: int) -> Bodies:
+    """The first bodies."""
+    return Bodies(
+        local.pose[:count],
+        local.twist[:count],
+        local.pseudo[:count],
+        local.real[:count],
+        local.kind[:count],
+        local.vertex,
+        local.start[:count],
+        local.pressed[:count],
+    )
+
+
+@inner_kernel
+def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
+    """The sub-step of the first bodies."""
+    paths, meeting = sub.meeting.paths, sub.meeting
+    some = Paths(paths.begin[:count], paths.end[:count], paths.pose[:count], paths.coefficient[:count])
+    pair = Meeting(
+        bodies_part(world.bodies, count),
+        some,
+        meeting.trial,
+        meeting.kind,
+        meeting.size,
+        meeting.offset,
+        meeting.vector,
+        meeting.corner,
+        meeting.watched,
+    )
+    return SubStep(
+        sub.clock,
+        sub.before[:count],
+        sub.start[:count],
+        sub.after[:count],
+        sub.gain[:count],
+        sub.path[:count],
+        sub.pose[:count],
+        sub.turn[:count],
+        sub.final[:count],
+        sub.opened,
+        sub.struck,
+        sub.saved,
+        sub.closing[:count],
+        sub.probe,
+        sub.lasting,
+        pair,
+        world.limit[:count],
+        journal_part(sub.journal, count),
+    )
+
+
+@inner_kernel
+def keep_memory(island: Island, world: World) -> bool:
+    """In order of the keys of all rows."""
+    rows = island.rows
+    if rows.counts[KEPT] + rows.counts[REMEMBERED] > len(rows.kept_key):
+        rows.counts[CANDIDATES] = 0  # it is rows that there are too few of
+        return False
+    keep_remembered(rows)
+    return True
+
+
+@inner_kernel
+def keep_end(island: Island, world: World) -> None:
+    """Poses and velocities."""
+    for k in range(len(island.bodies.pose)):
+        i = world.islands.member[k]
+        for d in range(3):
+            world.islands.pose[i, d], world.islands.twist[i, d] = island.bodies.pose[k, d], island.bodies.twist[k, d]
+
+
+@inner_kernel
+def end_islands(whole: Island, world: World) -> None:
+    """What forces do not move goes on with its velocity."""
+    bodies, islands = whole.bodies, world.islands
+    pass_on(whole.rows)
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FIXED:
+            continue
+        for d in range(3):
+            if bodies.kind[i, MOTION] == FREE:
+                bodies.pose[i, d], bodies.twist[i, d] = islands.pose[i, d], islands.twist[i, d]
+            else:
+                bodies.pose[i, d] += whole.options.dt * bodies.twist[i, d]
+        bodies.real[i, COS], bodies.real[i, SIN] = math.cos(bodies.pose[i, 2]), math.sin(bodies.pose[i, 2])
+
+
+@inner_kernel
+def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
+    """Contacts are those of the ledger."""
+    copy_vectors(whole.bodies.pose, buffer.pose[s])
+    copy_vectors(whole.bodies.twist, buffer.twist[s])
+    start = buffer.offset[s]
+    buffer.offset[s + 1] = start
+    if len(buffer.real) > 0:
+        buffer.offset[s + 1] = start + whole.ledger.used[0]
+        copy_ledger(whole.ledger, buffer, start)
+
+
+operations.provide_all(Island, globals())

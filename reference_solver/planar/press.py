@@ -103,7 +103,7 @@ def press(
 def cut_work(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array, end: float, share: float) -> None:
     """Impulses times ``share``, and work in the tally, of a sub-step up to ``end`` with the present velocities."""
     for entry in range(CONTACT_WORK, LOAD_WORK + 1):
-        tally[entry] = sub.tally[1, entry]
+        tally[entry] = sub.struck[entry]
     for i in range(len(bodies.kind)):
         for k in range(3):
             bodies.start[i, k] = sub.start[i, k] + end * bodies.real[i, LOAD + k]

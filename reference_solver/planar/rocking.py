@@ -4,32 +4,17 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel, spliced_kernel
-from reference_solver.direct.problem import Problem
-from reference_solver.model import Array
+from reference_solver.compilation import inner_kernel
 from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
 from reference_solver.planar.impact import flies, gap_noise, row_turn
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import free_accelerations
-from reference_solver.planar.press import press, row_gain
+from reference_solver.planar.press import row_gain
 from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
-from reference_solver.stepping.accounting import go_back
-from reference_solver.stepping.clock import (
-    HELD,
-    HOPPED,
-    LEFT,
-    REBOUND,
-    ROCKING,
-    ROCKS,
-    SERIES,
-    hold_hops,
-    is_patient,
-    weigh_event,
-)
+from reference_solver.stepping.clock import LEFT, is_patient
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.impacts import BOUNCES, HOPS, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
-from reference_solver.stepping.noise import FROZEN, NOISE, SHORT
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.noise import FROZEN, NOISE
 
 
 @inner_kernel
@@ -98,28 +83,3 @@ def end_rocking(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> tupl
                 continue
             rows.integer[other, ENDING] = SERIES_ENDS
     return longest, shortest
-
-
-@spliced_kernel
-def rest(
-    bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array, length: float
-) -> float:
-    """Hold contacts of bodies that rock to rest (E22), until they do, or hop by mere noise; length of the sub-step."""
-    left = sub.clock[LEFT]
-    longest, shortest = end_rocking(bodies, rows, sub, length)
-    if shortest < left:
-        weigh_event(sub.clock, REBOUND)
-    if longest == 0.0:
-        if sub.clock[SERIES] == 0.0:
-            hold_hops(sub.clock, hop_time(bodies, rows, sub))
-        if sub.clock[HOPPED] > 0.0:
-            go_back(tally, sub.tally[1])
-            length = sub.clock[SERIES]
-            press(bodies, rows, problem, sub, options, tally, length)
-        return length
-    go_back(tally, sub.tally[1])
-    sub.clock[HELD] = sub.clock[ROCKS]  # if rows turn the impulse-level scheme does it
-    sub.clock[ROCKS], sub.clock[ROCKING] = 0.0, 1.0
-    length = min(max(longest, SHORT * options.dt), left)
-    press(bodies, rows, problem, sub, options, tally, length)
-    return length

@@ -14,7 +14,7 @@ from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import tangent_velocity
 from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, Bodies, Rows, SubStep
-from reference_solver.stepping.accounting import go_back, keep
+from reference_solver.stepping.accounting import go_back
 from reference_solver.stepping.clock import BRIEF, HELD, SERIES
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
@@ -59,7 +59,6 @@ def press_until_stick(
 
     Where rows turn the frozen solve is not what counts, and the first one is enough.
     """
-    keep(tally, sub.tally[1])
     press(bodies, rows, problem, sub, options, tally, left)
     if not options.friction or sub.clock[HELD] > 0.0 or sub.clock[BRIEF] > 0.0:
         return left
@@ -77,6 +76,6 @@ def press_until_stick(
         slipped = max(slipped, length) if end > length else slipped
         # What a row that stuck tells of its end ignores its neighbours; what one that slips tells is exact.
         length = end if end > length else SHORTER * end
-        go_back(tally, sub.tally[1])
+        go_back(tally, sub.struck)
         press(bodies, rows, problem, sub, options, tally, length)
     return length

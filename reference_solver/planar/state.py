@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_solver.direct.problem import Problem
 from reference_solver.model import (
     Array,
     Body,
@@ -50,6 +51,7 @@ from reference_solver.shapes import MOST_VERTICES
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.tally import SIZE as TALLY_SIZE
 
@@ -122,13 +124,36 @@ class SubStep(NamedTuple):
     pose: Array  # (n, 3): poses at its start
     turn: Array  # (n, 2): cosine and sine of the angle there
     final: Array  # (n, 3): poses at its end where rows turn
-    tally: Array  # (3, SIZE): tallies to go back to where a solve is made again
+    opened: Array  # (SIZE,): the tally before the sub-step
+    struck: Array  # (SIZE,): the tally after its impacts
+    saved: Array  # (SIZE,): the tally after its frozen solve
     closing: Indices  # (n,): 1 where the position follows the velocity at the end, not the mean (E24)
     probe: Rows  # room for the contacts of one pair at another time
     lasting: Lasting
     meeting: Any  # `Meeting`: paths of all bodies, and room for one pair on them
     limit: Array  # (n, 4): lower and upper bounds of the centres, where they are confined [m]
     journal: Journal
+
+
+class Ledger(NamedTuple):
+    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
+
+    used: Indices  # (1,): number of contacts
+    integer: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
+
+
+class Island(NamedTuple):
+    """Bodies that can meet within a step, or all of them, and what their step works on."""
+
+    bodies: Bodies
+    pairs: Pairs
+    rows: Rows
+    problem: Problem
+    sub: SubStep
+    ledger: Ledger
+    options: Options
+    tally: Array  # (SIZE,)
 
 
 class World(NamedTuple):
@@ -139,14 +164,6 @@ class World(NamedTuple):
     limit: Array  # (n, 4): see `SubStep`
     order: Indices  # (n,): see `Pairs`
     tally: Array  # (SIZE,): to go back to where a step is made again
-
-
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    used: Indices  # (1,): number of contacts
-    integer: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 
 
 class Buffer(NamedTuple):
@@ -257,7 +274,9 @@ def allocate_sub_step(n: int, contacts: int, meeting: Any) -> SubStep:
         pose=np.zeros((n, 3)),
         turn=np.zeros((n, 2)),
         final=np.zeros((n, 3)),
-        tally=np.zeros((3, TALLY_SIZE)),
+        opened=np.zeros(TALLY_SIZE),
+        struck=np.zeros(TALLY_SIZE),
+        saved=np.zeros(TALLY_SIZE),
         closing=np.zeros(n, np.int64),
         probe=allocate_rows(4),
         lasting=allocate_lasting(2, n, contacts),

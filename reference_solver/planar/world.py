@@ -14,11 +14,11 @@ from reference_solver.pieces import allocate_journal
 from reference_solver.planar.ledger import copy_ledger
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
-from reference_solver.planar.run import run_located
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
     Buffer,
+    Island,
     allocate_bodies,
     allocate_ledger,
     allocate_pairs,
@@ -33,6 +33,7 @@ from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.stepping.lasting import allocate_lasting
 from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
+from reference_solver.stepping.run import run_located
 from reference_solver.tally import new_tally
 
 
@@ -113,8 +114,8 @@ class World:
         state = (self._bodies, self._pairs, self._rows, self._problem)
         if self._options.scheme != FIXED_STEP:
             sub = self._sub._replace(journal=self.journal)
-            own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
-            return int(run_located(*(*state, sub, *own)))
+            whole = Island(*state, sub, self._ledger, self._options, self.tally)
+            return int(run_located(whole, self._world, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def _most_contacts(self) -> int:

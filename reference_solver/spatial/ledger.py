@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.model import Array
-from reference_solver.spatial.state import Bodies, Ledger, Manifolds
+from reference_solver.spatial.state import Bodies, Buffer, Ledger, Manifolds
 from reference_solver.spatial.vector import Vector, row, times_transposed
 
 
@@ -70,3 +70,14 @@ def insert(name: tuple[int, int, int], manifolds: Manifolds, m: int, p: int, led
         ledger.real[k, 6 + d] = 0.0
     ledger.real[k, 9] = manifolds.gap[m, p]
     ledger.filled[0] += 1
+
+
+@kernel
+def copy_ledger(ledger: Ledger, buffer: Buffer, start: int) -> int:
+    """Write the contacts of the last step from index ``start`` on; return how many."""
+    for c in range(ledger.filled[0]):
+        for d in range(3):
+            buffer.names[start + c, d] = ledger.names[c, d]
+        for d in range(10):
+            buffer.real[start + c, d] = ledger.real[c, d]
+    return ledger.filled[0]

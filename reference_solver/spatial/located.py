@@ -1,342 +1,255 @@
-"""The step that is cut where bodies meet and where slides end, and the loop over such steps (E19 to E27, E30 to E34).
-
-sub-step:  detect what touches -> impacts -> force phase up to the first end of a slide -> next impact -> move
-
-What is left of the step after a cut is the next sub-step. A step without events is one sub-step.
-"""
+"""What a located step asks of space (`stepping.operations`), from the instant an island is gathered to its end."""
 
 from __future__ import annotations
 
 import math
 
 from reference_solver.compilation import inner_kernel, spliced_kernel
-from reference_solver.direct.problem import Problem
-from reference_solver.journal import keep_state
+from reference_solver.direct.problem import problem_part
+from reference_solver.journal import journal_part, keep_state
 from reference_solver.model import Array
+from reference_solver.spatial import flight, impact, jam, midpoint, phase, slide, time_of_impact
+from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
 from reference_solver.spatial.certificate import certify, open_solve, point_work
-from reference_solver.spatial.entries import enter_release, enter_settled, enter_sub_step
-from reference_solver.spatial.flight import begin_flight, curvature, move_along, undo
-from reference_solver.spatial.impact import carries, collide_now, copy_twists, end_series, release
+from reference_solver.spatial.entries import enter_release, enter_sub_step
+from reference_solver.spatial.entries import enter_settled as enter_settled_piece
 from reference_solver.spatial.iteration import solve_velocities
-from reference_solver.spatial.jam import weigh_clusters
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
-from reference_solver.spatial.ledger import enter_contacts, enter_impulses
-from reference_solver.spatial.manifolds import pair_key
-from reference_solver.spatial.midpoint import (
-    close_gaps,
-    deepest,
-    exchange_levers,
-    keep_change,
-    levers_of_start,
-    misses_end,
-    press_at_mid_drift,
-    take_back,
-)
+from reference_solver.spatial.ledger import copy_ledger, enter_contacts, enter_impulses
+from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
+from reference_solver.spatial.meeting import Meeting
 from reference_solver.spatial.motion import accelerate, displace
-from reference_solver.spatial.phase import NO_PHASE, cut_phase, end_phase, enter_phase, part_points
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import warm_start
-from reference_solver.spatial.slide import certify_press, hop_time, press_until_stick
+from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import (
+    CANDIDATES,
+    FIXED,
     FREE,
+    HALF_SPACE,
+    KEPT,
+    MANIFOLDS,
     POINTS,
     REMEMBERED,
     Bodies,
+    Buffer,
     Detection,
-    Ledger,
+    Island,
     Manifolds,
-    Memory,
     SubStep,
+    World,
 )
+from reference_solver.spatial.step import sample_state
 from reference_solver.spatial.sticking import prepare_wrenches
-from reference_solver.spatial.time_of_impact import next_impact
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
-from reference_solver.stepping.accounting import go_back, keep
-from reference_solver.stepping.clock import (
-    BRIEF,
-    CONFINED,
-    CRAWL,
-    ESCAPED,
-    EVENTS,
-    HASTE,
-    HELD,
-    HOPPED,
-    JAMMED,
-    LEFT,
-    MOST_SOFT_IN_SPACE,
-    OUTCOME,
-    REBOUND,
-    SERIES,
-    UNSETTLED,
-    count_event,
-    end_instant,
-    end_settling,
-    give_up_phase,
-    hold_hops,
-    open_step,
-    open_sub_step,
-    weigh_event,
-)
-from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping import operations
+from reference_solver.stepping.accounting import keep
+from reference_solver.stepping.clock import HELD, LEFT, MOST_SOFT_IN_SPACE, UNSETTLED
+from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.lasting import CONTACTS as LASTING
-from reference_solver.stepping.midpoint import CLOSINGS, PUSHED_INTO
-from reference_solver.stepping.noise import EVENT_BUDGET, NOTHING_LEFT, SHORT
+from reference_solver.stepping.noise import SHORT
 from reference_solver.stepping.options import Options
-from reference_solver.stepping.phase import SHORTENED
-from reference_solver.tally import (
-    CONTACT_WORK,
-    CONTRADICTED_A,
-    EXHAUSTED,
-    LOAD_WORK,
-    SURFACE_WORK,
-)
+from reference_solver.stepping.paths import Paths
+from reference_solver.stepping.phase import NO_PHASE
+from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Contacts of a phase that cost little: with more of them phases that creep try the patience of the step the sooner.
 CHEAP = 4
 
 
-@spliced_kernel
-def located_step(
-    bodies: Bodies,
-    detection: Detection,
-    room: Manifolds,
-    memory: Memory,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """One step of an island; False if an array is too small, with the step unfinished."""
-    open_step(sub.clock, len(bodies), options.dt, MOST_SOFT_IN_SPACE)
-    while sub.clock[LEFT] > 0.0 or sub.clock[UNSETTLED] > 0.0:
-        if sub.clock[UNSETTLED] > 0.0:
-            if not settle(bodies, detection, room, memory, problem, sub, ledger, options, tally):
-                return False
-        elif not sub_step(bodies, detection, room, memory, problem, sub, ledger, options, tally):
-            return False
-        if sub.clock[ESCAPED] > 0.0:
-            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
-            return True
-        if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
-            end_run(bodies)
-            sub.clock[LEFT] = sub.clock[UNSETTLED] = 0.0
-    return True
+@inner_kernel
+def is_free(island: Island, i: int) -> bool:
+    """Whether forces move body i."""
+    return bool(island.bodies.motion[i] == FREE)
 
 
 @inner_kernel
-def leaves_bounds(bodies: Bodies, sub: SubStep, end: float) -> bool:
-    """Whether any free body's way until ``end`` may leave the bounds given for the step; its flight has begun."""
+def patience(island: Island) -> int:
+    """Soft events of a step in space, where those of bodies with faces cost much."""
+    return MOST_SOFT_IN_SPACE
+
+
+@spliced_kernel
+def manifolds_of(island: Island) -> Manifolds:
+    """Those found last; spliced, as numba returns no part of an array."""
+    return island.room[: island.detection.found[MANIFOLDS]]
+
+
+@inner_kernel
+def find_contacts(island: Island) -> int:
+    """Number of manifolds found for the state of the clock; -1 if an array is too small."""
+    found = detect_touching(
+        island.bodies, island.detection, island.room, island.memory, island.sub.past, island.options, island.sub.clock
+    )
+    return found if island.ledger.filled[0] + POINTS * found <= len(island.ledger.real) else -1
+
+
+@inner_kernel
+def find_touching(island: Island) -> bool:
+    """Points that touch or last."""
+    return find_contacts(island) >= 0
+
+
+@inner_kernel
+def weigh_clusters(island: Island) -> None:
+    """Of the points that touch."""
+    jam.weigh_clusters(island.bodies, manifolds_of(island), island.sub, island.options, island.tally)
+
+
+@inner_kernel
+def begin_solve(island: Island) -> None:
+    """Velocities of the start, and what a manifold needs to be solved as a whole."""
+    impact.copy_twists(island.bodies.twist, island.bodies.before)
+    for i in range(len(island.bodies)):
+        for d in range(3):
+            island.bodies.momentum_before[i, d] = island.bodies.angular_momentum[i, d]
+    prepare_wrenches(island.bodies, manifolds_of(island), island.options)
+
+
+@inner_kernel
+def levers_of_start(island: Island) -> None:
+    """Frames and levers before they were those of mid-drift."""
+    midpoint.levers_of_start(island.bodies, manifolds_of(island), island.sub, island.options)
+
+
+@inner_kernel
+def collide_now(island: Island) -> int:
+    """Impacts, from ``before`` to ``first``."""
+    return int(impact.collide_now(island.bodies, manifolds_of(island), island.problem, island.options, island.tally))
+
+
+@inner_kernel
+def press_until_stick(island: Island, most: float, struck: bool) -> float:
+    """From ``first`` to ``twist``; at impulse level it is one solve at mid-drift."""
+    bodies, manifolds, problem, sub = island.bodies, manifolds_of(island), island.problem, island.sub
+    if sub.clock[HELD] > 0.0 and len(manifolds) > 0:
+        midpoint.press_at_mid_drift(bodies, manifolds, problem, sub, island.options, island.tally, most)
+        return most
+    return float(slide.press_until_stick(bodies, manifolds, problem, sub, island.options, island.tally, most, struck))
+
+
+@inner_kernel
+def press_for(island: Island, length: float, struck: bool) -> float:
+    """Also up to the first end of a slide."""
+    return press_until_stick(island, length, struck)
+
+
+@inner_kernel
+def end_series(island: Island, length: float) -> bool:
+    """Points that are hit again and again."""
+    return bool(impact.end_series(island.bodies, manifolds_of(island), island.sub, island.options, length))
+
+
+@inner_kernel
+def end_rocking(island: Island, length: float) -> tuple[float, float]:
+    """No rule for more than two points that are hit in turn is known."""
+    return 0.0, math.inf
+
+
+@inner_kernel
+def hop_time(island: Island) -> float:
+    """Uses up the first contact noted."""
+    return float(slide.hop_time(island.bodies, manifolds_of(island), island.sub, island.options))
+
+
+@inner_kernel
+def end_solve(island: Island) -> None:
+    """Velocities of the end, and the tally before the work of the force phase."""
+    impact.copy_twists(island.bodies.twist, island.bodies.last)
+    keep(island.tally, island.sub.saved)
+
+
+@inner_kernel
+def enter_path(island: Island, length: float) -> float:
+    """The frozen path, or that of a phase where rows turn along it."""
+    bodies, manifolds, sub, options, tally = (
+        island.bodies,
+        manifolds_of(island),
+        island.sub,
+        island.options,
+        island.tally,
+    )
+    smooth = phase.enter_phase(bodies, manifolds, sub, options, tally, sub.clock[LEFT], length)
+    if smooth == NO_PHASE:
+        return NO_PHASE
+    if smooth > 0.0:
+        length = smooth
+        phase.part_points(bodies, manifolds, options, length)
+    elif sub.clock[HELD] == 0.0:
+        slide.certify_press(bodies, manifolds, options, tally, length)
+    flight.begin_flight(bodies, manifolds, sub, options, length)
+    return smooth
+
+
+@inner_kernel
+def return_to_start(island: Island) -> None:
+    """Velocities and angular momenta; poses have not changed yet."""
+    flight.undo(island.bodies)
+
+
+@inner_kernel
+def next_impact(island: Island, length: float) -> float:
+    """On the paths of the bodies."""
+    return float(
+        time_of_impact.next_impact(
+            island.bodies, island.detection, manifolds_of(island), island.sub, island.options, length
+        )
+    )
+
+
+@inner_kernel
+def leaves_bounds(island: Island, end: float) -> bool:
+    """By the sum of all terms of the path."""
+    bodies, limit = island.bodies, island.sub.limit
     for i in range(len(bodies)):
         if bodies.motion[i] != FREE:
             continue
         for k in range(3):
-            way = end * (abs(bodies.twist[i, k]) + 0.5 * end * abs(curvature(bodies, i, 0)[k]))
+            way = end * (abs(bodies.twist[i, k]) + 0.5 * end * abs(flight.curvature(bodies, i, 0)[k]))
             if bodies.curved[i]:
                 c = bodies.path[i, k]
                 way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
-            if not (sub.limit[i, k] <= bodies.pose[i, k] - way and bodies.pose[i, k] + way <= sub.limit[i, 3 + k]):
+            if not (limit[i, k] <= bodies.pose[i, k] - way and bodies.pose[i, k] + way <= limit[i, 3 + k]):
                 return True
     return False
 
 
 @inner_kernel
-def end_run(bodies: Bodies) -> None:
-    """Leave no state that could be taken for an answer."""
-    for i in range(len(bodies)):
-        if bodies.motion[i] == FREE:
-            for k in range(6):
-                bodies.pose[i, k] = bodies.twist[i, k] = math.nan
-
-
-@spliced_kernel
-def sub_step(
-    bodies: Bodies,
-    detection: Detection,
-    room: Manifolds,
-    memory: Memory,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
-    left = sub.clock[LEFT]
-    found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
-    if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
-        return False
-    manifolds = room[:found]
-    if left == options.dt and sub.clock[JAMMED] == 0.0 and sub.clock[HELD] == 0.0:
-        weigh_clusters(bodies, manifolds, sub, options, tally)
-        if sub.clock[HELD] > 0.0:
-            return True  # points that may close are looked for as well
-    keep(tally, sub.opened)
-    length = solve_sub_step(bodies, detection, manifolds, problem, sub, options, tally)
-    smooth = enter_phase(bodies, manifolds, sub, options, tally, left, length)
-    if smooth == NO_PHASE:
-        give_up_phase(sub.clock, tally)
-        go_back(tally, sub.opened)
-        copy_twists(bodies.before, bodies.twist)
-        return True
-    held, pushed = sub.clock[HELD] > 0.0, False
-    if smooth > 0.0:
-        length = smooth
-        part_points(bodies, manifolds, options, length)
-    else:
-        if not held:
-            certify_press(bodies, manifolds, options, tally, length)
-        pushed = found > 0 and correct_positions(bodies, manifolds, options, tally)
-    begin_flight(bodies, manifolds, sub, options, length)
-    end = length
-    if sub.clock[EVENTS] < EVENT_BUDGET:
-        end = next_impact(bodies, detection, manifolds, sub, options, length)
-        if end < 0.0:
-            undo(bodies)
-            return False
-    if sub.clock[CONFINED] > 0.0 and leaves_bounds(bodies, sub, end):
-        sub.clock[ESCAPED] = 1.0
-        return True
-    if smooth > 0.0 and end < length:
-        cut_phase(bodies, manifolds, sub, end)
+def follow_path(island: Island, length: float, end: float, curved: bool) -> float:
+    """A phase that an impact cuts is made again up to there; a frozen sub-step is cut."""
+    bodies, manifolds, sub, options, tally = (
+        island.bodies,
+        manifolds_of(island),
+        island.sub,
+        island.options,
+        island.tally,
+    )
+    held = sub.clock[HELD] > 0.0
+    if curved and end < length:
+        phase.cut_phase(bodies, manifolds, sub, end)
         length = end
-    remember_forces(bodies, detection, manifolds, memory, length, options.dt)
+    remember_forces(island, length)
     if end < length or held:
         cut_work(bodies, manifolds, sub, options, tally, end, end / length)
     if held:
-        exchange_levers(manifolds, sub)
-        enter_impulses(bodies, manifolds, manifolds.hit, ledger)
-        exchange_levers(manifolds, sub)
-        enter_impulses(bodies, manifolds, manifolds.impulse, ledger)
+        midpoint.exchange_levers(manifolds, sub)
+        enter_impulses(bodies, manifolds, manifolds.hit, island.ledger)
+        midpoint.exchange_levers(manifolds, sub)
+        enter_impulses(bodies, manifolds, manifolds.impulse, island.ledger)
     else:
-        enter_contacts(bodies, manifolds, ledger)
+        enter_contacts(bodies, manifolds, island.ledger)
     keep_state(sub.journal, bodies.pose, bodies.before)
-    move_along(bodies, end, end == length and smooth == 0.0)
-    if smooth > 0.0:
-        end_phase(bodies, sub, tally, end)
+    pushed = not curved and len(manifolds) > 0 and correct_positions(bodies, manifolds, options, tally)
+    flight.move_along(bodies, end, end == length and not curved)
+    if curved:
+        phase.end_phase(bodies, sub, tally, end)
     if pushed:
         displace(bodies, options.dt)
-    sub.clock[UNSETTLED] = end if held and found > 0 else 0.0
+    sub.clock[UNSETTLED] = end if held and len(manifolds) > 0 else 0.0
     enter_sub_step(bodies, manifolds, sub, options, end)
-    if options.restitution and release(bodies, manifolds, problem, options, tally):
-        enter_contacts(bodies, manifolds, ledger)
-        enter_release(bodies, manifolds, sub, options, end)
-    haste, shortened = end < SHORT * options.dt, smooth == end and sub.clock[OUTCOME] == SHORTENED
-    if sub.clock[BRIEF] > 0.0:
-        end_instant(sub.clock, tally, *gained_speed(bodies, end))
-    if end < left and (haste or not shortened):
-        crawl = CRAWL * max(1.0, sub.lasting.size[LASTING] / CHEAP)
-        count_event(sub.clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
-    sub.clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
-    return True
-
-
-@inner_kernel
-def gained_speed(bodies: Bodies, length: float) -> tuple[float, float]:
-    """Largest change of a velocity in a sub-step, and what loads do in it, over free bodies [m/s]."""
-    gained, loaded = 0.0, 0.0
-    for i in range(len(bodies)):
-        for k in range(3):
-            if bodies.motion[i] == FREE:
-                gained = max(gained, abs(bodies.twist[i, k] - bodies.first[i, k]))
-                loaded = max(loaded, length * abs(bodies.acceleration[i, k]))
-    return gained, loaded
-
-
-@inner_kernel
-def settle(
-    bodies: Bodies,
-    detection: Detection,
-    room: Manifolds,
-    memory: Memory,
-    problem: Problem,
-    sub: SubStep,
-    ledger: Ledger,
-    options: Options,
-    tally: Array,
-) -> bool:
-    """Take out what the impulse-level scheme leaves of the gaps and velocities of contacts that it held (E28).
-
-    Gaps first: velocities are those that the closed contacts allow. Their impulses are found anew with the rows of the
-    end, by a solve that starts from them: what was too much is taken back. Otherwise it would be an impact in the
-    sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
-    anew.
-    """
-    found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
-    if found < 0 or ledger.filled[0] + POINTS * found > len(ledger.real):
-        return False
-    if found == 0:
-        end_settling(sub.clock)
-        return True
-    keep_state(sub.journal, bodies.pose, bodies.twist)
-    moved = close_gaps(bodies, room[:found], options)
-    if moved:
-        for k in range(CLOSINGS):
-            found = detect_touching(bodies, detection, room, memory, sub.past, options, sub.clock)
-            if found < 0:
-                return False
-            if k == CLOSINGS - 1 or deepest(bodies, room[:found]) <= PUSHED_INTO:
-                break
-            close_gaps(bodies, room[:found], options)
-    manifolds, time = room[:found], sub.clock[UNSETTLED]
-    misses = misses_end(bodies, manifolds, options, time)
-    if misses:
-        prepare_wrenches(bodies, manifolds, options)
-        take_back(bodies, manifolds, options, tally)
-        open_solve(bodies, 0.0, tally)
-        warm_start(bodies, manifolds, options)
-        solve_velocities(bodies, manifolds, problem, options, tally)
-        certify(bodies, manifolds, options, tally)
-        keep_change(bodies, manifolds, time)
-        enter_impulses(bodies, manifolds, manifolds.hit, ledger)
-    if moved or misses:
-        enter_settled(bodies, manifolds, sub, options)
-    end_settling(sub.clock)
-    return True
-
-
-@spliced_kernel
-def solve_sub_step(
-    bodies: Bodies,
-    detection: Detection,
-    manifolds: Manifolds,
-    problem: Problem,
-    sub: SubStep,
-    options: Options,
-    tally: Array,
-) -> float:
-    """Impacts and force phase; return the length of the sub-step, ``twist`` being the velocities at its end.
-
-    An attempt that is made again leaves its sweeps in the tally and nothing else.
-    """
-    copy_twists(bodies.twist, bodies.before)
-    prepare_wrenches(bodies, manifolds, options)
-    length, found, struck = sub.clock[LEFT], NO_IMPACT, False
-    open_sub_step(sub.clock, options.dt)
-    for k in range(SERIES_PASSES):
-        if k > 0:
-            go_back(tally, sub.opened)
-            if sub.clock[HELD] > 0.0:
-                levers_of_start(bodies, manifolds, sub, options)
-        found = collide_now(bodies, manifolds, problem, options, tally)
-        keep(tally, sub.struck)
-        struck = found >= LANDED
-        if sub.clock[HELD] > 0.0 and len(manifolds) > 0:
-            press_at_mid_drift(bodies, manifolds, problem, sub, options, tally, sub.clock[LEFT])
-        else:
-            length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
-        if not (struck and options.restitution and end_series(bodies, manifolds, sub, options, length)):
-            break
-    if sub.clock[HELD] == 0.0 and sub.clock[SERIES] == 0.0:
-        hold_hops(sub.clock, hop_time(bodies, manifolds, sub, options))
-        if sub.clock[HOPPED] > 0.0:
-            length = press_until_stick(bodies, manifolds, problem, sub, options, tally, struck)
-    if found >= REBOUNDED:
-        weigh_event(sub.clock, REBOUND if found == REBOUNDED else 0.0)
-    keep(tally, sub.saved)
-    copy_twists(bodies.twist, bodies.last)
-    return length
+    return end
 
 
 @inner_kernel
@@ -360,28 +273,256 @@ def cut_work(
             both = add(velocity_at(v, w, manifolds, m, p), velocity_at(v_start, w_start, manifolds, m, p))
             done, moved, _ = point_work(bodies, manifolds, m, p, both)
             tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
-    copy_twists(bodies.first, bodies.twist)
+    impact.copy_twists(bodies.first, bodies.twist)
 
 
 @inner_kernel
-def remember_forces(
-    bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, length: float, dt: float
-) -> None:
+def remember_forces(island: Island, length: float) -> None:
     """Keep the forces of the sub-step: they start the next solve, and tell which contacts last (E20).
 
     In a very short sub-step the impulses stem from round-off and turning normals rather than from forces; what was
     known before is the better guess.
     """
+    bodies, manifolds, memory, dt = island.bodies, manifolds_of(island), island.memory, island.options.dt
     for m in range(len(manifolds)):
         memory.pair[m] = pair_key(bodies, manifolds.body_a[m], manifolds.body_b[m])
         memory.points[m] = manifolds.points[m]
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]
             known, divisor = row(manifolds.impulse[m], p, 0), max(length, SHORT * dt)
-            ends = manifolds.release[m, p] > 0.0 or not carries(manifolds, m, p, length / dt)
+            ends = manifolds.release[m, p] > 0.0 or not impact.carries(manifolds, m, p, length / dt)
             if length < SHORT * dt and manifolds.force[m, p, 2] > 0.0:
                 known, divisor = row(manifolds.force[m], p, 0), 1.0
             force = times_transposed(manifolds.frame, m, known)
             for d in range(3):
                 memory.impulse[m, p, d] = 0.0 if ends else force[d] / divisor
-    detection.found[REMEMBERED] = len(manifolds)
+    island.detection.found[REMEMBERED] = len(manifolds)
+
+
+@inner_kernel
+def release(island: Island, length: float) -> None:
+    """All points that were held, together."""
+    bodies, manifolds = island.bodies, manifolds_of(island)
+    if impact.release(bodies, manifolds, island.problem, island.options, island.tally):
+        enter_contacts(bodies, manifolds, island.ledger)
+        enter_release(bodies, manifolds, island.sub, island.options, length)
+
+
+@inner_kernel
+def gained_speed(island: Island, length: float) -> tuple[float, float]:
+    """Of all components of each velocity."""
+    bodies, gained, loaded = island.bodies, 0.0, 0.0
+    for i in range(len(bodies)):
+        for k in range(3):
+            if bodies.motion[i] == FREE:
+                gained = max(gained, abs(bodies.twist[i, k] - bodies.first[i, k]))
+                loaded = max(loaded, length * abs(bodies.acceleration[i, k]))
+    return gained, loaded
+
+
+@inner_kernel
+def price_of_creeping(island: Island) -> float:
+    """Systems grow with the contacts noted."""
+    return max(1.0, island.sub.lasting.size[LASTING] / CHEAP)
+
+
+@inner_kernel
+def find_loaded(island: Island) -> int:
+    """Points of the end, with the forces that they carried: the clock tells that it is them who are wanted."""
+    return find_contacts(island)
+
+
+@inner_kernel
+def close_gaps(island: Island) -> bool:
+    """By displacements of all points."""
+    return bool(midpoint.close_gaps(island.bodies, manifolds_of(island), island.options))
+
+
+@inner_kernel
+def deepest_overlap(island: Island) -> float:
+    """Of all points."""
+    return float(midpoint.deepest(island.bodies, manifolds_of(island)))
+
+
+@inner_kernel
+def misses_end(island: Island, time: float) -> bool:
+    """Of all points."""
+    return bool(midpoint.misses_end(island.bodies, manifolds_of(island), island.options, time))
+
+
+@inner_kernel
+def solve_end(island: Island, time: float) -> None:
+    """Starts from the impulses of the sub-step."""
+    bodies, manifolds, options, tally = island.bodies, manifolds_of(island), island.options, island.tally
+    prepare_wrenches(bodies, manifolds, options)
+    midpoint.take_back(bodies, manifolds, options, tally)
+    open_solve(bodies, 0.0, tally)
+    warm_start(bodies, manifolds, options)
+    solve_velocities(bodies, manifolds, island.problem, options, tally)
+    certify(bodies, manifolds, options, tally)
+    midpoint.keep_change(bodies, manifolds, time)
+    enter_impulses(bodies, manifolds, manifolds.hit, island.ledger)
+
+
+@inner_kernel
+def enter_settled(island: Island) -> None:
+    """As a piece of no length."""
+    enter_settled_piece(island.bodies, manifolds_of(island), island.sub, island.options)
+
+
+@inner_kernel
+def is_finite(whole: Island) -> bool:
+    """Of all bodies."""
+    for i in range(len(whole.bodies)):
+        for k in range(6):
+            if not math.isfinite(whole.bodies.twist[i, k]):
+                return False
+    return True
+
+
+@inner_kernel
+def find_islands(whole: Island, world: World, room: float) -> bool:
+    """By bounding boxes of all that a body, turned at will, may sweep."""
+    bodies, options, limit = whole.bodies, whole.options, world.islands.limit
+    bound_bodies(bodies, options)
+    for i in range(len(bodies)):
+        far = flight.reach_of(bodies, i) + radius_of(bodies, i) if bodies.kind[i] != HALF_SPACE else math.inf
+        for k in range(3):
+            way = abs(bodies.twist[i, k]) * options.dt
+            if bodies.motion[i] == FREE:
+                way += 0.5 * options.dt * options.dt * abs(bodies.acceleration[i, k])
+                way = room * way + options.margin * bodies.extent[i]
+            way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
+            limit[i, k], limit[i, 3 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
+            if bodies.turning[i]:
+                bodies.low[i, k] = min(bodies.low[i, k], bodies.pose[i, k] - far)
+                bodies.high[i, k] = max(bodies.high[i, k], bodies.pose[i, k] + far)
+            bodies.low[i, k] -= way
+            bodies.high[i, k] += way
+    if not pair_bodies(bodies, whole.detection, options):
+        return False
+    join_candidates(whole, world.islands, whole.detection.candidate, whole.detection.found[CANDIDATES])
+    return True
+
+
+@inner_kernel
+def begin_islands(whole: Island) -> None:
+    """Counts of what is kept and entered."""
+    whole.detection.found[KEPT] = whole.ledger.filled[0] = 0
+
+
+@inner_kernel
+def gather(whole: Island, world: World, count: int) -> Island:
+    """Bodies in order of their place, and their bounds."""
+    for k in range(count):
+        i = world.islands.member[k]
+        world.bodies[k] = whole.bodies[i]
+        for d in range(6):
+            world.limit[k, d] = world.islands.limit[i, d]
+        world.order[k] = k
+    whole.sub.lasting.size[BODIES] = count
+    whole.detection.found[REMEMBERED] = -1
+    laws = whole.detection
+    detection = Detection(
+        laws.found,
+        laws.restitution,
+        laws.friction,
+        world.order[:count],
+        laws.candidate,
+        laws.polygon,
+        laws.polygon_edge,
+    )
+    return Island(
+        world.bodies[:count],
+        detection,
+        whole.room,
+        whole.memory,
+        problem_part(whole.problem, count),
+        sub_part(whole.sub, world, count),
+        whole.ledger,
+        whole.options,
+        whole.tally,
+    )
+
+
+@inner_kernel
+def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
+    """The sub-step of the first bodies."""
+    paths, meeting = sub.meeting.paths, sub.meeting
+    some = Paths(paths.begin[:count], paths.end[:count], paths.pose[:count], paths.coefficient[:count])
+    pair = Meeting(
+        world.bodies[:count],
+        some,
+        meeting.trial,
+        meeting.kind,
+        meeting.size,
+        meeting.offset,
+        meeting.vector,
+        meeting.corner,
+        meeting.watched,
+    )
+    return SubStep(
+        sub.clock,
+        sub.trial,
+        sub.opened,
+        sub.saved,
+        sub.struck,
+        sub.lasting,
+        sub.held[:count],
+        sub.noted,
+        sub.rows,
+        sub.end_pose[:count],
+        sub.end_twist[:count],
+        sub.start_pose[:count],
+        sub.kept,
+        sub.probe,
+        pair,
+        world.limit[:count],
+        sub.past,
+        journal_part(sub.journal, count),
+    )
+
+
+@inner_kernel
+def keep_memory(island: Island, world: World) -> bool:
+    """In order of the pairs."""
+    found = island.detection.found
+    if found[KEPT] + max(found[REMEMBERED], 0) > len(world.kept):
+        found[CANDIDATES] = 0  # it is manifolds that there are too few of
+        return False
+    keep_remembered(island.detection, island.memory, world.kept)
+    return True
+
+
+@inner_kernel
+def keep_end(island: Island, world: World) -> None:
+    """All of their records."""
+    for k in range(len(island.bodies)):
+        world.end[world.islands.member[k]] = island.bodies[k]
+
+
+@inner_kernel
+def end_islands(whole: Island, world: World) -> None:
+    """What forces do not move goes on with its velocity."""
+    bodies = whole.bodies
+    pass_on(whole.detection, world.kept, whole.sub.past)
+    for i in range(len(bodies)):
+        if bodies.motion[i] == FREE:
+            bodies[i] = world.end[i]
+        elif bodies.motion[i] != FIXED:
+            for k in range(6):
+                bodies.rate[i, k] = 0.0
+            flight.place_at(bodies, i, whole.options.dt, bodies, i)
+
+
+@inner_kernel
+def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
+    """Contacts are those of the ledger."""
+    sample_state(whole.bodies, buffer, s)
+    start = buffer.offset[s]
+    buffer.offset[s + 1] = start
+    if len(buffer.real) > 0:
+        buffer.offset[s + 1] = start + copy_ledger(whole.ledger, buffer, start)
+
+
+operations.provide_all(Island, globals())

@@ -25,7 +25,15 @@ from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
 from reference_solver.stepping.options import Options
-from reference_solver.stepping.phase import FAILED, begin_phase, find_phase, go_back, step_phase, write_path
+from reference_solver.stepping.phase import (
+    FAILED,
+    NO_PHASE,
+    begin_phase,
+    find_phase,
+    go_back,
+    step_phase,
+    write_path,
+)
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Gap of a contact that is held, as a share of the smaller half width: more is for the frozen solve to close (E20).
@@ -33,8 +41,6 @@ CLOSED = 1e-9
 
 #: What becomes of contacts: all are noted; there are none; gaps are left to close; one cannot be followed.
 NOTED, NO_CONTACTS, GAPS_OPEN, NOT_FOLLOWED = 0, 1, 2, 3
-#: Length of a phase where rows turn and no phase is found, or none is looked for.
-NO_PHASE = -1.0
 
 
 @inner_kernel

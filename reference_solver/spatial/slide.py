@@ -206,6 +206,7 @@ def press_until_stick(
     sub_step: SubStep,
     options: Options,
     tally: Array,
+    left: float,
     struck: bool,
 ) -> float:
     """Solve the sub-step up to the first end of a slide, or the whole of what is left; return its length.
@@ -213,9 +214,6 @@ def press_until_stick(
     Where rows turn the frozen solve is not what counts, and the first one is enough; where they do at the velocities of
     the start alone there is none, but for rebounds whose series may end.
     """
-    left = sub_step.clock[LEFT]
-    if sub_step.clock[SERIES] > 0.0:
-        left = min(left, sub_step.clock[SERIES])
     if len(manifolds) == 0:
         copy_twists(bodies.first, bodies.twist)
         accelerate(bodies, left)

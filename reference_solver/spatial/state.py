@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from reference_solver.direct.problem import Problem
 from reference_solver.model import (
     Array,
     Body,
@@ -31,6 +32,7 @@ from reference_solver.pieces import Journal, allocate_journal
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
+from reference_solver.stepping.options import Options
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -255,6 +257,28 @@ class SubStep(NamedTuple):
     journal: Journal
 
 
+class Ledger(NamedTuple):
+    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
+
+    filled: Indices  # (1,): number of entries
+    names: Indices  # (k, 3): body A, body B, feature
+    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
+
+
+class Island(NamedTuple):
+    """Bodies that can meet within a step, or all of them, and what their step works on."""
+
+    bodies: Bodies  # (n,)
+    detection: Detection
+    room: Manifolds  # as many as there is room for
+    memory: Memory  # of the sub-step before
+    problem: Problem
+    sub: SubStep
+    ledger: Ledger
+    options: Options
+    tally: Array  # (SIZE,)
+
+
 class World(NamedTuple):
     """Islands of the whole world, and room for the bodies of one of them."""
 
@@ -265,14 +289,6 @@ class World(NamedTuple):
     order: Indices  # (n,): see `Detection`
     kept: Memory  # for the next step
     tally: Array  # (SIZE,): to go back to where a step is made again
-
-
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    filled: Indices  # (1,): number of entries
-    names: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
 
 
 def allocate_sub_step(bodies: int, manifolds: int, meeting: Any) -> SubStep:

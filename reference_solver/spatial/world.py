@@ -13,10 +13,10 @@ from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
+from reference_solver.spatial.ledger import copy_ledger
 from reference_solver.spatial.meeting import allocate_meeting
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.problem import assemble, pose_problem
-from reference_solver.spatial.run import copy_ledger, run_located
 from reference_solver.spatial.state import (
     CANDIDATES,
     MANIFOLDS,
@@ -24,6 +24,7 @@ from reference_solver.spatial.state import (
     POINTS,
     REMEMBERED,
     Buffer,
+    Island,
     allocate_bodies,
     allocate_detection,
     allocate_ledger,
@@ -35,6 +36,7 @@ from reference_solver.spatial.state import (
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
 from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
+from reference_solver.stepping.run import run_located
 from reference_solver.tally import new_tally
 
 
@@ -88,8 +90,8 @@ class World:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
         if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
-            own = (self._ledger, self._options, self.tally, self._world, buffer, done, steps, stride)
-            return int(run_located(*(*state, sub, *own)))
+            whole = Island(*state, sub, self._ledger, self._options, self.tally)
+            return int(run_located(whole, self._world, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))
 
     def contacts(self) -> Contacts:

@@ -25,9 +25,7 @@ ROCKING, ROCKS = 11, 12
 SERIES = 13
 #: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it.
 BRIEF = 14
-#: 1 in a sub-step that holds hops of noise until they are over.
-HOPPED = 15
-CLOCK_SIZE = 16
+CLOCK_SIZE = 15
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -65,7 +63,13 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = clock[HOPPED] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = 0.0
+
+
+@kernel
+def opens_step(clock: Array, dt: float) -> bool:
+    """Whether nothing of the step has been made, and what jams has not been weighed."""
+    return bool(clock[LEFT] == dt and clock[JAMMED] == 0.0 and clock[HELD] == 0.0)
 
 
 @kernel
@@ -130,14 +134,6 @@ def give_up_phase(clock: Array, tally: Array) -> None:
 def open_sub_step(clock: Array, dt: float) -> None:
     """No series of rebounds ends; where a jam is looked for rows are held for an instant."""
     clock[SERIES] = clock[BRIEF] * dt
-    clock[HOPPED] = 0.0
-
-
-@kernel
-def hold_hops(clock: Array, time: float) -> None:
-    """Hold rows for the time until hops of noise are over; 0: there are none."""
-    if time > 0.0:
-        clock[SERIES], clock[HOPPED] = time, 1.0
 
 
 @kernel

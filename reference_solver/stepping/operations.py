@@ -1,8 +1,9 @@
 """What the step asks of a dimension, by name.
 
 A kernel that calls one of these functions is compiled once for each dimension: the callee is chosen by the type of the
-first argument, the dimension's ``Bodies``, while numba infers types. Callees are compiled as part of their caller, so
-that the caller's machine code is found on disk again by the next process. Uncompiled, a table does the same.
+first argument, the dimension's ``Bodies`` or its ``Island``, while numba infers types. Callees are compiled as part of
+their caller, so that the caller's machine code is found on disk again by the next process. Uncompiled, a table does the
+same.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from reference_solver.linking import Carried
 
 #: The bodies of either dimension: what operations are chosen by.
 Bodies: TypeAlias = Any
+#: The bodies of an island of either dimension, or of the whole world, with all that their step works on.
+Island: TypeAlias = Any
 
 
 def operation(function: Callable[..., Any]) -> Any:
@@ -27,7 +30,7 @@ def operation(function: Callable[..., Any]) -> Any:
         def chosen(first: Any, *others: Any) -> Any:
             return table[type(first)](first, *others)
 
-        chosen.__doc__ = function.__doc__
+        chosen.__name__, chosen.__doc__ = function.__name__, function.__doc__
         chosen.table = table  # type: ignore[attr-defined]
         return chosen
 
@@ -94,3 +97,261 @@ def displacement_curvature(bodies: Any, lasting: Any, i: int, end: int) -> None:
 def feature_limit(bodies: Any, lasting: Any, k: int) -> float:
     """Least distance of contact k from where its features end: positive within, infinite where they have no end [m]."""
     raise NotImplementedError
+
+
+# ---- The located step (`stepping.driver`): an island goes from event to event.
+
+
+@operation
+def patience(island: Any) -> int:
+    """Soft events located in a step, less one for each body."""
+    raise NotImplementedError
+
+
+@operation
+def find_touching(island: Any) -> bool:
+    """Find the contacts that touch or carried load a moment ago (E20); False if an array is too small."""
+    raise NotImplementedError
+
+
+@operation
+def weigh_clusters(island: Any) -> None:
+    """Weigh each cluster of bodies that touch, and tell the clock which jam (E28)."""
+
+
+@operation
+def begin_solve(island: Any) -> None:
+    """Keep the velocities with which the sub-step begins, and prepare the rows found."""
+
+
+@operation
+def levers_of_start(island: Any) -> None:
+    """Bring back the rows that the sub-step began with, after a solve at mid-drift."""
+
+
+@operation
+def collide_now(island: Any) -> int:
+    """Solve the impacts of all touching contacts together (E21); what they were (`stepping.impacts`)."""
+    raise NotImplementedError
+
+
+@operation
+def press_until_stick(island: Any, most: float, struck: bool) -> float:
+    """Solve the force phase up to the first end of a slide, at most ``most``; return its length (E23).
+
+    ``struck``: impacts came first.
+    """
+    raise NotImplementedError
+
+
+@operation
+def press_for(island: Any, length: float, struck: bool) -> float:
+    """Solve the force phase again for contacts that are held for ``length``; return its length."""
+    raise NotImplementedError
+
+
+@operation
+def end_series(island: Any, length: float) -> bool:
+    """Mark rebounds whose series ends within ``length`` (E22); whether any was marked, so that all is solved anew."""
+    raise NotImplementedError
+
+
+@operation
+def end_rocking(island: Any, length: float) -> tuple[float, float]:
+    """Mark contacts between which bodies rock to rest (E22): time until the last has, shortest until one returns."""
+    raise NotImplementedError
+
+
+@operation
+def hop_time(island: Any) -> float:
+    """How long until contacts that part by mere noise, and turn, have come back [s]; 0 if there are none."""
+    raise NotImplementedError
+
+
+@operation
+def end_solve(island: Any) -> None:
+    """Keep the velocities with which the sub-step ends."""
+
+
+@operation
+def enter_path(island: Any, length: float) -> float:
+    """Find the paths of all bodies; the length of the phase they belong to, 0 where the frozen solve is exact.
+
+    `phase.NO_PHASE` where rows turn and there is no phase (E35), or where it must not be looked for.
+    """
+    raise NotImplementedError
+
+
+@operation
+def return_to_start(island: Any) -> None:
+    """Put bodies where the sub-step began, with their velocities there."""
+
+
+@operation
+def next_impact(island: Any, length: float) -> float:
+    """First time up to ``length`` at which bodies meet on their paths (E24); < 0 if an array is too small."""
+    raise NotImplementedError
+
+
+@operation
+def leaves_bounds(island: Any, end: float) -> bool:
+    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+    raise NotImplementedError
+
+
+@operation
+def follow_path(island: Any, length: float, end: float, curved: bool) -> float:
+    """Move along the paths until ``end`` of ``length``, enter impulses and work; where it was, to the last digits.
+
+    ``curved``: the paths are those of a phase.
+    """
+    raise NotImplementedError
+
+
+@operation
+def release(island: Any, length: float) -> None:
+    """Give rebounds that were held for ``length`` their speed at its end (E22), and enter that."""
+
+
+@operation
+def gained_speed(island: Any, length: float) -> tuple[float, float]:
+    """Largest change of a velocity in a sub-step, and what loads do in it, over free bodies [m/s]."""
+    raise NotImplementedError
+
+
+@operation
+def price_of_creeping(island: Any) -> float:
+    """What a phase counts that was cut short, in units of one that costs little."""
+    raise NotImplementedError
+
+
+@operation
+def find_loaded(island: Any) -> int:
+    """Find the contacts that carried load in the sub-step that ended, or overlap; how many, < 0 without room."""
+    raise NotImplementedError
+
+
+@operation
+def close_gaps(island: Any) -> bool:
+    """Move bodies until the gaps of the contacts found are closed (E28); whether rows are not what they were."""
+    raise NotImplementedError
+
+
+@operation
+def deepest_overlap(island: Any) -> float:
+    """Largest overlap of the contacts found, as a share of the smaller half width."""
+    raise NotImplementedError
+
+
+@operation
+def misses_end(island: Any, time: float) -> bool:
+    """Whether velocities are not those that contacts held over ``time`` allow at its end; gives rows their impulses."""
+    raise NotImplementedError
+
+
+@operation
+def solve_end(island: Any, time: float) -> None:
+    """Find the impulses of contacts held over ``time`` anew, with their rows at its end, and enter the change."""
+
+
+@operation
+def enter_settled(island: Any) -> None:
+    """Enter what was changed of poses and impulses at the end of a sub-step at impulse level."""
+
+
+# ---- The step of the whole world (`stepping.run`): islands are gathered, stepped and put back.
+
+
+@operation
+def is_finite(whole: Any) -> bool:
+    """Whether every velocity is a number: comparisons with what is not would be silently false."""
+    raise NotImplementedError
+
+
+@operation
+def find_islands(whole: Any, world: Any, room: float) -> bool:
+    """Join the free bodies that may meet within ``room`` times the way they go; False if an array is too small."""
+    raise NotImplementedError
+
+
+@operation
+def begin_islands(whole: Any) -> None:
+    """Nothing is kept for the next step yet, and no contact of this one entered."""
+
+
+@operation
+def gather(whole: Any, world: Any, count: int) -> Any:
+    """Copy the ``count`` bodies listed as members to the front of the world's room; the island they are."""
+
+
+@operation
+def keep_memory(island: Any, world: Any) -> bool:
+    """Keep what is remembered of the island's contacts for the next step; False if there is too little room."""
+    raise NotImplementedError
+
+
+@operation
+def keep_end(island: Any, world: Any) -> None:
+    """Keep the states in which the island's bodies end the step."""
+
+
+@operation
+def end_islands(whole: Any, world: Any) -> None:
+    """Take over all states and memories at the end of the step."""
+
+
+@operation
+def sample_located(whole: Any, buffer: Any, s: int) -> None:
+    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+
+
+#: What an island's dimension provides, all of it.
+OF_ISLANDS = (
+    is_free,
+    patience,
+    find_touching,
+    weigh_clusters,
+    begin_solve,
+    levers_of_start,
+    collide_now,
+    press_until_stick,
+    press_for,
+    end_series,
+    end_rocking,
+    hop_time,
+    end_solve,
+    enter_path,
+    return_to_start,
+    next_impact,
+    leaves_bounds,
+    follow_path,
+    release,
+    gained_speed,
+    price_of_creeping,
+    find_loaded,
+    close_gaps,
+    deepest_overlap,
+    misses_end,
+    solve_end,
+    enter_settled,
+    is_finite,
+    find_islands,
+    begin_islands,
+    gather,
+    keep_memory,
+    keep_end,
+    end_islands,
+    sample_located,
+)
+
+
+def provide_all(island: type, names: dict[str, Any]) -> None:
+    """Let all operations of an island be the kernels of the same names.
+
+    Raises
+    ------
+    KeyError
+        If one is missing.
+    """
+    for operation_of_island in OF_ISLANDS:
+        provide(operation_of_island, island, names[operation_of_island.__name__])

@@ -93,6 +93,8 @@ SHORTEST = 1e-9
 
 #: What a phase was: over all of its length; cut where a mode ended; cut because its error demanded it; not possible.
 WHOLE, ENDED, SHORTENED, FAILED = 0, 1, 2, 3
+#: Length of a phase where rows turn and none is found, or none is looked for.
+NO_PHASE = -1.0
 
 
 @inner_kernel
