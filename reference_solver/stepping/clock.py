@@ -23,16 +23,17 @@ WEIGHT = 10
 ROCKING, ROCKS = 11, 12
 #: How long contacts are held whose series of rebounds ends in the sub-step, where rows turn [s]; 0: no such one.
 SERIES = 13
-#: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it.
-BRIEF = 14
-CLOCK_SIZE = 15
+#: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it; and
+#: what it is where no phase is found once more.
+BRIEF, LONGER_BRIEF = 14, 15
+CLOCK_SIZE = 16
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
 
 #: Length of such a sub-step, as a share of a step, in which bodies go nowhere; by what longer the next one is where
-#: loads did no more in it than residuals leave, and up to which share; how many times what loads do in it velocities
-#: change in a jam.
+#: loads did no more in it than residuals leave and no phase is found after it, and up to which share; how many times
+#: what loads do in it velocities change in a jam.
 INSTANT, LONGER, NO_INSTANT, JUMP = 1e-8, 1e2, 1e-3, 1e3
 
 #: Soft events located in a step, and one more per body. Of 16 two discs that bounce on each other and the floor used up
@@ -64,6 +65,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
     clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = 0.0
+    clock[LONGER_BRIEF] = INSTANT
 
 
 @kernel
@@ -121,10 +123,10 @@ def give_up_phase(clock: Array, tally: Array) -> None:
     """No phase is found: look for a jam first (E54), then let what is left of the step go by the impulse-level scheme.
 
     A slip that no force can stand against ends at once, by impulses without a collision: those of the impulse-level
-    solve E19 for a sub-step of no length. After it a phase may be found.
+    solve E19 for a sub-step of no length. After it a phase may be found: if not, a longer one is tried.
     """
-    if clock[BRIEF] == 0.0 and clock[JAMMED] == 0.0:
-        clock[BRIEF] = INSTANT
+    if clock[BRIEF] == 0.0 and clock[JAMMED] == 0.0 and clock[LONGER_BRIEF] <= NO_INSTANT:
+        clock[BRIEF] = clock[LONGER_BRIEF]
     else:
         clock[BRIEF] = 0.0
         hold_rest(clock, tally)
@@ -137,16 +139,10 @@ def open_sub_step(clock: Array, dt: float) -> None:
 
 
 @kernel
-def end_instant(clock: Array, tally: Array, gained: float, loaded: float) -> None:
-    """Whether a jam was found: velocities gained far more than what loads do; else the rest of the step is held."""
-    if clock[BRIEF] > 0.0:
-        longer = LONGER * clock[BRIEF]
-        clock[BRIEF] = 0.0
-        if gained <= JUMP * loaded:
-            if longer <= NO_INSTANT:
-                clock[BRIEF] = longer
-            else:
-                hold_rest(clock, tally)
+def end_instant(clock: Array, gained: float, loaded: float) -> None:
+    """Whether a jam was found: velocities gained far more than what loads do; else the next such sub-step is longer."""
+    clock[LONGER_BRIEF] = INSTANT if gained > JUMP * loaded else LONGER * clock[BRIEF]
+    clock[BRIEF] = 0.0
 
 
 @kernel

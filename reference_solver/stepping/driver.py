@@ -144,7 +144,7 @@ def make_sub_step(island: Island) -> bool:
     haste, shortened = end < SHORT * options.dt, phase == end and clock[OUTCOME] == SHORTENED
     if clock[BRIEF] > 0.0:
         gained, loaded = gained_speed(island, end)
-        end_instant(clock, tally, gained, loaded)
+        end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
         crawl = CRAWL * price_of_creeping(island)
         count_event(clock, tally, (crawl if shortened else HASTE) if haste else 1.0)

@@ -79,6 +79,7 @@ class Lasting(NamedTuple):
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
     monitor: Array  # (PLACES_WATCHED, k, MONITORS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
+    error: Array  # (1,): of the step made last, see `phase.relative_error`
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
     spin: Array  # (V,)
     trial: Array  # (k, 2, 1 + T, V): rows at the start of a path
@@ -133,6 +134,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         unknown=np.zeros((r, 2), np.int64),
         monitor=np.zeros((PLACES_WATCHED, k, MONITORS)),
         length=np.zeros(1),
+        error=np.zeros(1),
         early=np.ones(1),
         spin=np.zeros(v),
         trial=np.zeros((k, 2, 1 + t, v)),

@@ -91,6 +91,9 @@ SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
 SHORTEST = 1e-9
 
+#: Share of the time to the end of a slip that turns which is stepped: what is left is a share of it as well.
+BEFORE_END = 0.5
+
 #: What a phase was: over all of its length; cut where a mode ended; cut because its error demanded it; not possible.
 WHOLE, ENDED, SHORTENED, FAILED = 0, 1, 2, 3
 #: Length of a phase where rows turn and none is found, or none is looked for.
@@ -279,7 +282,7 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
             watch(bodies, lasting, BETWEEN)
             if lowest(lasting, BETWEEN) < -SURELY:
                 lasting.early[0] = min(lasting.early[0], NODES[stage])
-    error = relative_error(lasting, length)
+    error = lasting.error[0] = relative_error(lasting, length)
     if not clean_up(bodies, lasting):
         return -1.0
     if not evaluate_forces(bodies, lasting):
@@ -329,17 +332,17 @@ def relative_error(lasting: Lasting, length: float) -> float:
     """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
 
     What moves next to nothing is measured against `NEXT_TO_NOTHING` of the other, at the size of the largest body that
-    touches another.
+    touches another, and of the reference speed of contacts: what is missed then is below `NOISE` of it.
     """
-    split, size, least = lasting.impulse.shape[1], 0.0, NEXT_TO_NOTHING
+    split, size, least, speed = lasting.impulse.shape[1], 0.0, NEXT_TO_NOTHING, 0.0
     for k in range(lasting.size[CONTACTS]):
-        size = max(size, lasting.extent[k])
+        size, speed = max(size, lasting.extent[k]), max(speed, lasting.speeds[k])
     if size == 0.0:  # free bodies
         size, least = 1.0, 0.0
     missed_way, moved_way = missed_and_moved(lasting, length, 0, split)
     missed_turn, moved_turn = missed_and_moved(lasting, length, split, lasting.size[VELOCITIES])
-    way = max(moved_way, least * size * moved_turn)
-    turn = max(size * moved_turn, least * moved_way)
+    way = max(moved_way, least * max(size * moved_turn, speed))
+    turn = max(size * moved_turn, least * max(moved_way, speed))
     worst = 0.0
     if way > 0.0:
         worst = missed_way / (ERROR * way)
@@ -518,7 +521,8 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
     """Length of the step at whose end the first monitor is zero, below which it is not; < 0 where rows fail.
 
     `step_phase` of ``length`` has found one below zero. Chords between brackets (regula falsi, the kept end's value
-    halved where it is kept twice, as in the Illinois method), each evaluated by a step of its own.
+    halved where it is kept twice, as in the Illinois method), each evaluated by a step of its own; one whose error is
+    too large ends the search.
     """
     near, far = 0.0, length
     keep_monitors(lasting, START, NEAR)
@@ -532,6 +536,8 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
             break
         if step_phase(bodies, lasting, guess) < 0.0:
             return -1.0
+        if lasting.size[TANGENTS] > 1 and lasting.error[0] > 1.0:
+            return guess  # a slip turns on its way to its end
         value = lowest(lasting, LAST)
         if abs(value) <= LOCATED:
             return guess
@@ -550,6 +556,26 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
     if step_phase(bodies, lasting, far) < 0.0:
         return -1.0
     return far
+
+
+@inner_kernel
+def stops_across(lasting: Lasting) -> bool:
+    """Whether a slip that comes to its end along its last direction has turned, and goes on across it.
+
+    How a slip turns while it ends is a power of the time left: a step over the end itself is of no order, steps that
+    halve that time are. What is left in the end is round-off, and sticks.
+    """
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] != SLIP or lasting.friction[k] == 0.0 or lasting.size[TANGENTS] == 1:
+            continue
+        if lasting.monitor[START, k, ONWARD] > FORCE_NOISE and lasting.monitor[LAST, k, ONWARD] <= LOCATED:
+            speed, along = 0.0, 0.0
+            for t in range(lasting.size[TANGENTS]):
+                speed += lasting.speed[k, 1 + t] ** 2
+                along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
+            if math.sqrt(max(speed - along**2, 0.0)) > NOISE * lasting.speeds[k]:
+                return True
+    return False
 
 
 @inner_kernel
@@ -589,7 +615,11 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
         elif lowest(lasting, LAST) < -LOCATED:
             end = find_end(bodies, lasting, length)
             if end >= SHORTEST * left:
-                return end, ENDED
+                ends = not stops_across(lasting) and lasting.error[0] <= 1.0
+                if ends or BEFORE_END * end < SHORTEST * left:
+                    return end, ENDED
+                length, outcome = BEFORE_END * end, SHORTENED
+                continue
             if end < 0.0:
                 break
             end_first(bodies, lasting)
