@@ -26,7 +26,9 @@ SERIES = 13
 #: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it; and
 #: what it is where no phase is found once more.
 BRIEF, LONGER_BRIEF = 14, 15
-CLOCK_SIZE = 16
+#: 1 after a sub-step that held hops of noise: what it leaves of them is for a phase to take.
+HOPPED = 16
+CLOCK_SIZE = 17
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -40,7 +42,7 @@ INSTANT, LONGER, NO_INSTANT, JUMP = 1e-8, 1e2, 1e-3, 1e3
 #: half in a step of 1/60 s, and the series that was held then was 1e-6 m off.
 MOST_SOFT = 128
 #: The same in space, where an event of bodies with faces costs a hundred times as much.
-MOST_SOFT_IN_SPACE = 32
+MOST_SOFT_IN_SPACE = 64
 #: Free bodies of a cluster from which on it may jam, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
 #: Free bodies from which on a cluster jams however few its contacts.
@@ -64,7 +66,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[SERIES] = clock[BRIEF] = clock[HOPPED] = 0.0
     clock[LONGER_BRIEF] = INSTANT
 
 

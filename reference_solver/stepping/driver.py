@@ -21,6 +21,7 @@ from reference_solver.stepping.clock import (
     ESCAPED,
     HASTE,
     HELD,
+    HOPPED,
     LEFT,
     OUTCOME,
     REBOUND,
@@ -191,7 +192,8 @@ def come_to_rest(island: Island, length: float, struck: bool) -> float:
     if shortest < left:
         weigh_event(clock, REBOUND)
     if longest == 0.0:
-        hops = hop_time(island) if clock[SERIES] == 0.0 else 0.0
+        hops = hop_time(island) if clock[SERIES] == 0.0 and clock[HOPPED] == 0.0 else 0.0
+        clock[HOPPED] = 1.0 if hops > 0.0 else 0.0
         if hops > 0.0:
             go_back(island.tally, island.sub.struck)
             clock[SERIES] = hops
