@@ -73,18 +73,19 @@ def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float) -
 
 @inner_kernel
 def turns(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
-    """Whether rows of lasting contacts change along the frozen path; bodies are where they were afterwards."""
+    """Whether rows of lasting contacts change along the frozen path, or end; bodies are where they were afterwards."""
     lasting = sub.lasting
     copy_vectors(sub.start, bodies.twist)
     found = False
     if note_contacts(bodies, rows, lasting, length):
         evaluate(bodies, lasting)
         keep_rows(lasting)
+        phase.keep_limits(bodies, lasting)
         for part in range(2 if sub.clock[ROCKING] > 0.0 else 1, 3):  # what rocks to rest ends as it began
             for i in range(len(bodies.kind)):
                 place(bodies, sub, i, 0.5 * part * length)
             evaluate(bodies, lasting)
-            found = found or rows_changed(bodies, lasting)
+            found = found or rows_changed(bodies, lasting) or phase.passes_limit(bodies, lasting)
         for i in range(len(bodies.kind)):
             put_back(bodies, sub, i)
     copy_vectors(sub.after, bodies.twist)

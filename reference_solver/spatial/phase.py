@@ -31,6 +31,8 @@ from reference_solver.stepping.phase import (
     begin_phase,
     find_phase,
     go_back,
+    keep_limits,
+    passes_limit,
     step_phase,
     write_path,
 )
@@ -72,7 +74,7 @@ def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> in
 
 @inner_kernel
 def rows_stay(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: float) -> bool:
-    """Whether no row of a noted contact, and no slip's direction, changes along the way that bodies go.
+    """Whether no row of a noted contact, and no slip's direction, changes along the way that bodies go, and none ends.
 
     They go at the mean of ``first`` and ``last``.
     """
@@ -91,6 +93,7 @@ def rows_stay(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: flo
         for d in range(6):
             lasting.displacement[i, d] = 0.5 * time * (bodies.first[i, d] + bodies.last[i, d])
     space = Spatial(bodies, bodies.pose, bodies.twist)
+    keep_limits(space, lasting)
     for i in range(len(bodies)):
         if sub_step.held[i]:
             displace(space, lasting, i)
@@ -101,6 +104,7 @@ def rows_stay(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, time: flo
             i = lasting.body[k, side]
             if bodies.motion[i] == FREE or (bodies.motion[i] != FIXED and bodies.turning[i]):
                 stay = stay and same_rows(sub_step.rows[k, side], lasting.jacobian[k, side], lasting.extent[k])
+    stay = stay and not passes_limit(space, lasting)
     for i in range(len(bodies)):
         for d in range(6):
             lasting.displacement[i, d] = 0.0

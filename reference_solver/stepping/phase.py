@@ -447,6 +447,23 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
 
 
 @inner_kernel
+def keep_limits(bodies: Bodies, lasting: Lasting) -> None:
+    """Keep how far all contacts are from where their features end, at the start of a path."""
+    for k in range(lasting.size[CONTACTS]):
+        lasting.monitor[START, k, FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+
+
+@inner_kernel
+def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
+    """Whether the features of any contact end between there and here: it goes on with others, or parts."""
+    for k in range(lasting.size[CONTACTS]):
+        limit = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        if lasting.monitor[START, k, FEATURE] >= -FORCE_NOISE and limit < -FORCE_NOISE:
+            return True
+    return False
+
+
+@inner_kernel
 def lowest(lasting: Lasting, place: int) -> float:
     """Least monitor of those that were above zero at the start."""
     least = math.inf
