@@ -26,7 +26,7 @@ SERIES = 13
 #: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it; and
 #: what it is where no phase is found once more.
 BRIEF, LONGER_BRIEF = 14, 15
-#: 1 after a sub-step that held hops of noise: what it leaves of them is for a phase to take.
+#: 1 in a sub-step that holds hops of noise until they are over.
 HOPPED = 16
 CLOCK_SIZE = 17
 
@@ -52,7 +52,7 @@ REBOUND = 0.25
 #: What a soft event counts that follows within a thousandth of a step: such ones come in crowds.
 HASTE = 4.0
 #: What a phase counts that its error cut to less than a thousandth of a step: a slip that turns while it ends has some
-#: fifty.
+#: fifty; and what a hop of noise counts, of which each is a share of the one before.
 CRAWL = 0.1
 
 
@@ -138,6 +138,7 @@ def give_up_phase(clock: Array, tally: Array) -> None:
 def open_sub_step(clock: Array, dt: float) -> None:
     """No series of rebounds ends; where a jam is looked for rows are held for an instant."""
     clock[SERIES] = clock[BRIEF] * dt
+    clock[HOPPED] = 0.0
 
 
 @kernel

@@ -148,7 +148,7 @@ def make_sub_step(island: Island) -> bool:
         end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
         crawl = CRAWL * price_of_creeping(island)
-        count_event(clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
+        count_event(clock, tally, (crawl if shortened or clock[HOPPED] > 0.0 else HASTE) if haste else 1.0)
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -192,9 +192,9 @@ def come_to_rest(island: Island, length: float, struck: bool) -> float:
     if shortest < left:
         weigh_event(clock, REBOUND)
     if longest == 0.0:
-        hops = hop_time(island) if clock[SERIES] == 0.0 and clock[HOPPED] == 0.0 else 0.0
-        clock[HOPPED] = 1.0 if hops > 0.0 else 0.0
+        hops = hop_time(island) if clock[SERIES] == 0.0 else 0.0
         if hops > 0.0:
+            clock[HOPPED] = 1.0
             go_back(island.tally, island.sub.struck)
             clock[SERIES] = hops
             length = press_for(island, hops, struck)
