@@ -4,9 +4,11 @@
 ``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
 Halves end where the whole steps end. What a solver decides by the time that is left of a step (whether a series of
 rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with
-13 steps for each 5, or others whose ratio is near the square of the golden mean too: no such steps end near the whole
-ones but the last of all, where the runs are compared as well. Each rebound is smaller than the one before by e, and a
-run that leaves some out is off by as much for all steps that leave out as many: then it is made with 56 for 5, too.
+28 steps for each 5, or others near that ratio without a common divisor: none of them end together but the last of all,
+where the runs are compared as well. So many, because phases that the solver shortens by its own judgement of their
+error are no shorter at half the step, and at 13 for 5 hardly: their errors were up to three times what such runs told.
+Each rebound is smaller than the one before by e, and a run that leaves some out is off by as much for all steps that
+leave out as many: then it is made with 56 for 5, too.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below).
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
@@ -38,7 +40,7 @@ GROWTH = 1e3
 DISTURBANCE = 1e-12
 #: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds. In
 #: few, since an error may come and go: what topples is off while it falls, and no more once it lies.
-BLOCK, FINER, FINEST = 5, 2.618, 11.09
+BLOCK, FINER, FINEST = 5, 5.618, 11.09
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
 #: Signs of the disturbance, one after the other.
@@ -92,7 +94,7 @@ class Certificate:
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs about six runs, or seventeen, and the audit.
+    """Run ``model`` and certify the run; costs about nine runs, or twenty, and the audit.
 
     Raises
     ------

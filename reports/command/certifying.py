@@ -40,6 +40,7 @@ PARTS = (
     "piles",
     "turning",
     "turning_in_space",
+    "known.gates",
     "detection",
     "metamorphic",
     "hard_cases",
