@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.model import Array, Body, HalfSpace, Model, Shape
+from reference_solver.model import Array, Body, HalfSpace, Model, Polygon, Shape
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
@@ -98,6 +98,10 @@ class Change:
             normal = np.array(shape.normal)
             mirrored = normal if self.handedness > 0.0 else self.polar(normal)
             return HalfSpace(tuple(mirrored), self.length * shape.offset)
+        if isinstance(shape, Polygon):
+            corners = self.length * np.array(shape.vertices)
+            corners = corners if self.handedness > 0.0 else self.polar(corners)[::-1]  # counter-clockwise again
+            return Polygon(tuple((float(x), float(y)) for x, y in corners))
         make: Any = type(shape)
         return make(**{name: _plain(self.length * np.array(size)) for name, size in vars(shape).items()})
 

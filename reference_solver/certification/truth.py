@@ -4,9 +4,12 @@
 ``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
 Halves end where the whole steps end. What a solver decides by the time that is left of a step (whether a series of
 rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with
-34 steps for each 13, or others whose ratio is near the square of the golden mean too: no such steps end near the whole
-ones but the last of all, where the runs are compared as well. Each rebound is smaller than the one before by e, and a
-run that leaves some out is off by as much for all steps that leave out as many: then it is made with 144 for 13, too.
+28 steps for each 5, or others near that ratio without a common divisor: none of them end together but the last of all,
+where the runs are compared as well. So many, because phases that the solver shortens by its own judgement of their
+error are no shorter at half the step, and at 13 for 5 hardly: their errors were up to three times what such runs told.
+Each rebound is smaller than the one before by e, and a run that leaves some out is off by as much for all steps that
+leave out as many: then it is made with 56 for 5, too.
+To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below).
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -35,8 +38,11 @@ GROWTH = 1e3
 #: Size of the disturbance, as a share of the fastest speed of the run: thousands of units in the last place, so that
 #: what it grows to is told from the round-off of either run.
 DISTURBANCE = 1e-12
-#: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds.
-BLOCK, FINER, FINEST = 13, 2.618, 11.09
+#: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds. In
+#: few, since an error may come and go: what topples is off while it falls, and no more once it lies.
+BLOCK, FINER, FINEST = 5, 5.618, 11.09
+#: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
+SOLVE = 1e-13
 #: Signs of the disturbance, one after the other.
 SEED = 20
 
@@ -88,7 +94,7 @@ class Certificate:
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs about six runs, or seventeen, and the audit.
+    """Run ``model`` and certify the run; costs about nine runs, or twenty, and the audit.
 
     Raises
     ------
@@ -104,8 +110,9 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
-    error = _error(model, run, record, steps, stride)
-    growth, horizon = _horizon(model, settings, record, steps, stride)
+    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
+    round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
+    error = np.maximum.accumulate(_error(model, run, record, steps, stride) + round_off)
     if not np.isfinite(error[record.t < horizon]).all():
         reasons.append("the run at half the step is no numbers")
     holds = not reasons
@@ -141,8 +148,8 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     return np.maximum.accumulate(error + noise)
 
 
-def _horizon(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> tuple[Array, float]:
-    """Growth (s,) of a disturbance of all free bodies' velocities, and the time at which it is too large."""
+def _horizon(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> tuple[Array, float, Array]:
+    """Growth (s,) of a disturbance of all free bodies' velocities, the time at which it is too large, what it moves."""
     d, random = model.dimension, np.random.default_rng(SEED)
     fastest = float(np.abs(record.twist[:, :, :d]).max())
     size = DISTURBANCE * (fastest if np.isfinite(fastest) and fastest > 0.0 else 1.0)
@@ -158,7 +165,7 @@ def _horizon(model: Model, settings: Settings, record: Record, steps: int, strid
     free_flight = size * np.sqrt(d) * max(record.t[-1], settings.dt) + noise
     growth = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf) / free_flight)
     over = np.flatnonzero(growth >= GROWTH)
-    return growth, float(record.t[over[0]]) if len(over) else float("inf")
+    return growth, float(record.t[over[0]]) if len(over) else float("inf"), apart
 
 
 def distance(model: Model, one: Array, other: Array) -> Array:

@@ -21,6 +21,7 @@ from rich.table import Table
 from reference_solver.certification import Gate
 from reference_solver.certification.orders import PHASES, RATES, orders
 from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, trials
+from reports.command.fuzzing import show_random
 from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
 from reports.wording import number
@@ -39,6 +40,7 @@ PARTS = (
     "piles",
     "turning",
     "turning_in_space",
+    "known.gates",
     "detection",
     "metamorphic",
     "hard_cases",
@@ -56,8 +58,15 @@ WIDTH = 150
 @click.option(
     "--self-test", is_flag=True, help="Plant corruptions one at a time instead: does the certificate see them?"
 )
-def certify(as_json: bool, order: bool, self_test: bool) -> None:
-    """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold."""
+@click.option("--random", "count", type=click.IntRange(1), help="Attack: N random scenes against variants of them.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of the first random scene.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Random scenes: only planar (2) or spatial (3).")
+def certify(as_json: bool, order: bool, self_test: bool, count: int | None, seed: int, dim: tuple[int, ...]) -> None:
+    """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold.
+
+    With --random scenes are drawn, certified and run again mirrored, boosted, with other steps and so on: what is
+    certified and differs is a defect, and fails; what is refused is told with the condition.
+    """
     console = terminal(stderr=True)
     if not console.is_terminal:
         console = terminal(stderr=True, width=WIDTH)
@@ -66,6 +75,8 @@ def certify(as_json: bool, order: bool, self_test: bool) -> None:
         return
     if self_test:
         sys.exit(show_self_test(console, as_json))
+    if count is not None:
+        sys.exit(show_random(console, as_json, count, seed, dim or (2, 3)))
     found = side_by_side(measured, PARTS, console)
     gates = [gate for part in PARTS for gate in found[part]]
     if as_json:

@@ -1,0 +1,112 @@
+"""What becomes of one random scene: whether it is certified, why not, and how far its variants are from it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from reference_solver.certificate import GATES
+from reference_solver.certification.fuzz.scenes import STRIDE, scene
+from reference_solver.certification.fuzz.variants import Variant, variants
+from reference_solver.certification.truth import Certificate, certify, distance
+from reference_solver.model import Array
+from reference_solver.settings import Settings
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of one scene.
+
+    Parameters
+    ----------
+    seed, dimension
+        Of the scene.
+    certified
+        Whether its certificate holds.
+    conditions
+        What refused it, by name, with the value.
+    bound
+        X at the end, or at the horizon where that comes sooner [m].
+    off
+        Largest distance from any variant up to there [m], and that variant's name; of a refused scene from those with
+        other steps: small where a right answer was refused.
+    defects
+        Certified variants that differ by more than both bounds: name, time [s], difference, bound of both together [m].
+    refused_variants
+        Variants that differ by more than X and are refused, with the conditions.
+    """
+
+    seed: int
+    dimension: int
+    certified: bool
+    conditions: dict[str, float]
+    bound: float
+    off: float
+    farthest: str
+    defects: tuple[tuple[str, float, float, float], ...]
+    refused_variants: dict[str, tuple[str, ...]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def attack(seed: int, dimension: int) -> Trial:
+    """Certify the scene of a seed and compare it with its variants."""
+    drawn = scene(seed, dimension)
+    samples = drawn.steps // STRIDE
+    found = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
+    within = found.t < found.horizon
+    last = int(np.flatnonzero(within)[-1])
+    off, farthest = 0.0, ""
+    defects: list[tuple[str, float, float, float]] = []
+    refused: dict[str, tuple[str, ...]] = {}
+    for name, variant in variants(drawn).items():
+        if not (found.holds or name.startswith("dt/")):
+            continue
+        apart = _apart(variant, found, samples)
+        worst = float(apart[within].max())
+        if not worst <= off:
+            off, farthest = worst, name
+        if found.holds and not (apart <= found.error)[within].all():
+            other = variant.certified(samples)
+            if not other.holds:
+                refused[name] = tuple(conditions(other))
+                continue
+            beyond = np.flatnonzero(within & (other.t < other.horizon) & ~(apart <= found.error + other.error))
+            if len(beyond):
+                k = int(beyond[0])
+                defects.append((name, float(found.t[k]), float(apart[k]), float(found.error[k] + other.error[k])))
+    return Trial(
+        seed,
+        dimension,
+        found.holds,
+        conditions(found),
+        float(found.error[last]),
+        off,
+        farthest,
+        tuple(defects),
+        refused,
+    )
+
+
+def _apart(variant: Variant, found: Certificate, samples: int) -> Array:
+    """Return how far (s,) a variant is from the scene's own run [m]."""
+    return distance(variant.model, variant.seen(found.pose, found.t), variant.poses(samples))
+
+
+def conditions(certificate: Certificate) -> dict[str, float]:
+    """Return what refuses a certificate: the names of its checks and of the solver's own gates, with their values."""
+    found = {finding.name: finding.value for finding in certificate.findings if not finding.holds}
+    light = certificate.light
+    found |= {f"own {gate.name}": light[gate.name] for gate in GATES if not light[gate.name] <= gate.limit}
+    if not light["converged"]:
+        found["own converged"] = 0.0
+    ended = [reason for reason in light["reasons"] if reason.endswith("the run ended there")]
+    if ended:
+        found["run ended"] = float(len(ended))
+    if not found and not certificate.holds:
+        found["half the step"] = float("inf")
+    return found

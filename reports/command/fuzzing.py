@@ -1,0 +1,182 @@
+"""``certify --random N``: random scenes against variants of themselves, in processes that may hang or die."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from adapters.isolation import Child, Lost
+from reference_solver.certification.fuzz.trial import attack
+from reports.wording import number
+
+#: Processes side by side, and seconds that one scene may take: compiling kernels is part of the first.
+WORKERS, LIMIT = 2, 900.0
+#: What a process says once it has imported us, and seconds until then, on a busy machine and a cold disk.
+READY, START = b"ready", 120.0
+#: Seeds that a line names.
+NAMED = 6
+#: Distance from runs with other steps beyond which a refused answer counts as wrong, not only as refused [m].
+WRONG = 1e-6
+
+Job = tuple[int, int]
+
+
+@dataclass
+class _Seat:
+    child: Child | None = None
+    job: Job | None = None
+    until: float = 0.0
+
+
+def serve(connection: Connection) -> None:
+    """Attack one scene after the other until the other end closes."""
+    connection.send_bytes(READY)
+    while True:
+        try:
+            seed, dimension = json.loads(connection.recv_bytes())
+        except EOFError:
+            return
+        try:
+            answer = attack(seed, dimension).as_dict()
+        except Exception as error:  # a scene that breaks the solver is a find like any other
+            answer = {"seed": seed, "dimension": dimension, "broken": f"{type(error).__name__}: {error}"}
+        connection.send_bytes(json.dumps(answer).encode())
+
+
+def show_random(console: Console, as_json: bool, count: int, seed: int, dimensions: Sequence[int]) -> int:
+    """Print what became of random scenes; 1 if one is certified and differs, or has no answer, else 0."""
+    found: list[dict[str, Any]] = []
+    jobs = [(s, d) for d in dimensions for s in range(seed, seed + count)]
+    with console.status("attacking") as status:
+        for answer in attacked(jobs):
+            found.append(answer)
+            status.update(f"{len(found)} of {len(jobs)}")
+    found.sort(key=lambda answer: (answer["dimension"], answer["seed"]))
+    if as_json:
+        click.echo(json.dumps([{k: _finite(v) for k, v in answer.items()} for answer in found], indent=1))
+    bad = 0
+    for d in dimensions:
+        bad += _tell(console, d, [answer for answer in found if answer["dimension"] == d])
+    return 1 if bad else 0
+
+
+def attacked(jobs: Sequence[Job], limit: float = LIMIT) -> Iterator[dict[str, Any]]:
+    """Yield what became of each scene (seed, dimension), in the order in which they end."""
+    waiting, seats = deque(jobs), [_Seat() for _ in range(min(WORKERS, len(jobs)))]
+    try:
+        while True:
+            for seat in seats:
+                if seat.job is None and waiting:
+                    seat.child = seat.child or _started()
+                    seat.job, seat.until = waiting.popleft(), time.monotonic() + limit
+                    seat.child.send(json.dumps(seat.job).encode())
+            busy = [(seat, seat.child, seat.job) for seat in seats if seat.child is not None and seat.job is not None]
+            if not busy:
+                return
+            watched = [item for _, child, _ in busy for item in child.sentinels]
+            wait(watched, max(0.0, min(seat.until for seat, _, _ in busy) - time.monotonic()))
+            for seat, child, job in busy:
+                late = time.monotonic() > seat.until
+                if child.has_answer() or child.ended() or late:
+                    try:
+                        answer = json.loads(child.receive(0.0))
+                    except Lost as lost:
+                        child.stop()
+                        seat.child = None
+                        why = f"no answer after {limit:g} s" if late else str(lost)
+                        answer = {"seed": job[0], "dimension": job[1], "broken": why}
+                    seat.job = None
+                    yield answer
+    finally:
+        for seat in seats:
+            if seat.child is not None:
+                seat.child.stop()
+
+
+def _started() -> Child:
+    """Return a process that is ready; its scenes' clocks start then.
+
+    Raises
+    ------
+    Lost
+        If it does not even start.
+    """
+    child = Child(serve)
+    child.receive(START)
+    return child
+
+
+def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
+    """Print one dimension; how many of its scenes are defects."""
+    broken = [answer for answer in found if "broken" in answer]
+    made = [answer for answer in found if "broken" not in answer]
+    held = [answer for answer in made if answer["certified"]]
+    refused = [answer for answer in made if not answer["certified"]]
+    differs = [answer for answer in held if answer["defects"]]
+    console.print(
+        f"{dimension}-D: {len(found)} scenes, {len(held)} certified, {len(refused)} refused, "
+        f"{len(differs)} certified but different from a variant, {len(broken)} without an answer"
+    )
+    if held:
+        bounds, off = (np.array([answer[name] for answer in held]) for name in ("bound", "off"))
+        share = off / bounds
+        told = f"bound X of the certified [m]: half below {np.median(bounds):.1e}, nine tenths {_tenth(bounds):.1e}"
+        console.print(f"{told}, all {bounds.max():.1e}")
+        told = f"farthest variant over X: half below {np.median(share):.2g}, nine tenths {_tenth(share):.2g}"
+        console.print(f"{told}, all {share.max():.2g}")
+    if refused:
+        console.print(_refusals(refused))
+    for answer in differs:
+        for name, t, apart, allowed in answer["defects"]:
+            console.print(
+                f"DEFECT seed {answer['seed']}, {name}: {apart:.2e} m apart at {t:.3g} s, both bounds {allowed:.2e} m"
+            )
+    for answer in broken:
+        console.print(f"NO ANSWER seed {answer['seed']}: {answer['broken']}")
+    return len(differs) + len(broken)
+
+
+def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
+    """What refused, most frequent first; of each condition how many scenes it refused alone, and which were wrong."""
+    scenes: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    alone: Counter[str] = Counter()
+    for answer in refused:
+        for name in answer["conditions"]:
+            scenes[name].append(answer)
+        if len(answer["conditions"]) == 1:
+            alone[next(iter(answer["conditions"]))] += 1
+    table = Table(title="Refused by", title_justify="left")
+    for heading in ("condition", "scenes", "alone", "off", "worst", "seeds"):
+        table.add_column(heading, no_wrap=heading != "seeds")
+    for name, those in sorted(scenes.items(), key=lambda item: -len(item[1])):
+        values = [answer["conditions"][name] for answer in those]
+        wrong = sum(not answer["off"] <= WRONG for answer in those)
+        worst = max((value for value in values if value == value), default=math.nan)
+        seeds = " ".join(str(answer["seed"]) for answer in those[:NAMED]) + (" ..." if len(those) > NAMED else "")
+        table.add_row(name, str(len(those)), str(alone[name]), str(wrong), number(worst, 2), seeds)
+    table.caption = f"off: those of them that are more than {WRONG:g} m off runs with other steps"
+    return table
+
+
+def _tenth(values: Any) -> float:
+    return float(np.quantile(values, 0.9))
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no nan and no infinity: null."""
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

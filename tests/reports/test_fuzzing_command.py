@@ -1,0 +1,110 @@
+"""certify --random: what differs or does not answer fails the command, and no scene can stop it."""
+
+import json
+import os
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import certifying, fuzzing, main
+
+
+def answer(seed, dimension=2, **changed):
+    plain = {
+        "seed": seed, "dimension": dimension, "certified": True, "conditions": {}, "bound": 1e-10, "off": 5e-11,
+        "farthest": "dt/9.4", "defects": [], "refused_variants": {},
+    }  # fmt: skip
+    return plain | changed
+
+
+def certify(monkeypatch, *answers, flags=("--dim", "2")):
+    asked = []
+
+    def attacked(jobs):
+        asked.extend(jobs)
+        return iter(answers)
+
+    monkeypatch.setattr(fuzzing, "attacked", attacked)
+    return CliRunner().invoke(main, ["certify", "--random", "3", "--seed", "5", *flags]), asked
+
+
+def test_scenes_that_agree_pass(monkeypatch):
+    result, asked = certify(monkeypatch, answer(5), answer(6), answer(7))
+    assert result.exit_code == 0 and asked == [(5, 2), (6, 2), (7, 2)]
+    assert "3 scenes, 3 certified, 0 refused" in result.stderr
+    assert "half below 0.5" in result.stderr
+
+
+def test_both_dimensions_are_asked_where_none_is_named(monkeypatch):
+    _, asked = certify(monkeypatch, flags=())
+    assert asked == [(seed, d) for d in (2, 3) for seed in (5, 6, 7)]
+
+
+def test_a_certified_scene_that_differs_fails_and_is_named(monkeypatch):
+    result, _ = certify(monkeypatch, answer(6, defects=[["mirrored", 0.25, 1e-5, 2e-12]]))
+    assert result.exit_code == 1
+    assert "DEFECT seed 6, mirrored: 1.00e-05 m apart at 0.25 s" in result.stderr
+
+
+def test_what_refuses_is_counted_and_wrong_answers_apart(monkeypatch):
+    refused = [
+        answer(5, certified=False, conditions={"cone": 2e-7}, off=1e-12),
+        answer(6, certified=False, conditions={"cone": 3e-5, "fallback": 1.0}, off=1e-4),
+        answer(7, certified=False, conditions={"fallback": 2.0}, off=float("inf")),
+    ]
+    result, _ = certify(monkeypatch, *refused, flags=("--dim", "2", "--json"))
+    assert result.exit_code == 0  # a refusal is honest
+    rows = [line.split("│")[1:-1] for line in result.stderr.splitlines() if line.startswith("│")]
+    assert [[cell.strip() for cell in row] for row in rows] == [
+        ["cone", "2", "1", "1", "3.0e-5", "5 6"],
+        ["fallback", "2", "1", "2", "2", "6 7"],
+    ]
+    assert [each["off"] for each in json.loads(result.stdout)] == [1e-12, 1e-4, None]
+
+
+def test_no_answer_fails(monkeypatch):
+    result, _ = certify(monkeypatch, {"seed": 6, "dimension": 2, "broken": "ValueError: no"})
+    assert result.exit_code == 1 and "NO ANSWER seed 6: ValueError: no" in result.stderr
+
+
+def serve_badly(connection):
+    """Answers of a child: seed 0 plainly, 1 never, 2 by its death."""
+    connection.send_bytes(fuzzing.READY)
+    while True:
+        seed, dimension = json.loads(connection.recv_bytes())
+        if seed == 1:
+            time.sleep(600.0)
+        if seed == 2:
+            os._exit(3)
+        connection.send_bytes(json.dumps(answer(seed, dimension)).encode())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="children are guarded by a fork")
+def test_a_scene_that_hangs_or_kills_its_process_stops_no_other(monkeypatch):
+    monkeypatch.setattr(fuzzing, "serve", serve_badly)
+    found = {each["seed"]: each for each in fuzzing.attacked([(1, 2), (2, 2), (0, 2), (3, 3)], limit=20.0)}
+    assert "no answer after" in found[1]["broken"] and "exit code 3" in found[2]["broken"]
+    assert "broken" not in found[0] and "broken" not in found[3]
+
+
+def test_what_a_scene_raises_is_its_answer():
+    sent = []
+
+    asked = [json.dumps([3, 5]).encode()]
+
+    class Connection:
+        def recv_bytes(self):
+            if not asked:
+                raise EOFError
+            return asked.pop()
+
+        send_bytes = sent.append
+
+    fuzzing.serve(Connection())
+    assert sent[0] == fuzzing.READY and json.loads(sent[1])["broken"]
+
+
+def test_the_command_hands_over(monkeypatch):
+    monkeypatch.setattr(certifying, "show_random", lambda console, as_json, count, seed, dims: 7)
+    assert CliRunner().invoke(main, ["certify", "--random", "1"]).exit_code == 7
