@@ -116,7 +116,8 @@ def _laws(run: Run) -> Iterator[float]:
     # Where the direction of a slip turns within a piece, its friction is a mean of directions; in the plane there are
     # but two, and the normal's turn is known.
     swing = _angle(first, last) if run.d == 3 else np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
-    missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * swing) - leaning
+    turned = swing + np.where(sure[:, 0], 0.0, _unsure_turn(run, slip))
+    missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * turned) - leaning
     yield _worst(np.where(coarse, 0.0, missed), scale)
 
     about = cross(over.point, pieces.impulse)
@@ -168,6 +169,23 @@ def _speeds(run: Run) -> Array:
             total += np.where(row >= 0, np.linalg.norm(v, axis=1) + far * np.linalg.norm(w, axis=1), 0.0)
         del i
     return np.asarray(0.5 * total)
+
+
+def _unsure_turn(run: Run, slip: Array) -> Array:
+    """Sine (c,) by which a slip may be turned that was taken at the point of the start, at most 2.
+
+    In the piece that point goes elsewhere on bodies that spin.
+    """
+    pieces = run.pieces
+    passing = np.zeros(len(slip))
+    for i, row in ((pieces.body_a, run.side[0]), (pieces.body_b, run.side[1])):
+        arm = pieces.point - np.where((row >= 0)[:, None], pieces.pose_before[row, : run.d], pieces.point)
+        spins = [np.linalg.norm(x[row, run.d :], axis=1) for x in (pieces.twist_before, pieces.twist_after)]
+        spin = np.where(row >= 0, np.maximum(*spins), 0.0)
+        passing += spin * spin * np.linalg.norm(arm, axis=1) * pieces.length[run.contact_owner]
+        del i
+    size = np.linalg.norm(slip, axis=1)
+    return np.minimum(np.divide(passing, size, out=np.full(len(size), 2.0), where=size > 0.0), 2.0)
 
 
 def _angle(one: Array, other: Array) -> Array:

@@ -90,7 +90,10 @@ def _alone(owner: Indices, pairs: Indices) -> Array:
 
 
 def changes_of_force(run: Run) -> Array:
-    """Share (c,) by which the force between two bodies changes in a piece, as its neighbours in time tell."""
+    """Share (c,) by which the force between two bodies changes in a piece, as its neighbours in time tell.
+
+    Of its direction as well: friction turns with the slip.
+    """
     pieces, owner = run.pieces, run.contact_owner
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     length = pieces.length[owner]
@@ -101,10 +104,11 @@ def changes_of_force(run: Run) -> Array:
         at, first = np.unique(owner[rows], return_inverse=True)
         total = np.zeros((len(at), run.d))
         np.add.at(total, first, pieces.impulse[rows])
-        force = np.linalg.norm(total, axis=1) / pieces.length[at]
+        mean = total / pieces.length[at][:, None]
+        force = np.linalg.norm(mean, axis=1)
         begin, end = pieces.begin[at], pieces.begin[at] + pieces.length[at]
         follows = np.abs(begin[1:] - end[:-1]) <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(end[:-1]))
-        step = np.abs(np.diff(force)) * 2.0 / (pieces.length[at][1:] + pieces.length[at][:-1])
+        step = np.linalg.norm(np.diff(mean, axis=0), axis=1) * 2.0 / (pieces.length[at][1:] + pieces.length[at][:-1])
         step = np.where(follows, step, 0.0)
         known = np.concatenate([[False], follows]) & np.concatenate([follows, [False]])
         rate = np.maximum(np.concatenate([[0.0], step]), np.concatenate([step, [0.0]]))
