@@ -489,6 +489,20 @@ def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
 
 
 @inner_kernel
+def stops_at_once(lasting: Lasting) -> bool:
+    """Whether a slip in space that is all but nothing ends: the projection that takes it out knows no cone.
+
+    A frozen solve over the instant does (E54).
+    """
+    for k in range(lasting.size[CONTACTS]):
+        onward = lasting.monitor[LAST, k, ONWARD]
+        if lasting.size[TANGENTS] > 1 and lasting.mode[k] == SLIP and lasting.friction[k] > 0.0:
+            if lasting.monitor[START, k, ONWARD] <= FORCE_NOISE and onward < -FORCE_NOISE:
+                return True
+    return False
+
+
+@inner_kernel
 def end_first(bodies: Bodies, lasting: Lasting) -> None:
     """Change the mode that ends as soon as the phase has begun: gaps that were open by round-off are closed by then."""
     worst, which, what = 0.0, -1, LOAD
@@ -623,6 +637,8 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
         elif error > 1.0:
             parts = math.ceil(max(error, 1.0) ** 0.2 / SAFETY)
             length, outcome = length / max(parts, 2), SHORTENED
+        elif stops_at_once(lasting):
+            break
         elif switch_at_once(bodies, lasting):
             if not start_slopes(bodies, lasting):
                 break
