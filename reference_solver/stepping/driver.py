@@ -22,7 +22,9 @@ from reference_solver.stepping.clock import (
     HASTE,
     HELD,
     HOPPED,
+    INSTANT,
     LEFT,
+    LONGER_BRIEF,
     OUTCOME,
     REBOUND,
     ROCKING,
@@ -122,14 +124,15 @@ def make_sub_step(island: Island) -> bool:
     length = solve_sub_step(island)
     if tally[CONTRADICTED_A] > 0.0:
         return True
+    island.sub.lasting.lenient[0] = 1.0 if clock[LONGER_BRIEF] > INSTANT else 0.0
     phase = enter_path(island, length)
     if phase == NO_PHASE:
+        go_back(tally, island.sub.opened)
+        return_to_start(island)
         if clock[ROCKING] > 0.0:
             clock[ROCKS] = UNTIL_REST
         else:
             give_up_phase(clock, tally)
-        go_back(tally, island.sub.opened)
-        return_to_start(island)
         return True
     length = phase if phase > 0.0 else length
     end = next_impact(island, length)

@@ -81,6 +81,7 @@ class Lasting(NamedTuple):
     length: Array  # (1,): of the step being made [s]
     error: Array  # (1,): of the step made last, see `phase.relative_error`
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
+    lenient: Array  # (1,): 1 where a slip that is all but nothing may be projected away
     spin: Array  # (V,)
     trial: Array  # (k, 2, 1 + T, V): rows at the start of a path
 
@@ -136,6 +137,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         length=np.zeros(1),
         error=np.zeros(1),
         early=np.ones(1),
+        lenient=np.zeros(1),
         spin=np.zeros(v),
         trial=np.zeros((k, 2, 1 + t, v)),
     )

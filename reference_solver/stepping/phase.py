@@ -492,8 +492,10 @@ def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
 def stops_at_once(lasting: Lasting) -> bool:
     """Whether a slip in space that is all but nothing ends: the projection that takes it out knows no cone.
 
-    A frozen solve over the instant does (E54).
+    A frozen solve over an instant does (E54); where slip is left even after that, for rows that turn, it is round-off.
     """
+    if lasting.lenient[0] > 0.0:
+        return False
     for k in range(lasting.size[CONTACTS]):
         onward = lasting.monitor[LAST, k, ONWARD]
         if lasting.size[TANGENTS] > 1 and lasting.mode[k] == SLIP and lasting.friction[k] > 0.0:
