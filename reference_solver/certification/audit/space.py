@@ -107,13 +107,29 @@ def _rotation_vector(q: Array, p: Array) -> Array:
     return np.asarray(vector * np.where(sine > 1e-12, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
 
 
+def _vector_rate(psi: Array, w: Array) -> Array:
+    """Rates (s, 3) of rotation vectors psi at angular velocities w, world axes (J. Stuelpnagel, SIAM Rev. 6, 1964).
+
+    ``psi' = w - psi x w / 2 + c psi x (psi x w)``, ``c = (1 - (a/2) cot(a/2))/a^2`` of the angle a.
+    """
+    half = 0.5 * np.linalg.norm(psi, axis=1)
+    large = half > 1e-3  # below it the next term of the series is 1e-9 of this one
+    safe = np.where(large, half, 1.0)
+    share = np.where(large, (1.0 - safe / np.tan(safe)) / (4.0 * safe * safe), 1.0 / 12.0)
+    across = np.cross(psi, w)
+    return np.asarray(w - 0.5 * across + share[:, None] * np.cross(psi, across))
+
+
 def _pose_at(path: Path, k: Indices, t: Array) -> Array:
     """Poses (s, P) on intervals k after the time t (s,) of each, by cubic Hermite polynomials."""
     d = 2 if path.pose.shape[1] == 3 else 3
     length = path.length[k]
     s = np.clip(t / np.where(length > 0.0, length, 1.0), 0.0, 1.0)[:, None]
     whole, late = s * s * (3.0 - 2.0 * s), length[:, None] * s
-    moved = whole * path.way[k] + late * (1.0 - s) ** 2 * path.first[k] + late * s * (s - 1.0) * path.last[k]
+    last = path.last[k]
+    if d == 3:
+        last = np.concatenate([last[:, :3], _vector_rate(path.way[k][:, 3:], last[:, 3:])], axis=1)
+    moved = whole * path.way[k] + late * (1.0 - s) ** 2 * path.first[k] + late * s * (s - 1.0) * last
     place = path.pose[k][:, :d] + moved[:, :d]
     if d == 2:
         return np.concatenate([place, path.pose[k][:, 2:] + moved[:, 2:]], axis=1)
