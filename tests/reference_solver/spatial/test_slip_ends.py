@@ -1,0 +1,63 @@
+"""Slips in space that turn while they end: approached by steps that halve the time left, never stepped over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certification.fuzz.scenes import scene
+from reference_solver.certification.truth import certify
+from reference_solver.pieces import FORCES, IMPULSE_LEVEL
+
+G, UPRIGHT = 9.81, (1.0, 0.0, 0.0, 0.0)
+
+
+def on_floor(body: Body, friction: float) -> Model:
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT))
+    return Model(3, [floor, body], (0.0, 0.0, -G), 0.0, friction)
+
+
+def sliding_box(spin: float) -> Model:
+    half = np.array([0.3, 0.2, 0.05])
+    inertia = tuple(float(x) for x in (half @ half - half * half) / 3.0)
+    twist = (0.8, 0.3, 0.0, 0.0, 0.0, spin)
+    return on_floor(Body(Box((0.3, 0.2, 0.05)), 1.0, inertia, (0.0, 0.0, 0.05, *UPRIGHT), twist), 0.4)
+
+
+@pytest.mark.parametrize("spin", [0.5, 4.0])
+def test_a_box_that_slides_and_spins_comes_to_rest_with_a_certificate(spin):
+    """Both end at the same instant, as all four slips do: the last steps went by the fixed scheme, and were refused."""
+    certificate = certify(sliding_box(spin), Settings.reference(1 / 240), 120)
+    assert certificate.holds, certificate.reasons
+    assert certificate.error[-1] < 1e-7
+    simulation = Simulation(sliding_box(spin), Settings.reference(1 / 240))
+    record = simulation.record(120, pieces=True)
+    assert simulation.certificate["held_steps"] == 0
+    assert not ((record.pieces.kind == FORCES) & (record.pieces.scheme == IMPULSE_LEVEL)).any()
+    assert np.abs(record.twist[-1, 1]).max() < 1e-12
+    slides, spins = np.linalg.norm(record.twist[:, 1, :2], axis=1), np.abs(record.twist[:, 1, 5])
+    assert (slides > 1e-9).sum() == (spins > 1e-9).sum()  # neither ends before the other
+
+
+def test_friction_of_a_slip_that_turns_as_it_ends_stays_on_its_cone():
+    """A ball with unequal moments: its slip turns by a power of the time left, which no step over the end can follow."""
+    ball = Body(Sphere(0.3), 1.0, (0.03, 0.045, 0.02), (0.0, 0.0, 0.3, *UPRIGHT), (1.0, -0.5, 0.0, 3.0, 2.0, 5.0))
+    model = on_floor(ball, 0.3)
+    record = Simulation(model, Settings.reference(1 / 60)).record(30, pieces=True)
+    pieces = record.pieces
+    pressed = (pieces.impulse * pieces.normal).sum(axis=1)
+    along = np.linalg.norm(pieces.impulse - pressed[:, None] * pieces.normal, axis=1)
+    assert len(pressed) > 30  # it slides, and rolls
+    step = G / 60  # impulse of the weight over one
+    assert (along <= 0.3 * pressed + 1e-12 * step).all()
+    certificate = certify(model, Settings.reference(1 / 60), 30)
+    assert certificate.holds, certificate.reasons
+    assert certificate.error[-1] < 1e-7
+
+
+@pytest.mark.parametrize("seed", [2, 8, 14, 26, 31, 55])
+def test_random_scenes_that_were_refused_for_the_end_of_a_slip_are_certified(seed):
+    drawn = scene(seed, 3)
+    certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, 5)
+    assert certificate.holds, certificate.reasons
