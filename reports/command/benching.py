@@ -23,6 +23,7 @@ from reports import speed
 from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.piles import show_piles
 from reports.command.selection import JOBS, SECONDS, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from reports.stages import stage
@@ -49,17 +50,23 @@ AGREEMENT = 0.9
 @click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option(
+    "--piles", type=click.IntRange(20), metavar="N", help="Instead: piles of 20 to N bodies, by two profiles."
+)
 @click.option("--brief", is_flag=True, help="Print no tables: they stand in OUT/bench and in the report.")
 @AS_JSON
 @OUT
-def bench(out: Path, as_json: bool, brief: bool, **options: Any) -> None:
+def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
     """Measure errors and times of SCENES over steps and iterations; time at equal error, scaling, overhead.
 
     Errors come first, in worker processes; then everything is timed in a lane of its own. --quick takes under two
     minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
-    than 90 % of the ratios agree.
+    than 90 % of the ratios agree. With --piles what the reference costs in piles, against its own fixed steps.
     """
     console = terminal(stderr=True)
+    if piles is not None:
+        show_piles(console, as_json, piles, options["seed"] or 0)
+        return
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
     options["full"] = not options["quick"]

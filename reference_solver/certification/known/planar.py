@@ -90,7 +90,7 @@ def sliding_fall(space: Space, rng: Rng) -> Motion:
     the right, ``I q'' = N (-s_x - mu s_y)`` and ``x'' = -mu N/m``.
     """
     half = (rng.uniform(0.15, 0.4), rng.uniform(0.3, 0.6))
-    mu, lean, time = rng.uniform(0.05, 0.3), rng.uniform(0.1, 0.4), 0.25
+    mu, lean, time = rng.uniform(0.05, 0.3), rng.uniform(0.1, 0.4), rng.uniform(0.1, 0.3)
     inertia = (half[0] ** 2 + half[1] ** 2) / 3.0
     start, slip = -math.atan2(half[0], half[1]) - lean, rng.uniform(2.0, 3.0)
 
@@ -107,7 +107,12 @@ def sliding_fall(space: Space, rng: Rng) -> Motion:
     spin = rng.uniform(-0.5, 0.0)
     x, y = lever(start)
     # The corner goes with the slip: its velocity is v + w s_y.
-    state, _ = integrated(rate, np.array([start, spin, x, slip - spin * y]), time)
+    first = np.array([start, spin, x, slip - spin * y])
+    # Until it lies, or the slip ends.
+    state, left = integrated(rate, first, time, lambda s: min(s[0] + 0.5 * math.pi, s[3] + s[1] * lever(s[0])[1]))
+    if left > 0.0:
+        time = 0.9 * (time - left)
+        state, _ = integrated(rate, first, time)
     angle, _, along, _ = state
     box = space.box(x, y, space.twist(slip - spin * y, spin * x, spin), half, 1.0, start)
     truth = np.array(space.pose(float(along), lever(angle)[1], float(angle)))
@@ -208,11 +213,11 @@ def _rolled(
     while True:
         tested, checked = state, 0.0
         state, rest = integrated(rate, state, left, lambda s: part - s[0])
-        while checked < left - rest:  # along the way
-            tested, _ = integrated(rate, tested, 0.01)
-            checked += 0.01
+        while checked < left - rest:  # along the way, from its start
             if pressed(tested) < 0.0:
                 return None
+            tested, _ = integrated(rate, tested, 0.01)
+            checked += 0.01
         if pressed(state) < 0.0 or (rest == 0.0 and part - state[0] < 0.02 * state[1]):
             return None
         if rest == 0.0:
