@@ -107,14 +107,15 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     ),
     *(
         Experiment(
-            "slide-touching-start",
+            f"{scene}-touching-start",
             "with more sweeps, or from a start inside the slop, nothing lifts off; a smaller slop changes nothing",
             "default",
-            "slide",
+            scene,
             "hop",
             off,
             idle=({"collision_slop": 1e-5},),
         )
+        for scene in ("slide", "conveyor")
         for off in ({"iterations": 1000}, _INSIDE)
     ),
 )

@@ -21,6 +21,7 @@ OURS = (
     "v_groove",
     "pinch",
     "slide",
+    "conveyor",
     "slide_to_roll",
     "oblique",
     "roll_incline",
