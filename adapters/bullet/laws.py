@@ -188,7 +188,7 @@ def pulled_with_drag(scene: Scene, dt: float, measure: Measure) -> Prediction | 
     twist = np.zeros((steps + 1, 2, 3 if d == 2 else 6))
     pose[1:, 1, :d] += np.outer(np.cumsum(speed[1:]) * dt, line)
     twist[:, 1, :d] = np.outer(speed, line)
-    motion = Trajectory(np.arange(steps + 1) * dt, pose, twist, None, dt, "completed")
+    motion = Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")
     value, _ = measure(scene, motion)["pull"]
     return None if value is None else (value, 6.0 * RESIDUAL_SPEED / scene.duration)
 

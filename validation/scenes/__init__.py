@@ -22,6 +22,7 @@ OURS = (
     "pinch",
     "slide",
     "conveyor",
+    "wedge",
     "slide_to_roll",
     "oblique",
     "roll_incline",
