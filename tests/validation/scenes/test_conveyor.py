@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -15,15 +16,6 @@ DT = 1 / 240
 def made(dimension=2, **params):
     canonical = CATALOGUE["conveyor"]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def ridden(scene, dt=DT, mu=None, belt=None, offset=0.0):

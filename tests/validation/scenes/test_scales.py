@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
@@ -18,15 +19,6 @@ LENGTHS = [1e-6, 1e-3, 1.0, 1e3]
 def made(**params):
     canonical = CATALOGUE["scales"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
