@@ -90,6 +90,9 @@ def test_a_wedge_or_a_block_that_goes_otherwise_fails(size):
         gone = slid(scene)
         gone.pose[-1, k, axis] += size
         assert failing(canonical, scene, gone) == {"off_the_face"}
+    raised = slid(scene)
+    raised.pose[-1, 1:, 1] += size
+    assert failing(canonical, scene, raised) == {"off_the_face"}
     for k in (1, 2):
         turned = slid(scene)
         turned.pose[-1, k, 2] += 10.0 * size
