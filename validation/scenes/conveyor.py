@@ -1,7 +1,7 @@
 r"""A box is set down on a belt that runs: friction drags it until it goes with the belt.
 
        +---+
-       |   |  x = V t - v^2/(2 mu g)       slips for V/(mu g), pulled by mu g,
+       |   |  x = V t - V^2/(2 mu g)       slips for V/(mu g), pulled by mu g,
      ==========   V ->                     and leaves a mark of V^2/(2 mu g) on the belt;
     (o)      (o)                           from then on it rests against the belt
 
