@@ -127,4 +127,27 @@ ON_LOADS: tuple[Experiment, ...] = (
         {"aspect": 1.0, "ratio": 1.1},
         idle=(_SOLVED,),
     ),
+    Experiment(
+        "wedge-drag",
+        "without drag no momentum is lost but for 1e-10 N s; a wider margin does nothing",
+        "default",
+        "wedge",
+        "momentum",
+        _NO_DRAG,
+        idle=({"contactBreakingThreshold": 0.1},),
+        within=1e-8,
+    ),
+    *(
+        Experiment(
+            "wedge-hull-margin",
+            "without Baumgarte nothing is lifted; solving further does nothing",
+            profile,
+            "wedge",
+            "moved",
+            {"contactERP": 0.0},
+            {"mu": 0.7},
+            idle=(_SOLVED,),
+        )
+        for profile in ("default", "tuned", "one")
+    ),
 )

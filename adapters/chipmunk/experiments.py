@@ -107,15 +107,29 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     ),
     *(
         Experiment(
-            "slide-touching-start",
+            f"{scene}-touching-start",
             "with more sweeps, or from a start inside the slop, nothing lifts off; a smaller slop changes nothing",
             "default",
-            "slide",
+            scene,
             "hop",
             off,
             idle=({"collision_slop": 1e-5},),
         )
+        for scene in ("slide", "conveyor")
         for off in ({"iterations": 1000}, _INSIDE)
+    ),
+    *(
+        Experiment(
+            "wedge-touching-start",
+            "with more sweeps, a start inside the slop, or a slop that leaves no overlap, the block slides right; "
+            "pushing out faster does nothing",
+            "default",
+            "wedge",
+            "acceleration",
+            off,
+            idle=({"collision_bias": 0.5},),
+        )
+        for off in ({"iterations": 100}, _INSIDE, {"collision_slop": 1e-5})
     ),
 )
 

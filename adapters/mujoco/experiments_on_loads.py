@@ -12,6 +12,8 @@ _NO_SPRING = {"solref": "reflect", "solimp": RIGID, "kappa_elastic": 0.0, "kappa
 #: Friction damped so slowly that it stops no slip in a step, and so slowly that it hardly acts.
 _GENTLE: dict[str, Any] = {"solreffriction": (1.0, 1.0)}
 _NONE: dict[str, Any] = {"solreffriction": (1000.0, 1.0)}
+#: And in between: a load that gives way hops with the first and slips with the second.
+_SLOW: dict[str, Any] = {"solreffriction": (2.0, 1.0)}
 
 
 def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
@@ -120,5 +122,40 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
             {"solreffriction": None},
             {"ratio": 1.1},
             idle=({"impratio": 1e4}, {"margin": 0.0}),
+        ),
+        *(
+            Experiment(
+                "wedge-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing; solving further does nothing",
+                "tuned",
+                "wedge",
+                metric,
+                _SLOW,
+                idle=({"tolerance": 0.0, "iterations": 1000},),
+            )
+            for metric in ("given_way", "acceleration", "off_the_face")
+        ),
+        Experiment(
+            "wedge-viscous-friction",
+            "stiff friction (impratio 100) on an elliptic cone holds; solving further does not",
+            "default",
+            "wedge",
+            "moved",
+            {"impratio": 100.0, "cone": "elliptic"},
+            {"mu": 0.7},
+            idle=({"tolerance": 0.0},),
+        ),
+        *(
+            Experiment(
+                "wedge-soft-contact",
+                "with rigid contacts, and friction that lifts nothing, both go as they should; a round cone or solving "
+                "further does not do it",
+                "default",
+                "wedge",
+                metric,
+                hold | _SLOW,
+                idle=({"cone": "elliptic"}, {"tolerance": 0.0}),
+            )
+            for metric in ("given_way", "acceleration", "momentum", "off_the_face", "turned")
         ),
     )

@@ -146,23 +146,31 @@ def on_rods(reflect: Mapping[str, Any], hold: Mapping[str, Any]) -> tuple[Experi
             )
             for metric in ("momentum_defect", "asymmetry")
         ),
-        Experiment(
-            "scales-soft-contact",
-            "with the velocity reflected in the step after contact the ball rises as it should; solving does nothing",
-            "default",
-            "scales",
-            "apex",
-            {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
-            idle=(_FURTHER,),
+        *(
+            Experiment(
+                "scales-soft-contact",
+                "with the velocity reflected in the step after contact the ball rises right; solving does nothing",
+                "default",
+                "scales",
+                "apex",
+                {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
+                dimension=dimension,
+                idle=(_FURTHER,),
+            )
+            for dimension in (2, 3)
         ),
-        Experiment(
-            "scales-soft-contact",
-            "with rigid contacts the box does not lean; solving does nothing",
-            "default",
-            "scales",
-            "turned",
-            {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
-            idle=(_FURTHER,),
+        *(
+            Experiment(
+                "scales-soft-contact",
+                "with rigid contacts the box does not lean; solving does nothing",
+                "default",
+                "scales",
+                "turned",
+                {**reflect, "kappa_plastic": 0.1, "solreffriction": (0.05, 1.0)},
+                dimension=dimension,
+                idle=(_FURTHER,),
+            )
+            for dimension in (2, 3)
         ),
         *(
             Experiment(
@@ -173,10 +181,11 @@ def on_rods(reflect: Mapping[str, Any], hold: Mapping[str, Any]) -> tuple[Experi
                 "hop",
                 _GENTLE,
                 params,
+                dimension,
                 idle=({"impratio": 100.0},),
                 within=1.71e-4,
             )
-            for params in (dict[str, float](), {"length": 1e3})
+            for params, dimension in ((dict[str, float](), 2), ({"length": 1e3}, 2), (dict[str, float](), 3))
         ),
         Experiment(
             "rack-soft-contact",

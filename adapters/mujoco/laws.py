@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from adapters.law import Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
+from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
@@ -90,6 +91,11 @@ DEVIATIONS: tuple[Deviation, ...] = (
         _deviation(profile, "far_origin", metric, on_a_plate(stopping_law(profile, metric), metric), "slide")
         for profile in PROFILES
         for metric in ("stopping_distance", "braking", "hop", "turned")
+    ),
+    *(
+        _deviation(profile, "conveyor", metric, on_a_belt(profile, metric), "slide")
+        for profile in PROFILES
+        for metric in ("slipped", "pull", "hop", "turned")
     ),
     *(
         _deviation(profile, "pressed_box", metric, incline_law(profile, metric), "incline")

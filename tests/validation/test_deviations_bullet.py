@@ -11,7 +11,7 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 from adapters import needs, run
 from adapters.bullet import BulletEngine
 from adapters.bullet.contact_law import ContactLaw, fall
-from adapters.bullet.laws import DEVIATIONS, sliding_with_drag
+from adapters.bullet.laws import DEVIATIONS, pulled_with_drag, sliding_with_drag
 from adapters.engine_folder import covering
 from adapters.law import Deviation
 from validation.catalogue import CATALOGUE
@@ -143,6 +143,23 @@ def test_the_law_of_drag_is_silent_where_a_step_is_longer_than_contact_points_ma
         if law is not None:
             value, _ = execute(Slot("incline", (("ratio", ratio),), 3, "bullet", "default", dt)).metrics["acceleration"]
             assert abs(value - law[0]) <= law[1]
+
+
+@pytest.mark.parametrize(("params", "dimension"), [({}, 2), ({}, 3), ({"v": 0.5, "mu": 0.1}, 3)])
+def test_drag_of_the_default_profile_predicts_the_pull_of_a_belt(params, dimension):
+    rows = compare("conveyor", params, "default", 1 / 240, dimension)
+    assert_predicted(rows, 1)
+    _, (centre, band), check = rows["pull"]
+    assert abs(check.truth - centre) > band  # and the textbook is not within its band
+
+
+def test_a_belt_of_half_a_percent_less_friction_is_not_explained_by_drag_and_a_fast_one_has_no_law():
+    canonical = CATALOGUE["conveyor"]
+    (centre, band), (other, _) = (
+        pulled_with_drag(canonical.scene(3, {"mu": mu}), 1 / 240, canonical.measure) for mu in (0.4, 0.398)
+    )
+    assert abs(other - centre) > 5.0 * band
+    assert pulled_with_drag(canonical.scene(3, {"v": 3.0}), 1 / 240, canonical.measure) is None
 
 
 def test_sticking_box_has_no_law():

@@ -29,6 +29,9 @@ CELLS = [
     ("slide", {}, "default", 2, {"braking", "hop", "turned"}),
     ("slide", {}, "tuned", 3, {"braking", "hop"}),
     ("slide", {"heading": 22.5}, "tuned", 3, {"braking", "hop"}),
+    ("conveyor", {}, "default", 2, {"pull", "hop", "turned"}),
+    ("conveyor", {}, "tuned", 3, {"pull", "hop"}),
+    ("conveyor", {"heading": 22.5}, "tuned", 3, {"pull", "hop"}),
     ("oblique", {"mu": 0.1}, "default", 2, {"rebound_ratio", "forward_speed", "spin_speed"}),
     ("oblique", {"mu": 0.1, "heading": 30.0}, "tuned", 3, {"rebound_ratio", "forward_speed", "spin_speed"}),
     ("oblique", {"v": 1.0, "spin": -10.0, "mu": 1.0}, "default", 3, {"rebound_ratio", "forward_speed", "spin_speed"}),
@@ -67,6 +70,17 @@ def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, prof
 def test_a_pyramid_off_its_axis_is_not_predicted(name, params, profile, metric):
     (law,) = covering("mujoco", "4.0.1", profile, name, metric)
     assert law.law(CATALOGUE[name].scene(3, params), DT, CATALOGUE[name].measure) is None
+
+
+def test_the_law_of_a_belt_is_measured_in_the_room():
+    """From rest to the belt's velocity, on the floor's level."""
+    canonical, seen = CATALOGUE["conveyor"], []
+    (law,) = covering("mujoco", "4.0.1", "tuned", "conveyor", "pull")
+    scene = canonical.scene(3, {"heading": 22.5})
+    law.law(scene, DT, lambda scene, trajectory: seen.append(trajectory) or canonical.measure(scene, trajectory))
+    run = scene.bodies[0].surface_velocity
+    assert seen[0].twist[0, 1, :3] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert seen[0].twist[-1, 1, :3] == pytest.approx(run, abs=1e-3)
 
 
 def test_a_bar_that_turns_under_a_soft_contact_is_not_predicted():

@@ -21,6 +21,8 @@ OURS = (
     "v_groove",
     "pinch",
     "slide",
+    "conveyor",
+    "wedge",
     "slide_to_roll",
     "oblique",
     "roll_incline",

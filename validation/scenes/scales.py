@@ -116,7 +116,7 @@ SCENE = CanonicalScene(
     title="The same scene in millimetres and in kilometres",
     figure=__doc__ or "",
     law="stops after v^2/(2 mu g), rises to e^2 of its fall: in units of L the same whatever L and the mass are",
-    dimensions=(2,),
+    dimensions=(2, 3),
     parameters=(
         Parameter("length", 1e-3, "m", "the unit L of all lengths: 1e-3 is a pebble, 1e3 a mountain", 1e-6, 1e6),
         Parameter("mass", 1.0, "kg", "of either body: a gram is 1e-3, a ton 1e3", 1e-9, 1e9),
@@ -126,7 +126,7 @@ SCENE = CanonicalScene(
     measure=measure,
     rule=checks,
     sampling=states,
-    quick=(Variation({}), Variation({"length": 1e3})),
+    quick=(Variation({}), Variation({"length": 1e3}, dimensions=(2,))),
     full=tuple(Variation({"length": length, "mass": mass}) for length in (1e-3, 1.0, 1e3) for mass in (1e-3, 1.0, 1e3)),
     planted=({}, {"length": 1e3}),
     primary=Primary(

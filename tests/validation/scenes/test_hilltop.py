@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
@@ -17,15 +18,6 @@ DT = 1 / 240
 def made(**params):
     canonical = CATALOGUE["hilltop"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def integrated(scene, dt=DT, g=None, stuck=0.0, drag=0.0, late=0.0):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
@@ -17,15 +18,6 @@ CELLS = [{}, {"mu": 0.1, "e": 0.5}, {"along": -0.727}, {"along": 1.5, "mu": 0.1}
 def made(**params):
     canonical = CATALOGUE["kane"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def blown(scene, e=None, mu=None, heavy=1.0):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.engine import Contacts
 from adapters.trajectory import ContactRecord, Trajectory
@@ -16,15 +17,6 @@ DT = 1 / 240
 def made(**params):
     canonical = CATALOGUE["overhang"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def at_rest(scene, duration=2.0):

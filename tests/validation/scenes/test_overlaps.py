@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.reference.start import overlap_at_the_start
 from adapters.trajectory import Trajectory
@@ -14,15 +15,6 @@ SIZES = (0.1, 0.01, 0.001)
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if check.bound is not None and not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def parting(scene, share=0.2, kept=0.0, dt=DT, pull=0.0):

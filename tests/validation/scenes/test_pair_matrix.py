@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
@@ -14,15 +15,6 @@ DT = 1 / 240
 def made(dimension=2, **params):
     canonical = CATALOGUE["pair_matrix"]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def bouncing(scene, table, dt=DT):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
@@ -19,16 +20,6 @@ SIZES = [0.1, 0.01, 0.001]
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if check.bound is not None
-        and (measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound)
-    }
 
 
 def recorded(scene, times, place, tilt, velocity, spin, dt=DT):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -16,15 +17,6 @@ SIZES = [0.1, 0.01, 0.001]
 def made(**params):
     canonical = CATALOGUE["rack"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def broken(scene, dt=DT, e=1.0):

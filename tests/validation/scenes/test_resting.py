@@ -5,6 +5,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.optimize import linprog
 
 from adapters.engine import Contacts
@@ -19,15 +20,6 @@ SIZES = (0.1, 0.01, 0.001)
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if check.bound is not None and not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def at_rest(scene, impulses, duration=2.0):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
@@ -15,18 +16,9 @@ SIZES = [0.1, 0.01, 0.001]
 LENGTHS = [1e-6, 1e-3, 1.0, 1e3]
 
 
-def made(**params):
+def made(dimension=2, **params):
     canonical = CATALOGUE["scales"]
-    return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
+    return canonical, canonical.scene(dimension, params)
 
 
 def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
@@ -35,7 +27,7 @@ def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
     ``sunk`` [m]: how deep the box is let in; ``late``: of the impact, in steps.
     """
     length = scene.params["length"]
-    g = -scene.gravity[1]
+    g, up = -scene.gravity[-1], scene.dimension - 1
     times = np.arange(round(scene.duration / dt) + 1) * dt
 
     def landed(t, y):
@@ -58,20 +50,21 @@ def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
     stop = SPEED * length / (mu * g)
     t = np.minimum(times, stop)
     n = len(times)
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 3, 3))
-    pose[:, 1, 1], twist[:, 1, 1] = RADIUS * length + height, speed
+    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 3, 3 * up))
+    pose[:, 1, up], twist[:, 1, up] = RADIUS * length + height, speed
     pose[:, 2, 0], twist[:, 2, 0] = SPEED * length * t - 0.5 * mu * g * t * t, SPEED * length - mu * g * t
-    pose[1:, 2, 1] -= sunk
+    pose[1:, 2, up] -= sunk
     return Trajectory(times, pose, twist, None, dt, "completed")
 
 
 @pytest.mark.parametrize("late", [0.0, 0.5])
 @pytest.mark.parametrize("length", LENGTHS)
-def test_newton_s_laws_pass_in_every_unit_and_give_the_same_answers(length, late):
-    canonical, scene = made(length=length)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_newton_s_laws_pass_in_every_unit_and_give_the_same_answers(length, late, dimension):
+    canonical, scene = made(dimension, length=length)
     assert failing(canonical, scene, moved(scene, late=late)) == set()
     truth = canonical.exact(scene)
-    assert truth == pytest.approx(canonical.exact(made(length=1.0)[1]), rel=1e-12)
+    assert truth == pytest.approx(canonical.exact(made(dimension, length=1.0)[1]), rel=1e-12)
     found = canonical.measure(scene, moved(scene))
     assert [found[name][0] for name in truth] == pytest.approx(list(truth.values()), abs=1e-5)
 
@@ -93,6 +86,10 @@ def test_wrong_friction_restitution_and_boxes_that_sink_fail(length, size):
     assert "braking" in wrong and (size < 0.05 or "stopping_distance" in wrong)
     assert size < 0.005 or "apex" in failing(canonical, scene, moved(scene, dt, e=0.5 * (1.0 - 2.0 * size)))
     assert failing(canonical, scene, moved(scene, sunk=size * length)) == {"hop"}
+    canonical, spatial = made(3, length=length)
+    bent = moved(spatial)
+    bent.pose[-1, 2, 1] += size * length
+    assert failing(canonical, spatial, bent) == {"astray"}
 
 
 def test_numbers_in_metres_are_seen_where_they_are_large():

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
@@ -19,15 +20,6 @@ SIZES = (0.1, 0.01, 0.001)
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def sliding(scene, dt=DT, mu=None, offset=0.0):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.engine import Contacts
 from adapters.scene import SceneError
@@ -17,15 +18,6 @@ SIZES = [0.1, 0.01, 0.001]
 def made(**params):
     canonical = CATALOGUE["shove"]
     return canonical, canonical.scene(2, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def corners(body):

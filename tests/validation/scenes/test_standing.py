@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.engine import Contacts
 from adapters.trajectory import ContactRecord, Trajectory
@@ -30,15 +31,6 @@ def at_rest(scene, impulses, duration=3.0):
     rows = Contacts(a, b, *(np.zeros((n * len(pairs), 2)) for _ in range(2)), np.tile(each, (n, 1)), np.zeros(len(a)))
     record = ContactRecord(np.arange(n), len(pairs) * np.arange(n + 1), rows)
     return Trajectory(np.arange(n) * DT, pose, np.zeros_like(pose), record, DT, "completed")
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def scaled(trajectory, share):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planted import failing
 
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
@@ -14,15 +15,6 @@ DT = 1 / 240
 def made(dimension=2, **params):
     canonical = CATALOGUE["thin_wall"]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def thrown(scene, dt=DT, swept=True, e=None):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
@@ -18,15 +19,6 @@ SIZES = (0.1, 0.01, 0.001)
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound
-    }
 
 
 def recorded(scene, dt, x, z, turn, vx=0.0, vz=0.0, spin=0.0, stride=1):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planted import failing
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
@@ -17,16 +18,6 @@ CELLS = [{}, {"delta": 0.01, "spin": 6.0}, {"delta": 1.0, "spin": 1.0}, {"delta"
 def made(**params):
     canonical = CATALOGUE["tumble"]
     return canonical, canonical.scene(3, params)
-
-
-def failing(canonical, scene, trajectory):
-    measured = canonical.measure(scene, trajectory)
-    return {
-        check.metric
-        for check in canonical.checks(scene, trajectory.dt)
-        if check.bound is not None
-        and (measured[check.metric][0] is None or not abs(measured[check.metric][0] - check.truth) <= check.bound)
-    }
 
 
 def quaternion_rate(q, w):
