@@ -57,10 +57,10 @@ MEANINGS = {
 def slug(*parts: Any) -> str:
     """Anchor from names that may hold anything; distinct for names that differ in any character.
 
-    What is more than small letters, digits and dashes loses something here, so it carries a hash of all of it.
+    What is more than small letters, digits, dashes and underscores loses something here, so it carries a hash of it.
     """
     raw = "-".join(map(str, parts))
-    plain = re.sub(r"[^a-z0-9]+", "-", raw.lower()).strip("-")
+    plain = re.sub(r"[^a-z0-9_]+", "-", raw.lower()).strip("-")
     return plain if plain == raw else f"{plain or 'x'}-{hashlib.sha256(raw.encode()).hexdigest()[:8]}"
 
 
