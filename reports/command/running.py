@@ -30,6 +30,7 @@ from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.judging.rows import Row, rows_of
 from validation.posed import is_file, pinned, resolve
+from validation.questions.nulls import null_rows, with_skill
 from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.plan import slots
@@ -102,8 +103,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
 
 
 def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
-    plain = [row.as_dict() for row in rows]
-    written = exports.write_all(out, plain)
+    plain = [row.as_dict() for row in with_skill(rows)]
+    written = exports.write_all(out, plain, [row.as_dict() for row in null_rows(rows)])
     if options["junit"]:
         options["junit"].write_text(exports.as_junit(plain), encoding="utf-8")
     if options["markdown"]:
