@@ -43,6 +43,7 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--keep", is_flag=True, help="With --invariance: list the breaks that breaks.toml has a reason for.")
 @click.option("--invariance", is_flag=True, help="Ask instead what must not change an answer: order, heading, place.")
 @CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
@@ -75,7 +76,9 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         return
     if options["invariance"]:
         cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
-        sys.exit(statuses.verdict(not compare_and_show(cells, as_json), True))
+        sys.exit(statuses.verdict(not compare_and_show(cells, as_json, options["keep"]), True))
+    if options["keep"]:
+        raise SceneError("keep: lists breaks of invariance, and needs --invariance")
     if options["cluster"] and options["keep_trajectories"]:
         raise SceneError("keep_trajectories: a cluster sends observations only; run those cells here")
     folder(out)
