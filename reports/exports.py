@@ -73,7 +73,7 @@ COLUMNS = tuple(name for name in Row.__dataclass_fields__ if name not in ("slot"
 
 def flattened(row: Plain) -> dict[str, Any]:
     """A row without anything nested."""
-    return {name: _flat(row[name]) for name in COLUMNS}
+    return {name: _flat(row.get(name)) for name in COLUMNS}  # rows of an older file know fewer
 
 
 def _flat(value: Any) -> Any:

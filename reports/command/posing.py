@@ -21,7 +21,7 @@ from validation.findings.breaks import breaks_of, listed, standing_of, write
 from validation.findings.files import findings_folder
 from validation.judging.verdicts import Standing
 from validation.posed import resolve
-from validation.questions.invariance import FACTOR, MOVES, RELATIONS, Change, compare
+from validation.questions.invariance import FACTOR, INVISIBLE, MOVES, RELATIONS, Change, compare
 from validation.running.plan import QUICK_DT
 
 #: How a break's standing is said.
@@ -131,7 +131,8 @@ def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
     moves = ", ".join(map(str, MOVES))
     console.print()
     said = (
-        f"A change counts above {FACTOR:g} times the largest one from starts moved by {moves} units in the last place."
+        f"A change counts above {FACTOR:g} times the largest one from starts moved by {moves} units in the last place "
+        f"and {INVISIBLE:g} of its check's tolerance."
     )
     console.print(Text(said, style="dim"))
     console.print(Text("; ".join(f"{each.name}: {each.says}" for each in RELATIONS), style="dim"))
