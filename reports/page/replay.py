@@ -34,8 +34,8 @@ from validation.cells import Slot, format_dt
 from validation.posed import resolve
 from validation.running.tracks import Recording
 
-#: Levels of a length over the largest extent of the scene: half a pixel of a screen 8000 pixels wide.
-LENGTHS = 16000
+#: Levels of a length over the largest extent of the scene: half a pixel of a screen 4000 pixels wide.
+LENGTHS = 8000
 #: Levels of a contact's point and impulse: an arrow is read to a hundredth at best.
 ARROWS = 250
 #: Levels of an angle per radian, and of a quaternion's component.
