@@ -50,7 +50,7 @@ def check() -> None:
         )
 
 
-def load(folder: str | Path = "crosscheck-out", run: str = "latest") -> Any:
+def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> Any:
     """Rows of a run as a DataFrame; see `reports.exports.load`.
 
     Raises
@@ -63,7 +63,7 @@ def load(folder: str | Path = "crosscheck-out", run: str = "latest") -> Any:
     check()
     from reports.exports import load as load_rows
 
-    return load_rows(folder, run)
+    return load_rows(folder, run, nulls)
 
 
 def main() -> None:

@@ -9,7 +9,7 @@
         changes.toml      what the engine's own notes say of steps over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
         experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
-        findings/         families.toml and members.csv (`validation.findings`)
+        findings/         families.toml and members.csv (`validation.findings`), breaks.toml and breaks.csv
         decisive.csv      which settings of its cures matter, as measured (`validation.settings.decisive`)
         cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.settings.cures`)
 

@@ -16,20 +16,24 @@ from reports.findings import ALARMING, finding_line, grouped
 from reports.matrix import legend, matrix_of, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, rows_of
+from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Store
 
 Plain = Mapping[str, Any]
 
 
-def load(folder: str | Path = "crosscheck-out", run: str = "latest") -> pd.DataFrame:
+def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:
     """Rows of a run as a DataFrame, judged with today's checks, laws and findings.
+
+    With ``nulls`` followed by those of the nulls, which answer without an engine (engine ``none``).
 
     Raises
     ------
     StoreError
         If the folder has no results or no such run.
     """
-    return frame(load_rows(folder, run))
+    rows = load_rows(folder, run)
+    return frame([*with_skill(rows), *(null_rows(rows) if nulls else ())])
 
 
 def load_rows(folder: str | Path = "crosscheck-out", run: str = "latest") -> list[Row]:
@@ -69,7 +73,7 @@ COLUMNS = tuple(name for name in Row.__dataclass_fields__ if name not in ("slot"
 
 def flattened(row: Plain) -> dict[str, Any]:
     """A row without anything nested."""
-    return {name: _flat(row[name]) for name in COLUMNS}
+    return {name: _flat(row.get(name)) for name in COLUMNS}  # rows of an older file know fewer
 
 
 def _flat(value: Any) -> Any:
@@ -132,9 +136,11 @@ def _mark_case(case: TestCase, row: Plain) -> None:
         case.system_out = finding_line(row)
 
 
-def write_all(folder: Path, rows: Sequence[Plain]) -> dict[str, Path]:
-    """Write rows.jsonl, rows.csv and summary.md into ``folder``."""
+def write_all(folder: Path, rows: Sequence[Plain], nulls: Sequence[Plain] = ()) -> dict[str, Path]:
+    """Write rows.jsonl, rows.csv, summary.md and, if there are any, the rows of nulls as nulls.csv into ``folder``."""
     texts = {"rows.jsonl": as_jsonl(rows), "rows.csv": as_csv(rows), "summary.md": as_markdown(rows)}
+    if nulls:
+        texts["nulls.csv"] = as_csv(nulls)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return {name: folder / name for name in texts}

@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from adapters.trajectory import load_trajectory
 from validation.cells import Observation
 from validation.judging.rows import frame, rows_of
+from validation.questions.nulls import with_skill
 from validation.records.store import Run, Store
 
 #: Columns of a pose and a twist; planar ones have no z, and one angle.
@@ -42,10 +43,10 @@ def write(store: Store, runs: Sequence[Run], trajectories: Path, folder: Path) -
 
 
 def _rows(run: Run, observations: Sequence[Observation]) -> pd.DataFrame:
-    table = frame(rows_of(run.id, observations))
+    table = frame(with_skill(rows_of(run.id, observations)))
     for name in ("params", "slot", "cells", "initial_change"):
         table[name] = [json.dumps(value) for value in table[name]]
-    for name in ("value", "truth", "error", "tolerance", "floor"):
+    for name in ("value", "truth", "error", "tolerance", "floor", "skill"):
         table[name] = table[name].astype(float)
     return table
 

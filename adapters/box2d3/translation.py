@@ -5,8 +5,11 @@ What it can hold is a single number, so that a pair's own comes out to a roundin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
 #: What a logarithm, an exponential, a root and a product in doubles may miss of a number, as a share.
@@ -15,7 +18,11 @@ ROUNDING = 1e-14
 
 def restitutions(scene: Scene) -> list[float] | None:
     """Numbers of which the larger one is each pair's restitution; None if there are none."""
-    pairs = [(i, j, material.restitution) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _restitutions(scene, pairs))
+
+
+def _restitutions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | None:
+    pairs = [(i, j, material.restitution) for i, j, material in meetings]
     found = [1.0] * len(scene.bodies)
     for i, j, e in pairs:
         found[i], found[j] = min(found[i], e), min(found[j], e)
@@ -24,7 +31,11 @@ def restitutions(scene: Scene) -> list[float] | None:
 
 def frictions(scene: Scene) -> list[float] | None:
     """Numbers of which the root of the product is each pair's friction; None if there are none."""
-    pairs = [(i, j, material.friction) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _frictions(scene, pairs))
+
+
+def _frictions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | None:
+    pairs = [(i, j, material.friction) for i, j, material in meetings]
     values = {friction for _, _, friction in pairs}
     if len(values) == 1:
         return [values.pop()] * len(scene.bodies)

@@ -19,6 +19,7 @@ from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST
 from adapters.bullet.simulation import BulletSimulation
 from adapters.bullet.translation import factors, moments
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme
+from adapters.meeting import meeting_pairs
 from adapters.needs import Needs
 from adapters.probes import (
     GRAVITY,
@@ -118,7 +119,9 @@ class BulletEngine(Engine):
                 return f"{body.name}.shape: bullet needs sizes of at least {SMALLEST_SIZE:g} m"
             if body.motion == "free" and min(body.mass, *moments(body, body.mass)) < SMALLEST_INERTIA:
                 return f"{body.name}: bullet needs masses and moments of at least {SMALLEST_INERTIA:g}"
-        if max((m.friction for _, _, m in scene.contact_pairs()), default=0.0) > LARGEST_FRICTION:
+        if any(pair.friction > LARGEST_FRICTION for pair in scene.pairs) and any(
+            material.friction > LARGEST_FRICTION for _, _, material in meeting_pairs(scene)
+        ):
             return f"friction: bullet clamps coefficients to {LARGEST_FRICTION:g}"
         for coefficient in ("restitution", "friction"):
             if factors(scene, coefficient) is None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from adapters.meeting import Meeting, representable
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
@@ -18,13 +20,17 @@ FLOOR_REACH = 200.0
 
 
 def factors(scene: Scene, coefficient: str) -> list[float] | None:
-    """Values per body whose products are the coefficients of all pairs that can meet; None if there are none.
+    """Values per body whose products are the coefficients of all pairs, or of those that meet; None if there are none.
 
     Bullet multiplies the coefficients of two bodies (btManifoldResult.cpp:58,70). With one free body its partners
     carry the pair's value and it carries 1, which is exact. Otherwise the logarithms of the positive pairs solve a
     linear system, and a pair of 0 needs a body that is in no positive pair.
     """
-    pairs = [(i, j, float(getattr(material, coefficient))) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _factors(scene, pairs, coefficient))
+
+
+def _factors(scene: Scene, meetings: Sequence[Meeting], coefficient: str) -> list[float] | None:
+    pairs = [(i, j, float(getattr(material, coefficient))) for i, j, material in meetings]
     free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
     shares = [0.0] * len(scene.bodies)
     if len(free) == 1:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from adapters.meeting import Meeting, representable
 from adapters.needs import needs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene
 
@@ -24,9 +26,14 @@ def factors(scene: Scene, quantity: str) -> list[float] | None:
     """One number per body whose products are the pairs' ``quantity``, or None if there are none.
 
     The immovable partner takes 1 wherever that works, so that a value is handed over exactly; otherwise factors
-    solve ``log f_i + log f_j = log value`` over all pairs (a root of the value if it is common to all).
+    solve ``log f_i + log f_j = log value`` over all pairs, or over those that can meet (a root of the value if it is
+    common to all).
     """
-    pairs = [(i, j, float(getattr(material, quantity))) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _factors(scene, pairs, quantity))
+
+
+def _factors(scene: Scene, meetings: Sequence[Meeting], quantity: str) -> list[float] | None:
+    pairs = [(i, j, float(getattr(material, quantity))) for i, j, material in meetings]
     n = len(scene.bodies)
     to_immovable = [1.0] * n
     for i, j, value in pairs:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
 #: What a root and a product may miss of a number.
@@ -12,7 +14,11 @@ ROUNDING = 1e-15
 
 def restitutions(scene: Scene) -> list[float] | None:
     """Factors whose products are the pairs' restitutions: against what is fixed, or roots; None if neither works."""
-    pairs = [(i, j, material.restitution) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _restitutions(scene, pairs))
+
+
+def _restitutions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | None:
+    pairs = [(i, j, material.restitution) for i, j, material in meetings]
     against, roots = [1.0] * len(scene.bodies), [0.0] * len(scene.bodies)
     for i, j, e in pairs:
         for body, other in ((i, j), (j, i)):
@@ -27,7 +33,11 @@ def restitutions(scene: Scene) -> list[float] | None:
 
 def frictions(scene: Scene) -> list[float] | None:
     """Numbers of which the smaller one is each pair's friction; None if there are none."""
-    pairs = [(i, j, material.friction) for i, j, material in scene.contact_pairs()]
+    return representable(scene, lambda pairs: _frictions(scene, pairs))
+
+
+def _frictions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | None:
+    pairs = [(i, j, material.friction) for i, j, material in meetings]
     found = [0.0] * len(scene.bodies)
     for i, j, friction in pairs:
         found[i], found[j] = max(found[i], friction), max(found[j], friction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import click
@@ -12,13 +12,20 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from adapters.registry import find
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
+from validation.findings.breaks import breaks_of, listed, standing_of, write
+from validation.findings.files import findings_folder
+from validation.judging.verdicts import Standing
 from validation.posed import resolve
-from validation.questions.invariance import FACTOR, MOVES, RELATIONS, Change, compare
+from validation.questions.invariance import FACTOR, INVISIBLE, MOVES, RELATIONS, Change, compare
 from validation.running.plan import QUICK_DT
+
+#: How a break's standing is said.
+LABELS = {Standing.KNOWN: "known", Standing.NEW: "NEW", Standing.DRIFTED: "drifted"}
 
 
 def cells_of(slots: Iterable[Slot], named: bool) -> list[Slot]:
@@ -34,26 +41,66 @@ def cells_of(slots: Iterable[Slot], named: bool) -> list[Slot]:
     return list(chosen.values())
 
 
-def compare_and_show(slots: Sequence[Slot], as_json: bool) -> bool:
-    """Ask every cell everything; whether nothing mattered that must not."""
+@dataclass(frozen=True)
+class Judged:
+    """What a relation changed, and how that stands among the breaks that are listed."""
+
+    change: Change
+    standing: Standing | None
+    reason: str
+
+    @property
+    def alarming(self) -> bool:
+        """Whether it makes the command fail: a break that nobody listed, or one that is no longer what is listed."""
+        return not self.change.holds if self.standing is None else self.standing is not Standing.KNOWN
+
+
+def compare_and_show(slots: Sequence[Slot], as_json: bool, keep: bool = False) -> bool:
+    """Ask every cell everything; whether nothing mattered that must not, beyond the breaks that are listed.
+
+    With ``keep`` the breaks that a family speaks about are listed first.
+    """
     console, progress = terminal(), terminal(stderr=True)
     found: list[tuple[Slot, list[Change]]] = []
     for slot in slots:
         who = f"{slot.engine}/{slot.profile} {slot.scene} {slot.dimension}-D"
         progress.print(who, style="dim", markup=False, highlight=False)
         found.append((slot, compare(slot)))
+        if keep:  # after every cell: a suite takes long, and what is found is not lost
+            _keep(slot.engine, [(slot, change) for change in found[-1][1]])
+    judged = [(slot, [_judged(slot, change) for change in changes]) for slot, changes in found]
     if as_json:
-        plain = [
-            {"slot": slot.as_dict(), "changes": [{**asdict(change), "holds": change.holds} for change in changes]}
-            for slot, changes in found
-        ]
-        click.echo(json.dumps(plain, indent=1))
+        click.echo(json.dumps([_plain(slot, each) for slot, each in judged], indent=1))
     else:
-        _show(found, console)
-    return all(change.holds for _, changes in found for change in changes)
+        _show(judged, console)
+    return not any(each.alarming for _, own in judged for each in own)
 
 
-def _show(found: Sequence[tuple[Slot, list[Change]]], console: Console) -> None:
+def _keep(engine: str, found: Sequence[tuple[Slot, Change]]) -> None:
+    folder = findings_folder(engine)
+    if folder is not None and breaks_of(engine).families:
+        write(folder, listed(engine, find(engine).version, found))
+
+
+def _judged(slot: Slot, change: Change) -> Judged:
+    return Judged(change, *standing_of(slot, find(slot.engine).version, change))
+
+
+def _plain(slot: Slot, judged: Sequence[Judged]) -> dict[str, Any]:
+    """One cell as JSON: every relation with its physics, standing and reason, as rows have them."""
+    changes = [
+        {
+            **asdict(each.change), "holds": each.change.holds,
+            "physics": None if each.change.refused and not each.change.lost
+            else "pass" if each.change.holds else "fail",
+            "standing": each.standing.value if each.standing else None, "reason": each.reason,
+        }
+        for each in judged
+    ]  # fmt: skip
+    return {"slot": slot.as_dict(), "changes": changes}
+
+
+def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
     for scene in dict.fromkeys((slot.scene, slot.dimension) for slot, _ in found):
         own = [(slot, changes) for slot, changes in found if (slot.scene, slot.dimension) == scene]
         console.print()
@@ -62,28 +109,42 @@ def _show(found: Sequence[tuple[Slot, list[Change]]], console: Console) -> None:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
         for heading in ("engine, profile", "nothing changed by", "changed by"):
             table.add_column(heading, overflow="fold")
-        for slot, changes in own:
+        reasons: dict[str, None] = {}
+        for slot, judged in own:
+            changes = [each.change for each in judged]
             good = ", ".join(change.relation for change in changes if change.holds and not change.refused)
-            bad = "; ".join(_text(change) for change in changes if not change.holds)
+            bad = "; ".join(_text(each) for each in judged if not each.change.holds or each.standing)
+            reasons |= dict.fromkeys(
+                f"{each.standing.value}: {each.reason}" for each in judged if each.reason and each.standing
+            )
             silent = [change for change in changes if change.refused and not change.lost]
             if len(silent) == len(changes):
                 good, bad = "-", silent[0].refused
             table.add_row(f"{slot.engine}/{slot.profile}", good, bad)
         console.print(table, highlight=False)
-        for slot, changes in own:
-            if any(not change.holds for change in changes):
+        for reason in reasons:
+            console.print(Text(f"  {reason}"))
+        for slot, judged in own:
+            if any(each.alarming for each in judged):
                 console.print(Text(f"  {reproduce(slot.as_dict())} --invariance", style="dim"), soft_wrap=True)
                 break
     moves = ", ".join(map(str, MOVES))
     console.print()
     said = (
-        f"A change counts above {FACTOR:g} times the largest one from starts moved by {moves} units in the last place."
+        f"A change counts above {FACTOR:g} times the largest one from starts moved by {moves} units in the last place "
+        f"and {INVISIBLE:g} of its check's tolerance."
     )
     console.print(Text(said, style="dim"))
     console.print(Text("; ".join(f"{each.name}: {each.says}" for each in RELATIONS), style="dim"))
 
 
-def _text(change: Change) -> str:
+def _text(judged: Judged) -> str:
+    change = judged.change
+    said = f" {LABELS[judged.standing]}" if judged.standing else ""
+    if change.holds:
+        return f"{change.relation}{said}"
     if change.lost:
-        return f"{change.relation} (no answer: {change.refused})"
-    return f"{change.relation} ({change.metric} by {number(change.change, 2)}, may by {number(change.allowed, 1)})"
+        return f"{change.relation}{said} (no answer: {change.refused})"
+    return (
+        f"{change.relation}{said} ({change.metric} by {number(change.change, 2)}, may by {number(change.allowed, 1)})"
+    )

@@ -30,6 +30,7 @@ from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.judging.rows import Row, rows_of
 from validation.posed import is_file, pinned, resolve
+from validation.questions.nulls import null_rows, with_skill
 from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.plan import slots
@@ -42,6 +43,7 @@ from validation.workers import TIMEOUT, run_cells
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--keep", is_flag=True, help="With --invariance: list the breaks that breaks.toml has a reason for.")
 @click.option("--invariance", is_flag=True, help="Ask instead what must not change an answer: order, heading, place.")
 @CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
@@ -74,7 +76,9 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         return
     if options["invariance"]:
         cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
-        sys.exit(statuses.verdict(not compare_and_show(cells, as_json), True))
+        sys.exit(statuses.verdict(not compare_and_show(cells, as_json, options["keep"]), True))
+    if options["keep"]:
+        raise SceneError("keep: lists breaks of invariance, and needs --invariance")
     if options["cluster"] and options["keep_trajectories"]:
         raise SceneError("keep_trajectories: a cluster sends observations only; run those cells here")
     folder(out)
@@ -102,8 +106,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
 
 
 def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
-    plain = [row.as_dict() for row in rows]
-    written = exports.write_all(out, plain)
+    plain = [row.as_dict() for row in with_skill(rows)]
+    written = exports.write_all(out, plain, [row.as_dict() for row in null_rows(rows)])
     if options["junit"]:
         options["junit"].write_text(exports.as_junit(plain), encoding="utf-8")
     if options["markdown"]:

@@ -61,6 +61,7 @@ def render(source: Source) -> str:
             choices=choosing.choices(source),
             scenes=scene_sections(source),
             replays=replay.replays(source),
+            people=replay.people(source),
             explorer=explorer.explorer(source),
             speed=cost.speed(source),
             sheet=fairness.fairness(source),

@@ -188,6 +188,17 @@ class FindingFamily:
 
 
 @dataclass(frozen=True)
+class Member:
+    """A line of findings: what reads the same in the plane and in space stands once, with a link to each."""
+
+    scene: str
+    family: str
+    links: tuple[tuple[int, str], ...]
+    count: int
+    text: str
+
+
+@dataclass(frozen=True)
 class Reasoned:
     """Findings of one engine and profile that have one reason, with what cures each scene of theirs."""
 
@@ -196,7 +207,7 @@ class Reasoned:
     profile: str
     reason: str
     cures: tuple[tuple[str, str], ...]
-    members: tuple[FindingFamily, ...]
+    members: tuple[Member, ...]
 
 
 def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list[Reasoned]:
@@ -211,8 +222,19 @@ def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list
         for scene in dict.fromkeys(member.scene for member in members):
             by_cure[cured.get((engine, profile, scene), "")].append(scene)
         told = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
-        said.append(Reasoned(why_anchor(mark, engine, profile, reason), engine, profile, reason, told, tuple(members)))
+        anchor = why_anchor(mark, engine, profile, reason)
+        said.append(Reasoned(anchor, engine, profile, reason, told, _lines(members)))
     return said
+
+
+def _lines(found: Iterable[FindingFamily]) -> tuple[Member, ...]:
+    alike: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
+    for each in found:
+        alike[each.scene, each.family, each.text].append(each)
+    return tuple(
+        Member(scene, family, tuple((f.dimension, f.href) for f in own), sum(f.count for f in own), text)
+        for (scene, family, text), own in alike.items()
+    )
 
 
 def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:

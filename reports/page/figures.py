@@ -171,7 +171,7 @@ def _point_text(row: Mapping[Hashable, Any]) -> str:
 
 def motion(table: pd.DataFrame, truth: pd.DataFrame | None, what: str, title: str) -> Figure:
     """One coordinate over time for every engine; the truth is a broad grey line. Without truth the axis is a power."""
-    x = alt.X("t:Q", axis=alt.Axis(title="time [s]"), scale=alt.Scale(nice=False))
+    x = alt.X("t:Q", axis=alt.Axis(title="time [s]", tickCount=8), scale=alt.Scale(nice=False))
     if truth is None:
         scale, ticks = log_scale(list(table["value"]), 2.0)
         y = alt.Y("value:Q", scale=scale, axis=power_axis(what, ticks))

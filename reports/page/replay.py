@@ -1,6 +1,8 @@
 """Replays: recordings of all engines on one scene, packed for the page's player, with the truth as a ghost.
 
-    header (JSON): times, bodies, series      16-bit integers, differenced along time, low bytes first, deflated
+    header (JSON): bodies, series      16-bit integers: times in steps, then one quantity after the other, each as
+                                       changes along time; low bytes first, deflated
+    who (JSON, once for all scenes)    name, colour and dash of each engine and profile
 
 The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
 `validation.running.tracks` were computed from the full trajectory when the cell ran.
@@ -9,6 +11,7 @@ The player draws what is here and computes nothing; the moments at which an engi
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from collections import defaultdict
 from collections.abc import Sequence
@@ -31,14 +34,23 @@ from validation.cells import Slot, format_dt
 from validation.posed import resolve
 from validation.running.tracks import Recording
 
-#: Levels of a length over the largest extent of the scene: half a pixel of a screen 8000 pixels wide.
-LENGTHS = 16000
+#: Levels of a length over the largest extent of the scene: half a pixel of a screen 4000 pixels wide.
+LENGTHS = 8000
 #: Levels of a contact's point and impulse: an arrow is read to a hundredth at best.
 ARROWS = 250
 #: Levels of an angle per radian, and of a quaternion's component.
 ANGLES = 4000
 #: What an engine threw further than this many times the exact motion's extent is not followed by the camera.
 FOLLOWED = 3.0
+
+
+def people(source: Source) -> list[dict[str, Any]]:
+    """Name, colour and dash of each engine and profile, as the player's series count them."""
+    colours = colours_of(source.engines)
+    return [
+        {"name": f"{engine}/{profile}", "colour": colours[engine], "dash": list(dash_of(profile))}
+        for engine, profile in source.columns
+    ]
 
 
 @dataclass(frozen=True)
@@ -94,40 +106,35 @@ def _data(
     exact: NDArray[np.float64] | None,
     tracked: int | None,
 ) -> dict[str, Any]:
-    colours, d = colours_of(source.engines), scene.dimension
+    d, places = scene.dimension, {column: k for k, column in enumerate(source.columns)}
     free = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
     low, high = _view(scene, members, exact, tracked, free)
     unit = float(max(high - low)) / LENGTHS
     strongest = max((float(np.abs(r.impulse).max()) for _, r in members if len(r.impulse)), default=1.0)
-    blocks: list[NDArray[np.int16]] = []
+    dt = members[0][0].dt
+    blocks = [np.diff(np.round(t / dt), prepend=0.0).astype(np.int16)]
     series = []
     for slot, recording in members:
         blocks += [_pose_levels(recording.pose[:, free], d, unit), *_arrow_levels(recording, unit, strongest)]
-        series.append({
-            "name": f"{slot.engine}/{slot.profile}", "colour": colours[slot.engine],
-            "dash": list(dash_of(slot.profile)), "frames": len(recording.t), "contacts": len(recording.frame),
-            "departure": recording.departure, "finish": recording.finish,
-        })  # fmt: skip
+        one: dict[str, Any] = {"who": places[slot.engine, slot.profile], "contacts": len(recording.frame)}
+        if len(recording.t) < len(t):
+            one["frames"] = len(recording.t)
+        if recording.departure is not None:
+            one["departure"] = round(recording.departure, 6)
+        series.append(one)
     if exact is not None:
         blocks.append(_differenced(np.round(exact / unit)))
     # Low bytes, then high ones: of small steps the high bytes are nearly all alike, which deflates to nothing.
     levels = np.concatenate([block.ravel() for block in blocks]).astype("<i2")
     raw = levels.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {
-        "dimension": d, "t": _times(t), "bodies": [_body(scene, i) for i in free],
+        "dimension": d, "dt": dt, "count": len(t), "bodies": [_body(scene, i) for i in free],
         "fixed": [_body(scene, i) for i in range(len(scene.bodies)) if i not in free],
         "tracked": None if tracked is None else free.index(tracked), "low": _plain(low), "high": _plain(high),
         "unit": unit, "angle": 1.0 / ANGLES, "arrow": strongest / ARROWS, "gravity": list(scene.gravity),
         "static": exact is not None and bool(np.ptp(exact, axis=0).max() == 0.0), "series": series,
         "packed": base64.b64encode(zlib.compress(raw, 9)).decode(),
     }  # fmt: skip
-
-
-def _times(t: NDArray[np.float64]) -> list[float] | dict[str, float]:
-    """Times of the frames [s]: all of them, or the last one and how many where they are evenly spaced from zero."""
-    if len(t) > 2 and np.allclose(t, np.linspace(0.0, t[-1], len(t)), rtol=0.0, atol=1e-6):
-        return {"last": round(float(t[-1]), 6), "count": len(t)}
-    return [round(float(s), 6) for s in t]
 
 
 def _plain(values: NDArray[np.float64]) -> list[float]:
@@ -186,15 +193,20 @@ def _corners(shape: Capsule | Cylinder | Polygon | Hull, dimension: int) -> list
 
 
 def _pose_levels(pose: NDArray[np.float64], dimension: int, unit: float) -> NDArray[np.int16]:
-    """Frames x bodies x components as integers, differenced along time."""
+    """Bodies x components, each over all frames, as integers."""
     d = dimension
     return _differenced(np.concatenate([np.round(pose[..., :d] / unit), np.round(pose[..., d:] * ANGLES)], axis=-1))
 
 
 def _differenced(levels: NDArray[np.float64]) -> NDArray[np.int16]:
-    """First frame, then changes; sums wrap around like the browser's 16-bit integers."""
+    """One quantity after the other, each first as it starts, then its changes; sums wrap around like the browser's."""
     clipped = np.clip(np.nan_to_num(levels), -32000, 32000).astype(np.int64)
-    return np.diff(clipped, axis=0, prepend=0).astype(np.int16)
+    return _by_quantity(np.diff(clipped, axis=0, prepend=0))
+
+
+def _by_quantity(levels: NDArray[Any]) -> NDArray[np.int16]:
+    """All of the first quantity, then all of the next: what follows each other is alike, and deflates to less."""
+    return np.ascontiguousarray(levels.reshape(len(levels), math.prod(levels.shape[1:])).T).astype(np.int16)
 
 
 def _arrow_levels(recording: Recording, unit: float, strongest: float) -> list[NDArray[np.int16]]:
@@ -202,8 +214,8 @@ def _arrow_levels(recording: Recording, unit: float, strongest: float) -> list[N
     coarse = unit * LENGTHS / ARROWS
     return [
         np.diff(recording.frame, prepend=0).astype(np.int16),
-        np.clip(np.round(recording.point / coarse), -32000, 32000).astype(np.int16),
-        np.round(recording.impulse / strongest * ARROWS).astype(np.int16),
+        _by_quantity(np.clip(np.round(recording.point / coarse), -32000, 32000)),
+        _by_quantity(np.round(recording.impulse / strongest * ARROWS)),
     ]
 
 

@@ -5,6 +5,7 @@ curve; forty scenes of such charts are megabytes. What is left out here is what 
 page's charts are pictures with one name (``role="img"``), of which assistive technology reads no part.
 
 Tags that HTML closes by itself are not closed, and quotes around plain words are left out [HTML standard, 13.1.2].
+A head says whether it is a column's or a row's only where its place does not [HTML standard, 4.9.12.2: automatic].
 """
 
 from __future__ import annotations
@@ -151,6 +152,23 @@ _QUOTED = re.compile(r' (class|scope|id|colspan|rowspan|role|type|value)="([\w-]
 _INDENTED = re.compile(r"\s*\n\s*")
 
 
+_TABLE = re.compile(r"<table\b.*?</table>", re.DOTALL)
+_ROW = re.compile(r"<tr\b.*?(?=<tr\b|</table>)", re.DOTALL)
+_FIRST = re.compile(r"<(t[hd])\b")
+
+
+def _heads_by_place(table: re.Match[str]) -> str:
+    """A table without what its heads' places say: of a row without data they are columns', of a column rows'."""
+    text = table[0]
+    rows = [_FIRST.findall(row) for row in _ROW.findall(text)]
+    of_heads = [row for row in rows if "td" not in row]
+    if len(of_heads) != 1 or "td" in rows[0] or "group" in text or "span=" in text:
+        return text
+    if all(row[0] == "th" and "th" not in row[1:] for row in rows[1:]):
+        text = text.replace(' scope="row"', "")
+    return text.replace(' scope="col"', "")
+
+
 def small_html(text: str) -> str:
     """The page without what a browser adds by itself."""
     parts = _VERBATIM.split(text)
@@ -158,5 +176,6 @@ def small_html(text: str) -> str:
 
 
 def _small_markup(text: str) -> str:
+    text = _TABLE.sub(_heads_by_place, text)
     text = _INDENTED.sub("\n", _CLOSED_BY_THE_NEXT.sub("", text))
     return _QUOTED.sub(r" \1=\2", text)

@@ -13,6 +13,7 @@ from reports import speed
 from validation.bench import reading
 from validation.cells import Observation, Slot
 from validation.judging.rows import rows_of
+from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Run, Store
 from validation.running.tracks import Recording
 
@@ -48,6 +49,8 @@ class Source:
         Cells that were planned and left no observation.
     scenes_kept
         Texts of the scene files of the run and of the bench, by pinned name.
+    nulls
+        Rows of the nulls (`validation.questions.nulls`).
     """
 
     run: Run
@@ -57,6 +60,7 @@ class Source:
     bench: Bench | None = None
     missing: int = 0
     scenes_kept: Mapping[str, str] = field(default_factory=dict)
+    nulls: Sequence[Plain] = ()
     columns: tuple[tuple[str, str], ...] = field(init=False)
     lines: tuple[tuple[str, int], ...] = field(init=False)
     _by_scene: Mapping[str, Sequence[Plain]] = field(init=False, repr=False, compare=False)
@@ -99,12 +103,14 @@ def load_source(folder: Path, run: str = "latest") -> Source:
     try:
         chosen = store.run(run)
         every = store.observations(chosen)
-        rows = [row.as_dict() for row in rows_of(chosen.id, every)]
+        judged = rows_of(chosen.id, every)
+        rows, nulls = ([row.as_dict() for row in found] for found in (with_skill(judged), null_rows(judged)))
         observations = [observation for observation in every if observation.slot.ulp == 0]
         benches = reading.bench_runs(store)
         bench = _bench(store, benches[-1]) if benches else None
         files = store.scenes(chosen) | (store.scenes(bench.run) if bench else {})
-        return Source(chosen, rows, observations, store.recordings(chosen), bench, store.missing(chosen), files)
+        recordings, missing = store.recordings(chosen), store.missing(chosen)
+        return Source(chosen, rows, observations, recordings, bench, missing, files, nulls)
     finally:
         store.close()
 

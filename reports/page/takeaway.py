@@ -15,8 +15,9 @@ from markupsafe import Markup
 from reports.exports import flattened
 from reports.page.source import Source
 
-#: Identities of cells and how long each took here, which ``crosscheck bundle`` has; an error is value minus truth.
-ELSEWHERE = frozenset({"cells", "state_hash", "wall_time_s", "error"})
+#: Identities of cells, how long each took here and skills, which ``crosscheck bundle`` has; an error is value minus
+#: truth.
+ELSEWHERE = frozenset({"cells", "state_hash", "wall_time_s", "error", "skill", "null"})
 
 
 @dataclass(frozen=True)

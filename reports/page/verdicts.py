@@ -57,10 +57,10 @@ MEANINGS = {
 def slug(*parts: Any) -> str:
     """Anchor from names that may hold anything; distinct for names that differ in any character.
 
-    What is more than small letters, digits and dashes loses something here, so it carries a hash of all of it.
+    What is more than small letters, digits, dashes and underscores loses something here, so it carries a hash of it.
     """
     raw = "-".join(map(str, parts))
-    plain = re.sub(r"[^a-z0-9]+", "-", raw.lower()).strip("-")
+    plain = re.sub(r"[^a-z0-9_]+", "-", raw.lower()).strip("-")
     return plain if plain == raw else f"{plain or 'x'}-{hashlib.sha256(raw.encode()).hexdigest()[:8]}"
 
 
@@ -189,7 +189,10 @@ class CheckBlock:
 
 @dataclass(frozen=True)
 class SceneVerdicts:
-    """Checks of a scene in one dimension: its worst mark, an overview (engines x checks) and a block per check."""
+    """Checks of a scene in one dimension: its worst mark, an overview (engines x checks) and a block per check.
+
+    ``nulls``: lines of the overview for answers without an engine, their worst errors in units of the tolerance.
+    """
 
     scene: str
     dimension: int
@@ -199,6 +202,7 @@ class SceneVerdicts:
     refused: str
     overview: list[tuple[tuple[str, str], str, list[Mark]]]
     blocks: list[CheckBlock]
+    nulls: list[tuple[str, list[str]]]
 
 
 def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
@@ -221,7 +225,23 @@ def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
             marks = [mark or Mark("unsupported", "") for mark in own]
             overview.append((column, slug(scene, dimension, *column), marks))
     anchor = slug(scene, dimension)
-    return SceneVerdicts(scene, dimension, anchor, _summed(rows), asked, ", ".join(refused), overview, blocks)
+    guesses = _guesses(source, scene, dimension, [block.family for block in blocks])
+    return SceneVerdicts(scene, dimension, anchor, _summed(rows), asked, ", ".join(refused), overview, blocks, guesses)
+
+
+def _guesses(source: Source, scene: str, dimension: int, families: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Per null and family of checks the largest error in units of the tolerance; a dash where it has no such number."""
+    worst: dict[str, dict[str, float]] = defaultdict(dict)
+    for row in source.nulls:
+        if (row["scene"], row["dimension"]) == (scene, dimension):
+            family, ratio = family_of(row["metric"]), ratio_of(row)
+            known = worst[row["profile"]]
+            if ratio is not None:
+                known[family] = max(ratio, known.get(family, 0.0))
+    return [
+        (name, [("✓ " if known[f] <= 1.0 else "✗ ") + times(known[f]) if f in known else "–" for f in families])
+        for name, known in worst.items()
+    ]
 
 
 def _summed(rows: Sequence[Plain]) -> Mark:

@@ -64,7 +64,7 @@ def test_csv_holds_all_fields_but_slot_and_log():
         "metric": "rebound_ratio", "unit": "1", "value": "0.75", "truth": "0.8", "error": "-0.05",
         "tolerance": "1e-12", "because": "exact | law", "outcome": "ok", "physics": "fail", "standing": "new",
         "reason": "nobody knew", "state_hash": "ab", "steps": "120", "wall_time_s": "0.1", "source": "Newton",
-        "initial_change": "moved;turned", "cells": "c1;c2", "floor": "0.5", "certificate": "",
+        "initial_change": "moved;turned", "cells": "c1;c2", "floor": "0.5", "certificate": "", "skill": "", "null": "",
     }  # fmt: skip
     assert (second["initial_change"], second["reason"], second["cells"]) == ("", '\'=cmd|"x"', "c1")
 

@@ -22,7 +22,7 @@ from reports.page.choosing import choices, cures
 from reports.page.conclusions import findings, sentences
 from reports.page.explorer import explorer
 from reports.page.families import families, sentence
-from reports.page.replay import replays
+from reports.page.replay import people, replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import slug
 from validation.cells import Slot
@@ -319,16 +319,22 @@ def test_a_packed_replay_gives_back_every_pose_to_half_a_level(page_source):
     data = found.data
     planes = np.frombuffer(zlib.decompress(base64.b64decode(data["packed"])), np.uint8).reshape(2, -1)
     levels = np.ascontiguousarray(planes.T).view("<i2").ravel()
-    at, bodies = 0, len(data["bodies"])
-    for series, (_, recording) in zip(data["series"], _recordings(page_source, "bounce", 2), strict=True):
-        count = series["frames"] * bodies * 3
-        pose = np.cumsum(levels[at : at + count].reshape(series["frames"], bodies, 3), axis=0, dtype=np.int16)
+    times = np.cumsum(levels[: data["count"]]) * data["dt"]
+    at, bodies = data["count"], len(data["bodies"])
+    names = [one["name"] for one in people(page_source)]
+    for series, (slot, recording) in zip(data["series"], _recordings(page_source, "bounce", 2), strict=True):
+        assert names[series["who"]] == f"{slot.engine}/{slot.profile}"
+        frames = series.get("frames", data["count"])
+        assert times[:frames] == pytest.approx(recording.t, abs=1e-9)
+        assert series.get("departure") == pytest.approx(recording.departure, abs=1e-6)
+        count = frames * bodies * 3
+        pose = np.cumsum(levels[at : at + count].reshape(bodies, 3, frames), axis=-1, dtype=np.int16)
+        pose = np.moveaxis(pose, -1, 0)
         assert np.abs(pose[..., :2] * data["unit"] - recording.pose[:, 1:, :2]).max() <= 0.5 * data["unit"] * (1 + 1e-9)
         assert np.abs(pose[..., 2] * data["angle"] - recording.pose[:, 1:, 2]).max() <= 0.5 * data["angle"] * (1 + 1e-9)
         at += count + series["contacts"] * (1 + 2 + 2)
-    exact = np.cumsum(levels[at:].reshape(-1, 2), axis=0, dtype=np.int16) * data["unit"]
-    assert exact[0] == pytest.approx([0.0, 1.5], abs=data["unit"])
-    assert data["t"] == {"last": pytest.approx(_recordings(page_source, "bounce", 2)[0][1].t[-1]), "count": len(exact)}
+    exact = np.cumsum(levels[at:].reshape(2, -1), axis=-1, dtype=np.int16).T * data["unit"]
+    assert exact[0] == pytest.approx([0.0, 1.5], abs=data["unit"]) and len(exact) == data["count"]
 
 
 def _recordings(source, scene, dimension):

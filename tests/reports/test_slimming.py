@@ -69,7 +69,7 @@ class Seen(HTMLParser):
 
 def test_markup_means_the_same():
     page = (
-        '<table class="grid wide">\n  <tr id="a-1"><th scope="row">x</th><td class="n" title="a b">1 < 2</td></tr>\n'
+        '<table class="grid wide">\n  <tr id="a-1"><th>x</th><td class="n" title="a b">1 < 2</td></tr>\n'
         '</table><pre>\n  </td> kept </td>\n</pre><script>if (a) { "</li>  \n  " }</script><ul><li>y</li>\n</ul>'
     )
     small = small_html(page)
@@ -77,6 +77,27 @@ def test_markup_means_the_same():
     assert Seen(small).said.split() == Seen(page).said.split()
     assert "<pre>\n  </td> kept </td>\n</pre>" in small and '"</li>  \n  "' in small
     assert "class=n" in small and 'class="grid wide"' in small
+
+
+HEAD = '<thead><tr><th scope="col">a</th><th scope="col">b</th></tr></thead>'
+
+
+@pytest.mark.parametrize(
+    ("table", "left"),
+    [
+        (HEAD + '<tr><th scope="row">x</th><td>1</td></tr>', set()),
+        (HEAD + "<tr><td>x</td><td>1</td></tr>", set()),
+        # A head beside another, below data, or over several places is not known by its place.
+        (HEAD + '<tr><th scope="row">x</th><th scope="row">y</th><td>1</td></tr>', {"row"}),
+        (HEAD + '<tr><td>0</td><th scope="row">x</th></tr>', {"row"}),
+        (HEAD + '<tr><th scope="row">x</th></tr><tr><th scope="row">y</th><td>1</td></tr>', {"col", "row"}),
+        ('<tr><td>1</td><th scope="col">x</th></tr>', {"col"}),
+        ('<tr><th scope="colgroup" colspan="2">a</th></tr><tr><th scope="row">x</th><td>1</td></tr>',
+         {"colgroup", "row"}),
+    ],
+)  # fmt: skip
+def test_a_head_says_of_what_it_is_where_its_place_does_not(table, left):
+    assert set(re.findall(r"scope=\"?(\w+)", small_html(f"<table>{table}</table>"))) == left
 
 
 @pytest.mark.parametrize("quoted", ['<a href="#x">', '<td title="a">', '<input value="a b">', '<td class="a"/>'])

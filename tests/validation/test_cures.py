@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from adapters.engine_folder import CURES, inside
@@ -23,6 +24,15 @@ def test_a_table_is_read_back_with_its_tuples(tmp_path):
     other = replace(CURE, dimension=3, before=None, changes={}, profile="", others=(), cost_before=None, left=5)
     write([CURE, other], tmp_path / "cures.csv")
     assert read(tmp_path / "cures.csv") == [CURE, other]
+
+
+def test_numbers_of_numpy_are_written_and_a_table_that_cannot_be_keeps_the_old_one(tmp_path):
+    path = tmp_path / "cures.csv"
+    write([replace(CURE, failing=np.int64(CURE.failing), truth=np.float64(CURE.truth))], path)
+    assert read(path) == [CURE]
+    with pytest.raises(TypeError, match="table of cures"):
+        write([CURE, replace(CURE, dimension=3, changes={"solref": object()})], path)
+    assert read(path) == [CURE]
 
 
 def test_a_cure_is_told_in_one_line_with_error_and_cost():

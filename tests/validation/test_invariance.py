@@ -129,6 +129,13 @@ def test_a_change_is_judged_by_what_moved_starts_change():
     assert Change("boosted", refused="something in it is fixed").holds
 
 
+def test_a_defect_of_nothing_may_change_by_what_no_check_could_see():
+    floors, answer = dict.fromkeys(BASE, 0.0), {"speed": (2.0, ""), "count": (1e-16, "")}
+    assert not judged("mirrored", BASE, answer, floors).holds
+    assert judged("mirrored", BASE, answer, floors, {"count": 2e-13}).holds
+    assert not judged("mirrored", BASE, answer, floors, {"count": 0.9e-13}).holds
+
+
 def test_a_chaotic_scene_is_not_blamed_on_its_engine():
     floors = floor(BASE, ["no answer"])
     assert judged("mirrored", BASE, {"speed": (7.0, ""), "count": (3.0, "")}, floors).holds

@@ -7,16 +7,23 @@ import pytest
 
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
 from validation.catalogue import CATALOGUE
+from validation.cells import Slot
+from validation.judging.rows import rows_of
+from validation.questions import nulls
 from validation.questions.nulls import (
+    NO_ENGINE,
     NULLS,
     Null,
     did_nothing,
     free_flight,
+    null_rows,
     nulls_of,
     perfectly_inelastic,
     skill,
     skill_of,
+    with_skill,
 )
+from validation.running.execution import execute
 
 DT = 1 / 240
 
@@ -111,3 +118,32 @@ def test_the_skill_of_a_row_is_that_of_its_cell():
            "truth": 0.5, "value": 0.105}  # fmt: skip
     assert skill_of(row) == (pytest.approx(1.0 - 0.395 / 0.5), "did nothing")
     assert skill_of(row | {"value": None})[0] is None
+
+
+def judged(*slots):
+    return rows_of("r", [execute(slot) for slot in slots])
+
+
+def test_nulls_are_rows_once_for_all_engines_and_every_error_has_its_skill():
+    pytest.importorskip("pymunk")
+    slots = [Slot("impact", (), 2, "chipmunk", profile, DT) for profile in ("default", "tuned")]
+    rows = judged(*slots)
+    guesses = null_rows(rows)
+    asked = {row.metric for row in rows if row.truth is not None}
+    assert sorted((g.profile, g.metric) for g in guesses) == sorted((null, m) for null in NULLS for m in asked)
+    fallen = next(g for g in guesses if (g.profile, g.metric) == ("free flight", "rebound_ratio"))
+    assert (fallen.value, fallen.error, fallen.physics, fallen.engine) == (-1.0, -1.8, "fail", NO_ENGINE)
+    # The better null errs by .8, so that this one is worth 1 - 1.8/.8; it alarms nobody.
+    assert fallen.skill == pytest.approx(1.0 - 1.8 / 0.8) and not fallen.alarming
+    assert fallen.slot["engine"] == NO_ENGINE and fallen.because == rows[0].because
+    for row in with_skill(rows):
+        wanted, against = skill_of(row.as_dict())
+        assert row.skill == wanted and row.null == (against if wanted is not None else "")
+    assert any(row.skill is not None for row in with_skill(rows))
+
+
+def test_of_a_large_sweep_no_null_is_asked(monkeypatch):
+    pytest.importorskip("pymunk")
+    rows = judged(*(Slot("impact", (("e", e),), 2, "chipmunk", "tuned", DT) for e in (0.1, 0.2)))
+    monkeypatch.setattr(nulls, "MOST_CELLS", 1)
+    assert null_rows(rows) == [] and with_skill(rows) == rows

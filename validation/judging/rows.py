@@ -72,6 +72,9 @@ class Row:
     cells: list[str] = field(default_factory=list)
     floor: float | None = None
     certificate: str = ""
+    #: 1 - error/error of the best null, and which null that is; see `validation.questions.nulls`, which fills them in.
+    skill: float | None = None
+    null: str = ""
 
     @property
     def alarming(self) -> bool:

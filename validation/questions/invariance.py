@@ -4,8 +4,9 @@
 
 Bodies renumbered, world turned about the vertical or mirrored, moved far away or carried along, a bystander out of
 reach, the same again in the same process and in a fresh one. The largest change of each metric is judged against ten
-times the largest change from starts moved by 1 to 16 units in the last place: what a chaotic scene makes of round-off
-is no fault of its engine. Where the map itself rounds coarser (far away), the moved starts are rounded as coarsely.
+times the largest change from starts moved by 1 to 16 units in the last place, and a thousandth of its check's
+tolerance: what a chaotic scene makes of round-off is no fault of its engine, and nobody sees what no check could. Where
+the map itself rounds coarser (far away), the moved starts are rounded as coarsely.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -33,6 +35,8 @@ MOVES = (1, 2, 4, 8, 16)
 FACTOR = 10.0
 #: What is left where moved starts change nothing: the last digits of the value itself, in units of the machine's.
 LAST_DIGITS = 64.0 * float(np.finfo(float).eps)
+#: Share of a check's tolerance below which a change is not seen: a defect of exactly nothing has no last digits.
+INVISIBLE = 1e-3
 #: How far a scene is moved, in its own sizes.
 FAR = 1e3
 
@@ -378,7 +382,9 @@ def compare(slot: Slot, relations: Sequence[str] = ()) -> list[Change]:
 
 
 def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Change]:
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    tolerances = {check.metric: check.bound for check in canonical.checks(scene, slot.dt) if check.bound}
     base = apart.ask(measured, slot, "again")
     if isinstance(base, str):
         return [Change(each.name, refused=base) for each in wanted]
@@ -395,7 +401,7 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
                 base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
             )
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
-        found.append(judged(relation.name, base, answer, floors[unit]))
+        found.append(judged(relation.name, base, answer, floors[unit], tolerances))
     return found
 
 
@@ -410,8 +416,14 @@ def floor(base: Metrics, moved: Sequence[Metrics | str]) -> dict[str, float]:
     return changes
 
 
-def judged(relation: str, base: Metrics, answer: Metrics | str, floors: Mapping[str, float]) -> Change:
-    """The metric that changed most for what it may."""
+def judged(
+    relation: str,
+    base: Metrics,
+    answer: Metrics | str,
+    floors: Mapping[str, float],
+    tolerances: Mapping[str, float] = MappingProxyType({}),
+) -> Change:
+    """The metric that changed most for what it may; ``tolerances`` are those of its check, where there is one."""
     if isinstance(answer, str):
         return Change(relation, refused=answer, lost=True)
     worst = Change(relation)
@@ -419,7 +431,7 @@ def judged(relation: str, base: Metrics, answer: Metrics | str, floors: Mapping[
         other = answer.get(name, (None, ""))[0]
         if value is None:
             continue
-        allowed = FACTOR * floors[name] + LAST_DIGITS * abs(value)
+        allowed = FACTOR * floors[name] + LAST_DIGITS * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
         change = math.inf if other is None else abs(other - value)
         if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
             worst = Change(relation, name, change, allowed)

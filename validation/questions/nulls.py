@@ -7,13 +7,15 @@
 They are measured by the scene's own metrics and judged by its own checks, like any engine. An error says how wrong a
 number is, the skill ``1 - error/error of the best null`` what an engine's physics is worth for it: 1 is exact, 0 no
 better than guessing, below 0 worse. Where a null is exact (a column that should just stand) there is no skill to show.
+
+They are rows like those of engines (`null_rows`), with no standing: nobody is alarmed by a guess that fails.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -25,14 +27,21 @@ from adapters.engine import Array
 from adapters.scene import Scene
 from adapters.stepping import step_count
 from adapters.trajectory import Measured, Trajectory
-from validation.canonical import CanonicalScene
+from validation.canonical import CanonicalScene, Check
 from validation.geometry import least_gap, separation
+from validation.judging.rows import Row
+from validation.judging.verdicts import judge_physics
 from validation.posed import resolve
 
 #: Bodies that are nearer than this share of the scene's size touch: starts are exact to round-off only.
 TOUCH = 1e-9
 #: More bodies than that are not asked: pairs are looked at one by one.
 MOST_BODIES = 30
+#: Of more cells (a sweep) nulls are not asked unless somebody names the row: a cell takes 7 ms in the mean (measured
+#: over the quick suite).
+MOST_CELLS = 1000
+#: Stands where a row names its engine.
+NO_ENGINE = "none"
 
 
 @dataclass(frozen=True)
@@ -195,6 +204,52 @@ def skill_of(row: Mapping[str, Any]) -> tuple[float | None, str]:
         return None, "there is no error to compare"
     asked = row["scene"], row["dimension"], row["slot"]["params"], row["dt"], row["metric"], row["truth"]
     return skill(row["value"] - row["truth"], nulls_of(*asked))
+
+
+def with_skill(rows: Sequence[Row]) -> list[Row]:
+    """The rows with the skill of each beside its error, and the null that it is measured against."""
+    if len(_cells(rows)) > MOST_CELLS:
+        return list(rows)
+    found = []
+    for row in rows:
+        worth, against = skill_of(vars(row))
+        found.append(row if worth is None else replace(row, skill=worth, null=against))
+    return found
+
+
+def null_rows(rows: Sequence[Row]) -> list[Row]:
+    """What each null makes of every check that ``rows`` judge: a row each, once for all engines and iterations."""
+    if len(_cells(rows)) > MOST_CELLS:
+        return []
+    asked = {(*_cell(row), row.metric): row for row in reversed(rows) if row.truth is not None and len(row.cells) < 2}
+    found = []
+    for row in reversed(asked.values()):
+        assert row.truth is not None
+        answers = nulls_of(row.scene, row.dimension, row.slot["params"], row.dt, row.metric, row.truth)
+        found += [_row_of(row, row.truth, null, answers) for null in answers]
+    return found
+
+
+def _row_of(row: Row, truth: float, null: Null, answers: list[Null]) -> Row:
+    """The row of one null, from that of an engine that was asked the same."""
+    physics = judge_physics(null.value, Check(row.metric, row.unit, truth, row.tolerance, row.because, row.source))
+    error = None if null.value is None else null.value - truth
+    worth, against = skill(error, answers)
+    return replace(
+        row, engine=NO_ENGINE, engine_version="", profile=null.name, iterations=None, value=null.value, error=error,
+        outcome="ok", physics=physics.value if physics else None, standing=None, reason=null.reason, state_hash="",
+        steps=0, wall_time_s=0.0, log="", initial_change=[], cells=[], floor=None, certificate="",
+        slot={**row.slot, "engine": NO_ENGINE, "profile": null.name, "iterations": None}, skill=worth,
+        null=against if worth is not None else "",
+    )  # fmt: skip
+
+
+def _cell(row: Row) -> tuple[Any, ...]:
+    return row.scene, row.dimension, tuple(sorted(row.slot["params"].items())), row.dt
+
+
+def _cells(rows: Iterable[Row]) -> set[tuple[Any, ...]]:
+    return {_cell(row) for row in rows}
 
 
 def skill(error: float | None, nulls: list[Null]) -> tuple[float | None, str]:

@@ -23,6 +23,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from adapters.engine_folder import CURES, belongs_of, candidates_of, inside
 from adapters.registry import find, load, profile_of
 from adapters.stepping import step_count
@@ -335,15 +337,25 @@ _PLAIN = ("engine", "version", "shipped", "scene", "metric", "unit", "profile")
 
 
 def write(cures: Iterable[Cure], path: Path) -> None:
-    """Write a table of cures."""
-    with path.open("w", encoding="utf-8", newline="") as lines:
+    """Write a table of cures; what stood there stays until all of it is written."""
+    fresh = path.with_suffix(".new")
+    with fresh.open("w", encoding="utf-8", newline="") as lines:
         table = csv.writer(lines, lineterminator="\n")
         names = [field.name for field in fields(Cure)]
         table.writerow(names)
         for cure in cures:
             rounded = replace(cure, cost_before=_digits(cure.cost_before, 3), cost_after=_digits(cure.cost_after, 3))
             values = [getattr(rounded, name) for name in names]
-            table.writerow([v if n in _PLAIN else json.dumps(v) for n, v in zip(names, values, strict=True)])
+            cells = [v if n in _PLAIN else json.dumps(v, default=_of_numpy) for n, v in zip(names, values, strict=True)]
+            table.writerow(cells)
+    fresh.replace(path)
+
+
+def _of_numpy(value: Any) -> Any:
+    """A number of numpy as Python's own: engines and metrics hand them on."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{value!r} cannot be written into a table of cures")
 
 
 def _digits(value: float | None, digits: int) -> float | None:

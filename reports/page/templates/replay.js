@@ -4,35 +4,39 @@
   if (!player || !("DecompressionStream" in window)) return;
   const $ = (id) => document.getElementById("replay-" + id);
   const canvas = $("canvas"), pen = canvas.getContext("2d"), slider = $("time");
-  const loaded = new Map();
+  const loaded = new Map(), people = JSON.parse($("who").textContent);
   let show = null, playing = false, last = 0, clock = 0;
 
-  /* Sums along time undo the differences; 16-bit integers wrap around as the packing did. */
-  function summed(levels, stride) {
-    for (let i = stride; i < levels.length; i++) levels[i] += levels[i - stride];
-    return levels;
+  /* One quantity after the other becomes frame by frame; sums along time undo the changes, and 16-bit integers wrap
+     around as the packing did. */
+  function framed(levels, width, changes) {
+    const count = levels.length / width, out = new Int16Array(levels.length);
+    for (let c = 0; c < width; c++)
+      for (let k = 0; k < count; k++)
+        out[k * width + c] = levels[c * count + k] + (changes && k ? out[(k - 1) * width + c] : 0);
+    return out;
   }
   async function load(id) {
     if (loaded.has(id)) return loaded.get(id);
     const data = JSON.parse(document.querySelector(`.replay-data[data-id="${CSS.escape(id)}"]`).textContent);
     const bytes = new Uint8Array(await inflate(data.packed, "deflate")), half = bytes.length / 2;
     const levels = new Int16Array(half).map((_, i) => bytes[i] | (bytes[half + i] << 8));
-    const { last: end, count } = data.t;
-    if (count) data.t = Array.from({ length: count }, (_, k) => (end * k) / (count - 1));
     const d = data.dimension, parts = d === 2 ? 3 : 7, bodies = data.bodies.length;
-    let at = 0;
+    let at = 0, steps = 0;
     const take = (count) => levels.slice(at, (at += count));
+    data.t = Array.from(take(data.count), (change) => (steps += change) * data.dt);
+    data.series = data.series.map((one) => ({ frames: data.count, departure: null, ...people[one.who], ...one }));
     for (const one of data.series) {
-      one.pose = summed(take(one.frames * bodies * parts), bodies * parts);
-      one.frame = summed(take(one.contacts), 1);
-      one.point = take(one.contacts * d);
-      one.impulse = take(one.contacts * d);
+      one.pose = framed(take(one.frames * bodies * parts), bodies * parts, true);
+      one.frame = framed(take(one.contacts), 1, true);
+      one.point = framed(take(one.contacts * d), d, false);
+      one.impulse = framed(take(one.contacts * d), d, false);
       one.first = new Int32Array(one.frames + 1).fill(one.contacts);
       for (let c = one.contacts - 1; c >= 0; c--) one.first[one.frame[c]] = c;
       for (let k = one.frames - 1; k >= 0; k--) one.first[k] = Math.min(one.first[k], one.first[k + 1]);
       one.shown = !hidden.has(one.name);
     }
-    data.exact = data.tracked === null ? null : summed(take(data.t.length * d), d);
+    data.exact = data.tracked === null ? null : framed(take(data.count * d), d, true);
     data.parts = parts;
     loaded.set(id, data);
     return data;

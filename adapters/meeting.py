@@ -1,0 +1,112 @@
+"""Which bodies can meet while a scene lasts: an engine has to hold the materials of these pairs, and of no others.
+
+What touches nothing else keeps to itself. Of bodies that may touch each other nobody knows who moves how, but what all
+of them can have is bounded. With the kinetic energy T of a group and ``V = sqrt(2 T)``, contacts that do no work (fixed
+partners, e <= 1, friction) leave
+
+    V(t) <= V(0) + t sqrt(sum m a^2 + torque^2 / I)      (Cauchy and Schwarz, of the loads' power),
+
+so that a body of mass m is never faster than ``V(t)/sqrt(m)`` and never farther from its start than t times that. A
+prescribed body or a surface that runs does work: what can reach one may be anywhere afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.drives import top_speed
+from adapters.scene import Body, HalfSpace, Pair, Scene
+from adapters.shapes import reach
+
+#: Pair of bodies, by index, with its material.
+Meeting = tuple[int, int, Pair]
+#: Engines leave the exact motion, by drag, overlap or what they add to a rebound: so many times as far is looked.
+ROOM = 2.0
+#: Of more free bodies all pairs are taken to meet: these are looked at one by one.
+MOST_BODIES = 200
+
+
+def representable(scene: Scene, solve: Callable[[Sequence[Meeting]], list[float] | None]) -> list[float] | None:
+    """Numbers of bodies that give the materials of all pairs, or else of those that can meet; None if there are none.
+
+    ``solve`` finds them for a list of pairs. All pairs come first: what an engine could hold, it holds as it did.
+    """
+    found = solve(list(scene.contact_pairs()))
+    if found is not None:
+        return found
+    pairs = meeting_pairs(scene)
+    return solve(pairs) if pairs else [0.0] * len(scene.bodies)
+
+
+def meeting_pairs(scene: Scene) -> list[Meeting]:
+    """Pairs with a free body that can come to touch within the scene's duration."""
+    pairs = list(scene.contact_pairs())
+    if sum(body.motion == "free" for body in scene.bodies) > MOST_BODIES:
+        return pairs
+    group = list(range(len(scene.bodies)))
+    while True:
+        around = _around(scene, group)
+        met = [pair for pair in pairs if _gap(scene, pair[0], pair[1]) <= around[pair[0]] + around[pair[1]]]
+        joined = list(group)
+        for i, j, _ in met:
+            # What is fixed passes nothing on between those that touch it; what is driven does work on them.
+            if _moves(scene.bodies[i]) and _moves(scene.bodies[j]):
+                old, new = joined[j], joined[i]
+                joined = [new if name == old else name for name in joined]
+        if joined == group:
+            return met
+        group = joined
+
+
+def _moves(body: Body) -> bool:
+    return body.motion != "fixed" or any(body.surface_velocity)
+
+
+def _around(scene: Scene, group: Sequence[int]) -> list[float]:
+    """How far from its start a body's outermost point can get [m]."""
+    found = [0.0] * len(scene.bodies)
+    for name in set(group):
+        members = [k for k, other in enumerate(group) if other == name]
+        free = [scene.bodies[k] for k in members if scene.bodies[k].motion == "free"]
+        driven = any(scene.bodies[k].motion != "free" and _moves(scene.bodies[k]) for k in members)
+        start, growth = _norms(scene, free)
+        for k in members:
+            body = scene.bodies[k]
+            if driven and free:
+                speed = math.inf
+            elif body.motion == "free":
+                speed = (start + growth * scene.duration) / math.sqrt(body.mass)
+            else:
+                speed = top_speed(body) if body.motion == "prescribed" else 0.0
+            found[k] = reach(body.shape) + ROOM * scene.duration * speed
+    return found
+
+
+def _norms(scene: Scene, free: Sequence[Body]) -> tuple[float, float]:
+    """``V(0)`` [sqrt(kg) m/s] of a group, and how fast its loads can make it grow."""
+    d, start, growth = scene.dimension, 0.0, 0.0
+    for body in free:
+        inertia = np.atleast_1d(np.asarray(body.inertia, dtype=float))
+        load = np.array(body.force) / body.mass + np.array(scene.gravity)
+        start += body.mass * _square(body.twist[:d]) + float(inertia.max()) * _square(body.twist[d:])
+        growth += body.mass * _square(load) + _square(body.torque) / float(inertia.min())
+    return math.sqrt(start), math.sqrt(growth)
+
+
+def _square(vector: Sequence[float] | NDArray[np.float64]) -> float:
+    return float(sum(float(x) ** 2 for x in vector))
+
+
+def _gap(scene: Scene, i: int, j: int) -> float:
+    """Distance of two centres at the start, or of a centre from a face [m]."""
+    a, b = scene.bodies[i], scene.bodies[j]
+    if isinstance(a.shape, HalfSpace):
+        a, b = b, a
+    place = a.pose[: scene.dimension]
+    if isinstance(b.shape, HalfSpace):
+        return sum(n * x for n, x in zip(b.shape.normal, place, strict=True)) - b.shape.offset
+    return math.dist(place, b.pose[: scene.dimension])
