@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
-from validation.pivoting import Pivot, fall_checks
 from validation.scenes.tilt_table import TOLD
+from validation.truths.pivoting import Pivot, fall_checks
 
 DT = 1 / 64
 
