@@ -9,6 +9,7 @@ import pytest
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
 from reference_solver.certification.geometry import rotation
 from validation.catalogue import CATALOGUE
+from validation.questions import nulls
 from validation.questions.nulls import (
     NULLS,
     Null,
@@ -21,6 +22,12 @@ from validation.questions.nulls import (
 )
 
 DT = 1 / 240
+
+
+@pytest.fixture(autouse=True)
+def nothing_remembered():
+    """What was measured of nulls before is measured anew."""
+    nulls._measured.cache_clear()
 
 
 def scene_of(*bodies, gravity=(0.0, 0.0), duration=1.0):
