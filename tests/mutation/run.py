@@ -227,6 +227,8 @@ def run(module: str, sample: int | None, survivors_only: bool) -> tuple[Score, l
         codes = {mutant: code for mutant, code in exit_codes(folder, module).items() if code is not None}
         if not codes:
             raise NothingRanError(f"{module}: no mutant ran; do its tests pass, and do they call it?\n{said[-500:]}")
+        if left := set(chosen) - set(codes):  # a run that ended early has not shown that tests notice
+            raise NothingRanError(f"{module}: {len(left)} mutants did not run\n{said[-500:]}")
         made = changes(folder, module)
     alive = [made[mutant] for mutant, code in codes.items() if code in ALIVE]
     now = os.times()
