@@ -20,9 +20,9 @@ Made by `make releases`{commit}. The same cells of every scene of the quick suit
 driven by one adapter in an environment of its own; receipts ran before each cell. A row is one check of one cell.
 *fails* counts rows outside their tolerance; *no answer* those whose cell crashed, hung or is not driven as declared:
 they fail no check and are no better for it; *mended* those that pass although they are listed as findings of other
-releases; *moved* those whose verdict flips or whose value moves beyond its noise floor. `crosscheck bisect` finds each
-of these steps again. What the notes say of a release is set beside a step that it may explain; it was not proven by
-building that one change.
+releases; *moved* those whose verdict flips or whose value moves beyond its noise floor: by more than from starts moved
+by the last place. `crosscheck bisect` finds each of these steps again. What the notes say of a release is set beside a
+step that it may explain; it was not proven by building that one change.
 """
 
 

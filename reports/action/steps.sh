@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Steps of the Action (action.yml): install, run, compare with a release, write summary and comment. Reads ENGINE, SCENES,
-# BASE, FAIL_ON and EXTRAS; writes crosscheck-out/. Exits with 1 if rows are alarming or what FAIL_ON names has changed.
+# BASE, FAIL_ON and EXTRAS; writes crosscheck-out/. Exits with 1 if rows are alarming or what FAIL_ON names has changed,
+# with 4 if the base does not answer.
 set -uo pipefail
 
 out=crosscheck-out
@@ -20,7 +21,8 @@ mv "$out.md" "$out/summary.md"
 
 : > "$out/comment.md"
 if [ -n "${BASE:-}" ]; then
-  crosscheck releases "$ENGINE" "$BASE" "${scenes[@]}" --out "$out" --json > "$out/base.json"
+  # A base that does not answer (4) is nothing to compare with: green would say that nothing changed.
+  crosscheck releases "$ENGINE" "$BASE" "${scenes[@]}" --out "$out" --json > "$out/base.json" || exit $?
   released=$(python -c 'import json, sys; print(json.load(open(sys.argv[1]))["releases"][0]["release"])' "$out/base.json") || exit 2
   changed=0
   crosscheck compare "$released" latest --markdown --fail-on "${FAIL_ON:-regressions}" --out "$out" > "$out/comment.md" || changed=$?

@@ -6,6 +6,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -29,6 +30,7 @@ from validation.releases import environments, history
 from validation.releases.bisection import Unchanged, bisect
 from validation.releases.choosing import Release, chosen
 from validation.releases.driving import Effort, drive, planned, time
+from validation.releases.floors import moved_starts
 from validation.workers import TIMEOUT
 
 Command = Callable[..., None]
@@ -89,6 +91,7 @@ def releases(
     asked, wanted, effort, console = _prepared(engine, which, options, out)
     store = Store(out)
     told = [_drive(store, release, wanted, effort, console, times) for release in asked]
+    told = _with_floors(store, asked, wanted, told, effort, console)
     store.close()
     moved = history.steps(told)
     if as_json:
@@ -147,6 +150,24 @@ def _drive(
     told = history.told_by(release.engine, release.version, found, taken)
     say(console, f"{release.name}: {told.reason or plural(len(found), 'cell')}")
     return told
+
+
+def _with_floors(
+    store: Store,
+    asked: Sequence[Release],
+    wanted: Sequence[Slot],
+    told: Sequence[history.Told],
+    effort: Effort,
+    console: Console,
+) -> list[history.Told]:
+    """What releases told, with the noise floors of all values that moved between them."""
+    starts, out = moved_starts(told), []
+    again = replace(effort, fresh=False)  # what has just been asked is stored
+    for release, before in zip(asked, told, strict=True):
+        if release.version in starts:
+            before = _drive(store, release, [*wanted, *starts[release.version]], again, console)
+        out.append(before)
+    return out
 
 
 @main.command("bisect")

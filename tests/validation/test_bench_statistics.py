@@ -65,6 +65,39 @@ def test_a_planted_exponent_is_found_within_its_standard_error():
     assert exact.standard_error < 1e-12
 
 
+def test_three_points_give_an_exponent_with_its_error():
+    """log2 of (1, 2, 4) and of (1, 2, 8): slope 3/2, residuals (1, -2, 1)/6, of which 1/6 is left to one degree."""
+    fit = power_law([1, 2, 4], [1, 2, 8])
+    assert (fit.exponent, fit.points) == (pytest.approx(1.5), 3)
+    assert fit.factor == pytest.approx(2.0 ** (-1 / 6))
+    assert fit.standard_error == pytest.approx(np.sqrt(1 / 6 / 2))
+    five = power_law([1, 2, 4, 8, 16], [1, 2, 4, 8, 32])
+    away = np.array([0.0, 1.0, 2.0, 3.0, 5.0]) - 2.2 - 1.2 * (np.arange(5) - 2)
+    assert (five.exponent, five.standard_error) == (pytest.approx(1.2), pytest.approx(np.sqrt(away @ away / 3 / 10)))
+    assert power_law(["1", "2", "4"], ["1", "2", "8"]) == fit  # what a CSV holds
+
+
+def test_a_spread_holds_the_numbers_of_its_samples():
+    found = spread(["3", "1", "2", "5"])
+    assert (found.n, found.minimum, found.median) == (4, 1.0, 2.5)
+    assert 1.0 <= found.low < found.median < found.high <= 5.0
+    # The interval leaves as many resampled medians below it as above.
+    evenly = spread(np.concatenate([-np.arange(1.0, 41.0), np.arange(1.0, 41.0)]))
+    assert evenly.low == pytest.approx(-evenly.high, abs=3.0)
+
+
+def test_drift_needs_four_samples_and_halves_them():
+    assert drift([1.0, 1.0, 2.0]) == 0.0
+    assert drift(["1", "1", "2", "2"]) == pytest.approx(1.0)
+    assert drift([2.0, 2.0, 2.0, 4.0, 4.0, 4.0, 4.0]) == pytest.approx(1.0)
+    assert drift([2.0, 2.0, 2.0, 2.0, 6.0, 6.0, 6.0, 6.0]) == pytest.approx(2.0)
+
+
+def test_an_envelope_is_told_of_numbers_as_text_holds_them():
+    assert lower_envelope(["9", "10"], ["2", "1"]).tolist() == [True, True]
+    assert lower_envelope(["9", "10"], ["10", "9"]).tolist() == [True, True]
+
+
 def test_two_points_give_no_exponent():
     assert power_law([1.0, 2.0], [1.0, 2.0]) is None
     assert power_law([3.0, 3.0, 3.0], [1.0, 2.0, 3.0]) is None

@@ -1,11 +1,13 @@
 """Nulls: three motions that need no engine, and the skill that errors have against them."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from reference_solver.certification.geometry import rotation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.judging.rows import rows_of
@@ -28,6 +30,12 @@ from validation.running.execution import execute
 DT = 1 / 240
 
 
+@pytest.fixture(autouse=True)
+def nothing_remembered():
+    """What was measured of nulls before is measured anew."""
+    nulls._measured.cache_clear()
+
+
 def scene_of(*bodies, gravity=(0.0, 0.0), duration=1.0):
     return Scene("toy", 1, 2, bodies, (Pair(),), gravity, duration)
 
@@ -42,6 +50,67 @@ def test_free_flight_follows_its_loads_to_the_digit():
     assert found.t[-1] == pytest.approx(1.0)
     assert found.pose[-1, 0] == pytest.approx([1.0 + 2.0 + 1.0, -5.0, 3.0])
     assert found.twist[-1, 0] == pytest.approx([4.0, -10.0, 3.0])
+
+
+@pytest.mark.parametrize("null", NULLS.values())
+def test_a_null_is_a_run_like_any_other(null):
+    found = null(scene_of(disc("ball", 1.0, 2.0), duration=10.0 * DT), DT)
+    assert found.t.dtype == float and found.t == pytest.approx(np.arange(11) * DT)
+    assert (found.dt, found.finish, found.contacts) == (DT, "completed", None)
+    assert found.pose.shape == found.twist.shape == (11, 1, 3)
+
+
+def test_bodies_in_space_turn_each_about_its_own_axis_from_any_attitude():
+    """Turned by a third about (1, 1, 1) at the start, then by half a radian about z: products of rotations."""
+    tumble = CATALOGUE["tumble"].scene(3)
+    attitude, spin = (0.5, 0.5, 0.5, 0.5), (0.0, 0.0, 0.5)
+    one = replace(tumble.bodies[0], pose=(0.0, 0.0, 0.0, *attitude), twist=(0.0, 0.0, 0.0, *spin))
+    still = replace(one, name="still", twist=(0.0,) * 6)
+    slow = replace(one, name="slow", twist=(0.0, 0.0, 0.0, 0.25, 0.0, 0.0))
+    found = free_flight(replace(tumble, bodies=(one, still, slow), duration=1.0), DT)
+    third = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    c, s = math.cos(0.5), math.sin(0.5)
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    c, s = math.cos(0.25), math.sin(0.25)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    assert rotation(found.pose[:, 0])[-1] == pytest.approx(about_z @ third)
+    assert rotation(found.pose[:, 1])[-1] == pytest.approx(third)
+    assert rotation(found.pose[:, 2])[-1] == pytest.approx(about_x @ third)
+    assert found.twist[-1, :, 3:] == pytest.approx(np.array([spin, (0.0,) * 3, (0.25, 0.0, 0.0)]))
+
+
+def test_flight_goes_on_from_where_bodies_met():
+    """Two that meet at 1/2 s under their loads: one of them is pushed on, the common speed grows with half of it."""
+    pushed = disc("a", 0.0, 1.0, force=(4.0, 0.0))
+    found = perfectly_inelastic(scene_of(pushed, disc("b", 1.0 + 0.5 + 0.5, 0.0), duration=1.5), DT)
+    met = int(np.argmax(found.twist[:, 1, 0] > 0.0))
+    assert found.t[met] == pytest.approx(0.5, abs=DT)
+    speed, after = 0.5 * (1.0 + 4.0 * found.t[met]), found.t[-1] - found.t[met]
+    assert found.twist[-1, :, 0] == pytest.approx([speed + 2.0 * after] * 2)
+    assert found.pose[-1, 1, 0] == pytest.approx(2.0 + speed * after + after**2)
+
+
+def test_what_touches_at_the_start_is_one_from_the_start_however_large_the_scene():
+    near = [disc("a", 0.0, 2.0), disc("b", 1.0 + 5e-10, 0.0)]
+    assert perfectly_inelastic(scene_of(*near), DT).twist[0, :, 0] == pytest.approx([1.0, 1.0])
+    apart = [disc("a", 0.0, 0.0, spin=3.0), disc("b", 1.0 + 4e-9, 0.0)]
+    assert perfectly_inelastic(scene_of(*apart), DT).twist[-1, 0, 2] == 3.0  # two radii and 4e-9 m do not touch
+    far = disc("c", 1e3, 5.0)
+    assert perfectly_inelastic(scene_of(*apart, far), DT).twist[-1, 0, 2] == 0.0  # of a scene of 1 km they do
+
+
+def test_a_body_that_meets_nothing_keeps_its_spin():
+    row = [disc("a", 0.0, 3.0, spin=7.0), disc("b", 2.0), disc("alone", 50.0, spin=2.0)]
+    assert perfectly_inelastic(scene_of(*row), DT).twist[-1, :, 2].tolist() == [0.0, 0.0, 2.0]
+
+
+def test_a_null_says_its_value_and_why_it_has_none():
+    found = {null.name: null for null in nulls_of("impact", 2, {"e": 0.5}, DT, "rebound_ratio", 0.5)}
+    assert found["free flight"] == Null("free flight", -1.0, 1.5, "")
+    assert found["did nothing"] == Null("did nothing", 0.0, 0.5, "")
+    none = nulls_of("stack", 2, {}, DT, "interface_impulse[1]", 1.0)
+    assert {(null.value, null.error) for null in none} == {(None, None)} and all(null.reason for null in none)
+    assert {null.reason for null in nulls_of("impact", 2, {}, DT, "nothing", 1.0)} == {"a null has no such metric"}
 
 
 def test_a_body_in_space_keeps_turning_about_its_axis():

@@ -7,5 +7,6 @@ driven.py         runs in the environment: plain data in, observations out; need
 driving.py        the other end of it: one run per release in the same store, what is stored is asked once
 timing.py         what a scene costs on a release, against a loop of Python on the same machine
 history.py        rows over releases: what moved, in which release
+floors.py         cells that moved, from starts moved by the last place: what any change would have moved is no step
 bisection.py      the release in which a verdict flips or a value moves, in log2(n) questions
 """

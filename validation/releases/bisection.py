@@ -16,12 +16,11 @@ from typing import Any
 
 from validation.cells import Slot, slot_from_dict
 from validation.judging.comparison import Change, Kind, by_seriousness, compare_rows
+from validation.releases.floors import MOVES
 from validation.releases.history import ANSWERS, Told
 
 #: What a release says of the rows in question; None if it cannot be asked.
 Ask = Callable[[int, Sequence[Slot]], Told]
-#: Moves of the start, in units in the last place, that give a row its noise floor.
-MOVES = (1, 2)
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import count
+from math import gcd
 from typing import Any
 
 from adapters.engine import Engine
 from adapters.stepping import run, step_count
 from adapters.trajectory import Trajectory
 from validation.cells import Prepared, Slot
+
+#: Fewest steps between two ends that both runs share, and how many times as many steps the other run makes: the square
+#: of the golden mean, whose multiples stay as far from whole numbers as any number's can.
+BLOCK, FINER = 13, 2.618
 
 
 def fully_certified(
@@ -41,22 +47,67 @@ def fully_certified(
 def _metric_errors(
     engine: Engine, prepared: Prepared, slot: Slot, settings: Mapping[str, Any], trajectory: Trajectory
 ) -> dict[str, float | None]:
-    """Twice the difference of each metric to that of a run at half the step, at the same times.
+    """How far the finite step puts each metric off: twice its largest difference to that of two other runs.
 
-    That is at least its error for the step, whatever the order; None where only one of both has the metric.
+    A scheme of order p is off by C h^p. A run with steps of r h, r <= 1/2, is off by r^p of that, and both differ by
+    (1 - r^p) of it, which is at least half, whatever p >= 1.
+
+    The first run makes two steps of each. All ends of whole steps are ends of its own: what a solver decides there,
+    by the time that is left of a step or by what it finds at its end, comes out alike in both, and so does what is
+    wrong with it. So the second makes its steps where `_elsewhere` says, and shares few ends or none.
+
+    None where only one of a pair of runs has the metric.
     """
-    scene, sampling = prepared.scene, prepared.canonical.sampling(prepared.scene)
-    whole = replace(scene, duration=step_count(scene.duration, slot.dt) * slot.dt)
-    if sampling.contacts_from is None:  # the same samples: what a metric owes to their spacing is no error of the run
-        sampling = replace(sampling, stride=2 * sampling.stride)
-        finer = replace(run(engine, whole, 0.5 * slot.dt, settings, sampling), dt=slot.dt)
-    else:  # impulses are those of a step, and metrics know of which
-        finer = run(engine, whole, 0.5 * slot.dt, settings, sampling)
-    here, there = (prepared.canonical.measure(scene, found) for found in (trajectory, finer))
-    return {name: _error(value, there[name][0]) for name, (value, _) in here.items()}
+    canonical, scene = prepared.canonical, prepared.scene
+    sampling, steps = canonical.sampling(scene), step_count(scene.duration, slot.dt)
+
+    def finer(steps: int, more: int, stride: int) -> Trajectory:
+        """The first ``steps`` steps once more, in ``more`` of them."""
+        own = replace(scene, duration=steps * slot.dt)
+        return run(engine, own, steps / more * slot.dt, settings, replace(sampling, stride=stride))
+
+    def differences(one: Trajectory, other: Trajectory) -> dict[str, float | None]:
+        here, there = canonical.measure(scene, one), canonical.measure(scene, other)
+        return {name: _difference(value, there[name][0]) for name, (value, _) in here.items()}
+
+    if sampling.contacts_from is not None:  # impulses are those of a step, and metrics know of which
+        halves = differences(trajectory, finer(steps, 2 * steps, 1))
+        others = differences(trajectory, finer(steps, _coprime(steps), 1))
+    else:  # the same samples: what a metric owes to their spacing is no error of the run
+        halves = differences(trajectory, replace(finer(steps, 2 * steps, 2 * sampling.stride), dt=slot.dt))
+        each, blocks, more = _elsewhere(steps // sampling.stride, sampling.stride)
+        other = finer(blocks * each * sampling.stride, blocks * more, more)
+        others = differences(_told(trajectory, slice(0, blocks * each + 1, each)), replace(other, dt=slot.dt))
+    # What samples that far apart do not show is told by the halves alone.
+    return {name: _larger(value, others[name]) for name, value in halves.items()}
 
 
-def _error(value: float | None, finer: float | None) -> float | None:
-    if value is None or finer is None:
-        return 0.0 if value is finer else None
-    return 2.0 * abs(value - finer)
+def _elsewhere(samples: int, stride: int) -> tuple[int, int, int]:
+    """Samples in a block, number of blocks, and steps that another run makes in a block of ``stride`` steps a sample.
+
+    Only the ends of blocks are ends of steps of both runs, so that blocks are as long as is told without losing sight
+    of the motion, `BLOCK` steps or up to twice as many: the number that leaves the fewest samples over at the end.
+    """
+    least = max(1, -(-BLOCK // stride))
+    each = min(samples, min(range(least, 2 * least), key=lambda size: samples % size))
+    return each, samples // each, _coprime(each * stride)
+
+
+def _coprime(steps: int) -> int:
+    """Number of steps near `FINER` times ``steps`` of which none but the last ends where one of those does."""
+    return next(more for more in count(round(FINER * steps)) if gcd(more, steps) == 1)
+
+
+def _told(trajectory: Trajectory, at: slice) -> Trajectory:
+    """The same run, known at fewer samples."""
+    return replace(trajectory, t=trajectory.t[at], pose=trajectory.pose[at], twist=trajectory.twist[at], contacts=None)
+
+
+def _difference(value: float | None, other: float | None) -> float | None:
+    if value is None or other is None:
+        return 0.0 if value is other else None
+    return 2.0 * abs(value - other)
+
+
+def _larger(halves: float | None, others: float | None) -> float | None:
+    return halves if halves is None or others is None else max(halves, others)

@@ -41,7 +41,7 @@ def test_a_box_that_slides_and_spins_comes_to_rest_with_a_certificate(spin):
 
 
 def test_friction_of_a_slip_that_turns_as_it_ends_stays_on_its_cone():
-    """A ball with unequal moments: its slip turns by a power of the time left, which no step over the end can follow."""
+    """A ball with unequal moments: its slip turns by a power of the time left, which no step over the end follows."""
     ball = Body(Sphere(0.3), 1.0, (0.03, 0.045, 0.02), (0.0, 0.0, 0.3, *UPRIGHT), (1.0, -0.5, 0.0, 3.0, 2.0, 5.0))
     model = on_floor(ball, 0.3)
     record = Simulation(model, Settings.reference(1 / 60)).record(30, pieces=True)

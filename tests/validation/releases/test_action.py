@@ -78,5 +78,11 @@ def test_without_a_base_nothing_is_installed_or_compared(job):
     assert (home / "crosscheck-out" / "comment.md").read_text() == ""
 
 
+def test_a_base_that_does_not_answer_is_no_comparison_that_found_nothing(job):
+    """1.1.0 cannot be imported: its library is missing."""
+    home = job('float("inf")', 4, BASE="1.1.0")
+    assert "libtoy.so.1" in (home / "crosscheck-out" / "base.json").read_text()
+
+
 def test_an_engine_that_is_not_there_stops_the_job(job):
     job("3.0", 2, ENGINE="another")

@@ -4,11 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from reports.command import releasing
 from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import Family, Finding, FindingsError
 from validation.judging.comparison import Kind
 from validation.releases import history, notes
+from validation.releases.choosing import Release
+from validation.releases.driving import Effort
+from validation.releases.floors import moved_starts
 from validation.releases.history import steps, told_by
 
 SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
@@ -51,6 +55,44 @@ def test_a_cell_that_crashes_is_an_answer_and_one_that_is_invalid_is_none():
     crashed = told("2", None, outcome=Outcome.CRASHED)
     assert kinds([told("1", 0.5), crashed]) == [("1", "2", Kind.OUTCOME, 1)]
     assert kinds([told("1", 0.5), told("2", 0.4, outcome=Outcome.INVALID), told("3", 0.5)]) == []
+
+
+def noisy(version, ratio, scatter, moves=(0, 1, 2)):
+    """A release that answers from starts moved by units in the last place, each of which adds ``scatter``."""
+    found = [
+        Observation(
+            replace(SLOT, ulp=u), "c", 1, version, Outcome.OK, metrics={"rebound_ratio": (ratio + u * scatter, "")}
+        )
+        for u in moves
+    ]
+    return told_by("toy", version, found)
+
+
+def test_a_value_that_moves_no_more_than_from_a_moved_start_is_no_step():
+    assert kinds([noisy("1", 0.40, 0.01), noisy("2", 0.41, 0.01)]) == []
+    assert kinds([noisy("1", 0.40, 0.001), noisy("2", 0.41, 0.001)]) == [("1", "2", Kind.ERROR, 1)]
+
+
+def test_starts_are_moved_where_values_moved_on_both_sides_and_nowhere_else():
+    releases = [told("1", 0.5), told("2", 0.4), told("3", 0.41, (SLOT, OTHER)), told("4", 0.41, (SLOT, OTHER))]
+    starts = [replace(SLOT, ulp=1), replace(SLOT, ulp=2)]
+    assert moved_starts(releases) == {"2": starts, "3": starts}
+
+
+def test_the_command_asks_what_moved_again_and_only_that(monkeypatch):
+    asked = []
+
+    def drive(store, release, cells, effort, console):
+        asked.append((release.version, [cell.ulp for cell in cells], effort.fresh))
+        return noisy(release.version, {"2": 0.40, "3": 0.41}[release.version], 0.01)
+
+    monkeypatch.setattr(releasing, "_drive", drive)
+    releases = [Release("toy", version, "toyphysics", ()) for version in "123"]
+    before = [told("1", 0.40), told("2", 0.40), told("3", 0.41)]
+    assert kinds(before) == [("2", "3", Kind.ERROR, 1)]
+    after = releasing._with_floors(None, releases, [SLOT], before, Effort(fresh=True), None)
+    assert asked == [("2", [0, 1, 2], False), ("3", [0, 1, 2], False)]
+    assert after[0] is before[0] and kinds(after) == []
 
 
 @pytest.mark.parametrize(
