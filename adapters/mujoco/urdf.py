@@ -62,7 +62,7 @@ def read(text: str, drop: bool) -> Model:
     joints = [child for child in root.children if child.tag == "joint"]
     notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's own"]
     notes += _let_go(root, links, joints)
-    own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false", "strippath": "true"}, 0)])
+    own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false"}, 0)])
     root.children.insert(0, own)
 
     def without(gone: Element) -> bool:
