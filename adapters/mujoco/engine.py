@@ -24,6 +24,7 @@ from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
+from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
 from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, STEPS
 from adapters.receipts import IMPULSE_SHARE
@@ -100,7 +101,7 @@ class MujocoEngine(Engine):
     profiles = PROFILES
     releases = RELEASES
     exports = MappingProxyType({"python": python, "mjcf": mjcf})
-    reads = MappingProxyType({".xml": read})
+    reads = MappingProxyType({".xml": read, ".urdf": read_urdf})
 
     def version(self) -> str:
         """Version of `mujoco-core` or `mujoco`, whichever is installed."""

@@ -1,4 +1,4 @@
-"""The text of an MJCF model: read without harm, and rid of what does not move bodies, before MuJoCo compiles it.
+"""The text of an MJCF or URDF model: read without harm, rid of what does not move bodies, before MuJoCo compiles it.
 
 MuJoCo's own parser opens files that a model includes and reserves whatever a model asks for. So the text is parsed here
 first: no document types or entities, no files, no more bodies than a scene may have. What has no place in a scene is
@@ -8,7 +8,7 @@ refused with its element and line, or left out where that is wanted.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -79,8 +79,8 @@ class Element:
         return any(child.without(gone) for child in self.children)
 
 
-def parsed(text: str) -> Element:
-    """Root of the model.
+def parsed(text: str, tag: str = "mujoco", otherwise: str = "a model of MJCF begins with <mujoco>") -> Element:
+    """Root of the model, which is called ``tag``.
 
     Raises
     ------
@@ -114,8 +114,8 @@ def parsed(text: str) -> Element:
             raise
         raise SceneError(f"model: is not XML: {one_line(error)}") from None
     root = roots[0]
-    if root.tag != "mujoco":
-        raise SceneError(f"model: {root}: a model of MJCF begins with <mujoco>")
+    if root.tag != tag:
+        raise SceneError(f"model: {root}: {otherwise}")
     return root
 
 
@@ -135,12 +135,55 @@ def cleaned(root: Element, drop: bool) -> list[str]:
     made = _made(root)
     if made > MOST_MADE:
         raise SceneError(f"model: {made:.4g} bodies and geoms are more than the {MOST_MADE} that are read")
+    for top in root.children:
+        if top.tag == "worldbody":
+            named(top, ("body", "geom"))
+    return dropped
+
+
+def named(root: Element, tags: Collection[str]) -> None:
+    """Give elements a name by their line where they have none."""
     taken: Counter[str] = Counter()
-    for element in (e for top in root.children if top.tag == "worldbody" for e in top.walk()):
-        if element.tag in ("body", "geom") and "name" not in element.attributes:
+    for element in root.walk():
+        if element.tag in tags and "name" not in element.attributes:
             name = f"{element.tag}@{element.line}"
             taken[name] += 1
             element.attributes["name"] = name if taken[name] == 1 else f"{name}-{taken[name]}"
+
+
+def rid_of(
+    root: Element, drop: bool, kept: Collection[str], silent: Collection[str], no_place: Mapping[str, str]
+) -> list[str]:
+    """Rid a model of another language than MJCF of what does not move bodies; returns what was left out besides.
+
+    Raises
+    ------
+    SceneError
+        Naming the first element that has no place in a scene, unless ``drop``; or that cannot have its name.
+    """
+    dropped: list[str] = []
+    left = [root]
+    while left:
+        parent = left.pop()
+        children = []
+        for child in parent.children:
+            if child.tag in silent:
+                continue
+            if child.tag not in kept:
+                line = f"{child}: {no_place.get(child.tag, 'there is no place for it in a scene')}"
+                if not drop:
+                    raise SceneError(f"model: {line}")
+                dropped.append(line)
+                continue
+            name = child.attributes.get("name", "")
+            if not is_visible(name) or len(name) > NAME - 4:
+                raise SceneError(f"model: line {child.line}: {one_line(name, 40)!r} cannot be a name")
+            children.append(child)
+        parent.children = children
+        left += children
+    made = sum(element.tag in ("link", "collision") for element in root.walk())
+    if made > MOST_MADE:
+        raise SceneError(f"model: {made} links and their shapes are more than the {MOST_MADE} that are read")
     return dropped
 
 

@@ -12,7 +12,7 @@ rebound, since MJCF states none.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,19 +44,41 @@ def read(text: str, drop: bool) -> Model:
     """
     root = parsed(text)
     dropped = cleaned(root, drop)
-    lines = {
-        e.attributes["name"]: e
-        for e in root.walk()
-        if e.tag in ("body", "geom", "joint", "pair")
-        if "name" in e.attributes
-    }
+    return read_tree(root, drop, dropped, ("body", "geom", "joint", "pair"), root.without, [])
+
+
+def read_tree(
+    root: Element,
+    drop: bool,
+    dropped: list[str],
+    tags: Collection[str],
+    without: Callable[[Element], bool],
+    notes: list[str],
+) -> Model:
+    """The model below ``root``, in a language that MuJoCo compiles.
+
+    Parameters
+    ----------
+    dropped, notes
+        What was left out of it so far, and what a reader of results must know.
+    tags
+        Elements that the compiled model knows by their names.
+    without
+        Takes one of them out, with what cannot be without it; whether it was there.
+
+    Raises
+    ------
+    SceneError
+        As `read`.
+    """
+    lines = {e.attributes["name"]: e for e in root.walk() if e.tag in tags and "name" in e.attributes}
     while True:
         try:
-            return _Reading(root, drop, dropped, lines).model()
+            return _Reading(root, drop, dropped, lines, notes).model()
         except Refused as refused:
             element = lines.get(refused.name)
             line = f"{element or _shown(root, refused)}: {refused.why}"
-            if not drop or refused.fatal or element is None or not root.without(element):
+            if not drop or refused.fatal or element is None or not without(element):
                 raise SceneError(f"model: {line}") from None
             dropped.append(line)
             for keyframe in [e for e in root.children if e.tag == "keyframe"]:
@@ -73,7 +95,9 @@ def _shown(root: Element, refused: Refused) -> str:
 class _Reading:
     """One attempt at a model, which either succeeds or says what stands in its way."""
 
-    def __init__(self, root: Element, drop: bool, dropped: list[str], lines: Mapping[str, Element]) -> None:
+    def __init__(
+        self, root: Element, drop: bool, dropped: list[str], lines: Mapping[str, Element], notes: list[str]
+    ) -> None:
         import mujoco
 
         self.mujoco, self.drop, self.dropped, self.lines = mujoco, drop, dropped, lines
@@ -82,7 +106,7 @@ class _Reading:
             self.compiled = mujoco.MjModel.from_xml_string(text_of(root))
         except ValueError as error:
             raise SceneError(f"model: MuJoCo does not compile it: {one_line(' '.join(str(error).split()))}") from None
-        self.notes: list[str] = []
+        self.notes = list(notes)
         self.data = mujoco.MjData(self.compiled)
         if self.compiled.nkey:
             mujoco.mj_resetDataKeyframe(self.compiled, self.data, 0)
@@ -110,8 +134,8 @@ class _Reading:
         if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
             gravity = (0.0, 0.0, 0.0)
         pairs = tuple(_pairs(contacts, bodies))
-        self.notes.append("restitution 0 in all engines but its own: MJCF states none, contacts rebound by solref")
-        name = next((e.attributes["model"] for e in [self.root] if e.attributes.get("model")), "model")
+        self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
+        name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)
         settings += self._softness(contacts)
         return Model(scene, tuple(self.notes), tuple(self.dropped), tuple(settings), float(m.opt.timestep))

@@ -71,6 +71,11 @@ class RapierEngine(Engine):
                 "colliders have density 0, the scene's mass and inertia are added",
                 "rapier3d, RigidBodyBuilder.additional_mass_properties",
             ),
+            Quirk(
+                "no body moves faster than 400 m/s",
+                "left alone in `default`, no limit in `tuned`",
+                "rapier3d, IntegrationParameters.normalized_max_linear_velocity; measured: scales at 1000 m",
+            ),
             Quirk("bodies sleep", "no body may", "rapier3d, can_sleep"),
         ),
     )

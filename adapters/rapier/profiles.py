@@ -24,18 +24,26 @@ FREQUENCY, STATIC_FREQUENCY = 30.0, 60.0
 DAMPING = 10.0
 #: Overlap that is left alone, and distance at which contacts are seen ahead, in units of length.
 ALLOWED, PREDICTION = 0.005, 0.02
+#: Speed that no body exceeds, and at which overlaps are pushed out at most, in units of length per second.
+FASTEST, PUSH_OUT = 400.0, 3.0
+#: A speed that is none: what moves faster is no scene of ours.
+NO_LIMIT = 1e9
 
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
         "iterations": settings.whole(1, 10**6),
         "substeps": settings.whole(1, 10**6),
+        "relaxations": settings.whole(0, 10**6),
         "frequency": settings.number(0.0, 1e9),
         "static_frequency": settings.number(0.0, 1e9),
         "damping_ratio": settings.number(0.0, 1e9),
         "allowed_error": settings.number(0.0, 1e9),
         "prediction": settings.number(0.0, 1e9),
+        "fastest": settings.number(0.0, 1e30),
+        "push_out": settings.number(0.0, 1e30),
         "friction_model": settings.word("simplified", "coulomb"),
         "recycling": settings.flag,
+        "clustering": settings.flag,
     }
 )
 
@@ -46,13 +54,17 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
     return [
         Setting("iterations", 1, f"{said}: one sweep in each small step", source),
         Setting("substeps", SUBSTEPS, f"{said}: small steps of a step", source),
+        Setting("relaxations", 1, f"{said}: one sweep without springs in each small step", source),
         Setting("frequency", FREQUENCY, f"{said}: contacts of moving bodies are springs of 30 Hz", source),
         Setting("static_frequency", STATIC_FREQUENCY, f"{said}: against fixed bodies 60 Hz", source),
         Setting("damping_ratio", DAMPING, said, source),
         Setting("allowed_error", ALLOWED, f"{said}: overlap that is left alone", source),
         Setting("prediction", PREDICTION, f"{said}: contacts are seen so far ahead", source),
+        Setting("fastest", FASTEST, f"{said}: no body moves faster [m/s]", source),
+        Setting("push_out", PUSH_OUT, f"{said}: no overlap is pushed out faster [m/s]", source),
         Setting("friction_model", "simplified", f"{said}: one friction constraint per manifold", source),
         Setting("recycling", True, f"{said}: manifolds of bodies that hardly moved are kept", source),
+        Setting("clustering", True, f"{said}: manifolds of one pair that face alike become one", source),
     ]
 
 
@@ -63,11 +75,14 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     return [
         Setting("iterations", 4, "more sweeps in each small step, for loads on light bodies", source),
         Setting("substeps", TUNED_SUBSTEPS, "twice the small steps: impulses travel farther up a column", source),
+        Setting("relaxations", 1, "as shipped", "rapier3d, IntegrationParameters"),
         Setting("frequency", stiff, "contacts as stiff as a step resolves, so that bodies do not sink in", source),
         Setting("static_frequency", stiff, "the same against fixed bodies", source),
         Setting("damping_ratio", DAMPING, "as shipped: over-damped, so that nothing is thrown out", source),
         Setting("allowed_error", 1e-5 * needs.smallest_size, "5 mm of overlap would be left alone as shipped", source),
         Setting("prediction", PREDICTION, "as shipped", "rapier3d, IntegrationParameters"),
+        Setting("fastest", NO_LIMIT, "400 m/s as shipped: scenes in kilometres are faster", "measured: scales"),
+        Setting("push_out", PUSH_OUT, "as shipped", "rapier3d, IntegrationParameters"),
         Setting(
             "friction_model",
             "simplified",
@@ -75,6 +90,7 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
             "measured: 0.936 mu g at 0 degrees, mu g at 45",
         ),
         Setting("recycling", False, "contacts are found anew in every step", "rapier3d, contact_recycling"),
+        Setting("clustering", True, "as shipped", "rapier3d, IntegrationParameters"),
     ]
 
 

@@ -53,12 +53,16 @@ class RapierSimulation(Simulation):
         held.dt = dt
         held.num_solver_iterations = settings["substeps"]
         held.num_internal_pgs_iterations = settings["iterations"]
+        held.num_internal_stabilization_iterations = settings["relaxations"]
         damping = settings["damping_ratio"]
         held.contact_softness = rapier3d.SpringCoefficients(settings["frequency"], damping)
         held.static_contact_softness = rapier3d.SpringCoefficients(settings["static_frequency"], damping)
         held.normalized_allowed_linear_error = settings["allowed_error"]
         held.normalized_prediction_distance = settings["prediction"]
+        held.normalized_max_linear_velocity = settings["fastest"]
+        held.normalized_max_corrective_velocity = settings["push_out"]
         held.contact_recycling = settings["recycling"]
+        held.contact_clustering = settings["clustering"]
         held.friction_model = getattr(rapier3d.FrictionModel, settings["friction_model"].upper())
 
     def _made(self, rapier3d: Any, index: int, asked: Body) -> Any:
@@ -159,11 +163,15 @@ class RapierSimulation(Simulation):
             "gravity": [g.x, g.y, g.z],
             "iterations": held.num_internal_pgs_iterations,
             "substeps": held.num_solver_iterations,
+            "relaxations": held.num_internal_stabilization_iterations,
             "frequency": held.contact_softness.natural_frequency,
             "static_frequency": held.static_contact_softness.natural_frequency,
             "allowed_error": held.normalized_allowed_linear_error,
             "prediction": held.normalized_prediction_distance,
+            "fastest": held.normalized_max_linear_velocity,
+            "push_out": held.normalized_max_corrective_velocity,
             "recycling": held.contact_recycling,
+            "clustering": held.contact_clustering,
             "friction_model": str(held.friction_model),
             "threads": self.world.num_threads,
             "bodies": {

@@ -118,3 +118,17 @@ def test_a_blow_is_what_its_law_says_and_a_millionth_more_is_not(profile, params
         assert abs(found[metric][0] - value) <= band, metric
         if scene.params["e"] * scene.params["v"] > 0.1:
             assert band < 1e-8 and (metric == "momentum_defect" or abs(found[metric][0] * 1.000001 - value) > band)
+
+
+def test_what_no_step_finds_in_a_thin_wall_passes_it_as_its_law_says():
+    from adapters.dart.laws import DEVIATIONS
+
+    wall = CATALOGUE["thin_wall"]
+    for params, passes in (({}, False), ({"v": 200.0}, True)):
+        scene = wall.scene(2, params)
+        found = wall.measure(scene, drive(scene))
+        laws = [d for d in DEVIATIONS if d.covers("dart", "6.20.0", "default", "thin_wall", "rebound_ratio")]
+        told = [each for each in (d.law(scene, DT, wall.measure) for d in laws) if each is not None]
+        assert len(told) == 1
+        value, band = told[0]
+        assert abs(found["rebound_ratio"][0] - value) <= band < 1e-6 and (value == -1.0) is passes

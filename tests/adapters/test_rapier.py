@@ -49,7 +49,10 @@ def test_default_is_what_fresh_parameters_hold():
     assert chosen["damping_ratio"] == held.contact_softness.damping_ratio == held.static_contact_softness.damping_ratio
     assert chosen["allowed_error"] == pytest.approx(held.normalized_allowed_linear_error)
     assert chosen["prediction"] == pytest.approx(held.normalized_prediction_distance)
-    assert chosen["recycling"] == held.contact_recycling
+    assert chosen["recycling"] == held.contact_recycling and chosen["clustering"] == held.contact_clustering
+    assert chosen["relaxations"] == held.num_internal_stabilization_iterations
+    assert chosen["fastest"] == held.normalized_max_linear_velocity
+    assert chosen["push_out"] == held.normalized_max_corrective_velocity
     assert held.friction_model == rapier3d.FrictionModel.SIMPLIFIED
 
 
@@ -57,7 +60,9 @@ def test_default_is_what_fresh_parameters_hold():
     ("changes", "field"),
     [({"iterations": 0}, "iterations"), ({"substeps": True}, "substeps"), ({"frequency": -1.0}, "frequency"),
      ({"damping_ratio": math.inf}, "damping_ratio"), ({"recycling": 1}, "recycling"),
-     ({"friction_model": "dry"}, "friction_model"), ({"slop": 0.1}, "slop")],
+     ({"friction_model": "dry"}, "friction_model"), ({"slop": 0.1}, "slop"),
+     ({"relaxations": -1}, "relaxations"), ({"fastest": math.nan}, "fastest"), ({"push_out": "3"}, "push_out"),
+     ({"clustering": 0}, "clustering")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}") as caught:
@@ -69,6 +74,19 @@ def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_a
     smooth, rough = (drive(resting(mu)).contacts.impulse_between(0, 1)[-60:] / DT for mu in (0.0, 0.5))
     assert np.isfinite(smooth).all() and smooth[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3)
     assert rough[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3) and np.isnan(rough[:, :2]).all()
+
+
+@pytest.mark.parametrize("changes", [{"relaxations": 7}, {"fastest": 5.0}, {"push_out": 0.25}, {"clustering": False}])
+def test_what_is_set_is_what_the_world_holds(changes):
+    held = drive(replace(resting(), duration=DT), **changes).readback
+    assert {name: held[name] for name in changes} == changes
+
+
+def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
+    box = replace(resting().bodies[1], twist=(500.0, 0.0, 0.0, 0.0, 0.0, 0.0), pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0))
+    fast = replace(resting(), bodies=(FLOOR, box), gravity=(0.0, 0.0, 0.0), duration=5 * DT)
+    assert drive(fast).twist[-1, 1, 0] == pytest.approx(400.0, rel=1e-6)
+    assert drive(fast, "tuned").twist[-1, 1, 0] == pytest.approx(500.0, rel=1e-6)
 
 
 def test_loads_act_in_every_step():

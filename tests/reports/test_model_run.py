@@ -72,6 +72,25 @@ def test_the_same_command_says_how_many_cells_and_a_profile_can_be_chosen(tmp_pa
     assert "no chosen engine has a profile 'mine'" in call(*words, "--profile", "mine", status=(2,)).output
 
 
+def test_a_robot_in_urdf_runs_as_well(tmp_path):
+    words = (
+        "run",
+        MODELS / "cube_on_table.urdf",
+        "--engine",
+        "mujoco",
+        "--profile",
+        "model",
+        "--param",
+        "duration=0.3",
+    )
+    done = call(*words, "--param", "duration=0.3", "--jobs", 1, "--out", tmp_path, "--json", status=(0, 1))
+    rows = json.loads(done.stdout)
+    assert {row["dimension"] for row in rows} == {2, 3} and {row["outcome"] for row in rows} == {"ok"}
+    assert "friction 1 in all pairs" in done.stderr
+    arm = call("run", MODELS / "refused_arm.urdf", "--engine", "mujoco", "--out", tmp_path / "no", status=(2,))
+    assert "line 3: <joint> 'shoulder': a revolute joint" in arm.output and len(arm.output.splitlines()) == 1
+
+
 def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
     words = ("run", MODELS / "refused_hinge.xml", "--engine", "mujoco", "--profile", "model", "--out", tmp_path)
     refused = call(*words, status=(2,))

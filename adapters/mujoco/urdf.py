@@ -1,0 +1,113 @@
+"""URDF models of free links with one primitive shape each, as scenes.
+
+    text -> nothing from outside, nothing that only draws -> MuJoCo's own compiler -> model.py
+
+URDF does not say whether a robot is held: as in Bullet and Gazebo its root is free, unless it is called ``world`` or
+has no mass. It states neither friction, nor softness, nor a floor: what MuJoCo takes for them is said. Joints that are
+neither fixed nor floating, meshes and cylinders have no place in a scene.
+"""
+
+from __future__ import annotations
+
+from adapters.model import Model
+from adapters.mujoco import model
+from adapters.mujoco.markup import Element, named, parsed, rid_of
+from adapters.plain import one_line
+from adapters.scene import SceneError
+
+#: Elements that stay.
+KEPT = frozenset(
+    ("robot", "link", "joint", "inertial", "mass", "inertia", "origin", "collision", "geometry", "box", "sphere",
+     "cylinder", "capsule", "parent", "child", "axis")
+)  # fmt: skip
+#: Elements that only draw, or speak of motors that a joint which is free or fixed has none of.
+SILENT = frozenset(["visual", "material", "transmission", "ros2_control", "verbose", "sensor"])
+#: Elements that a scene has no place for, or that another program reads, and why.
+NO_PLACE = {
+    "mesh": "a scene has no meshes",
+    "sdf": "other files are not read",
+    "contact": "what Bullet alone reads of contacts is not read",
+    "gazebo": "what Gazebo alone reads is not read",
+    "mujoco": "what MuJoCo alone reads is not read",
+    "limit": "a scene has no joints but fixed ones",
+    "dynamics": "a scene has no joints but fixed ones",
+    "mimic": "a scene has no joints but fixed ones",
+    "safety_controller": "a scene has no motors",
+    "calibration": "a scene has no motors",
+}
+#: Name of a link that holds what hangs on it.
+WORLD = "world"
+
+
+def read(text: str, drop: bool) -> Model:
+    """The robot in ``text``; see `adapters.model.Reader`.
+
+    Raises
+    ------
+    SceneError
+        Naming the element that has no place in a scene, or with the compiler's complaint.
+    """
+    root = parsed(text, "robot", "a model of URDF begins with <robot>")
+    dropped = rid_of(root, drop, KEPT, SILENT, NO_PLACE)
+    named(root, ("link", "collision"))
+    for joint in [child for child in root.children if child.tag == "joint"]:
+        if joint.attributes.get("type") not in ("fixed", "floating"):
+            kind = one_line(joint.attributes.get("type", "nameless"), 20)
+            line = f"{joint}: a {kind} joint holds a link; bodies of a scene are free or fixed"
+            if not drop:
+                raise SceneError(f"model: {line}")
+            dropped.append(f"{line}: and what hangs on it")
+            _cut(root, joint)
+    links = [child for child in root.children if child.tag == "link"]
+    joints = [child for child in root.children if child.tag == "joint"]
+    notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's own"]
+    notes += _let_go(root, links, joints)
+    own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false"}, 0)])
+    root.children.insert(0, own)
+
+    def without(gone: Element) -> bool:
+        """Leave out a link with the joint that it hangs by, or a shape."""
+        name = gone.attributes["name"]
+        hung = [e for e in root.children if gone.tag == "link" and e.tag == "joint" and _link_of(e, "child") == name]
+        for joint in hung:
+            _cut(root, joint)
+        return bool(hung) or root.without(gone)
+
+    return model.read_tree(root, drop, dropped, ("link", "collision"), without, notes)
+
+
+def _cut(root: Element, joint: Element) -> None:
+    """Leave out a joint, the link that hangs by it, and all that hangs on that one."""
+    if not root.without(joint):
+        return
+    name = _link_of(joint, "child")
+    for link in [e for e in root.children if e.tag == "link" and e.attributes["name"] == name]:
+        root.without(link)
+    for other in [e for e in root.children if e.tag == "joint" and _link_of(e, "parent") == name]:
+        _cut(root, other)
+
+
+def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[str]:
+    """Hang the root on the world by a floating joint, unless it is the world or has no mass; says so."""
+    held = {_link_of(joint, "child") for joint in joints}
+    roots = [link for link in links if link.attributes["name"] not in held]
+    if len(roots) != 1:
+        which = f"{roots[1]}: is a second root" if roots else "no link is its root"
+        raise SceneError(f"model: {which}; a robot has one, on which all others hang")
+    name = roots[0].attributes["name"]
+    if name == WORLD:
+        return []
+    if not any(child.tag == "inertial" for child in roots[0].children):
+        roots[0].attributes["name"] = WORLD
+        for end in (e for joint in joints for e in joint.children if e.attributes.get("link") == name):
+            end.attributes["link"] = WORLD
+        return [f"{one_line(name, 60)} is fixed: it has no mass"]
+    free = Element("joint", {"name": f"{WORLD}@free", "type": "floating"}, roots[0].line)
+    free.children = [Element("parent", {"link": WORLD}, 0), Element("child", {"link": name}, 0)]
+    root.children += [Element("link", {"name": WORLD}, 0), free]
+    return [f"{one_line(name, 60)} is free: URDF does not say whether a robot's root is held, a link 'world' holds it"]
+
+
+def _link_of(joint: Element, end: str) -> str:
+    """Name of the link at one end of a joint; empty where it states none."""
+    return next((child.attributes.get("link", "") for child in joint.children if child.tag == end), "")
