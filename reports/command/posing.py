@@ -17,10 +17,10 @@ from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.findings.breaks import breaks_of, listed, standing_of, write
 from validation.findings.files import findings_folder
 from validation.judging.verdicts import Standing
 from validation.posed import resolve
+from validation.questions.breaks import breaks_of, listed, standing_of, write
 from validation.questions.invariance import FACTOR, INVISIBLE, MOVES, RELATIONS, Change, compare
 from validation.running.plan import QUICK_DT
 

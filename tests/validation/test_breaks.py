@@ -9,9 +9,10 @@ from adapters.registry import names
 from reports.command import main, posing
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.findings import FindingsError, breaks
-from validation.findings.breaks import BAND, breaks_of, decades_of, listed, read, standing_of, write
+from validation.findings import FindingsError
 from validation.judging.verdicts import Standing
+from validation.questions import breaks
+from validation.questions.breaks import BAND, breaks_of, decades_of, listed, read, standing_of, write
 from validation.questions.invariance import RELATIONS, Change
 
 DT = 1 / 240
