@@ -56,6 +56,8 @@ PLACE, DIRECTION, RADIUS, ALONG, SIDE = 0, 6, 12, 14, 16
 
 #: Coordinates this near to a face, as a share of its half extent, lie on it.
 ON_FACE = 1e-6
+#: What rolls off a face is as near to its edge as this share of its half extent: events are located to 1e-13.
+AT_EDGE = 1e-9
 #: Squared sines below this belong to parallel directions: the normal of a face against the one that was found.
 PARALLEL = 1e-12
 #: A tangent that the new normal leaves less of is replaced: it turned by more than 80 degrees.
@@ -94,10 +96,12 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
     core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
     core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
     if face_a >= 0 and core_b == POINT:
-        set_face(bodies, a, face_a, n, lasting, k, 0)
+        if core_a == PLANE or not rolls_off(bodies, manifolds, lasting, c, k, 0, face_a):
+            set_face(bodies, a, face_a, n, lasting, k, 0)
         return True
     if face_b >= 0 and core_a == POINT:
-        set_face(bodies, b, face_b, scale(-1.0, n), lasting, k, 1)
+        if core_b == PLANE or not rolls_off(bodies, manifolds, lasting, c, k, 1, face_b):
+            set_face(bodies, b, face_b, scale(-1.0, n), lasting, k, 1)
         return True
     if core_a == LINE and core_b == LINE:
         e_a, e_b = (
@@ -108,6 +112,31 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
         lasting.place[k, SIDE] = 1.0 if dot(across, n) > 0.0 else -1.0
         return dot(across, across) > ON_FACE
     return core_a != PLANE and core_b != PLANE
+
+
+@inner_kernel
+def rolls_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int, face: int) -> bool:
+    """Whether the other body is round, stands where a face of the box on this side ends, and goes on over its edge.
+
+    Its core, which is above the point of contact by its radius, moves out of the face.
+    """
+    radius = lasting.place[k, RADIUS + 1 - side]
+    if radius == 0.0:
+        return False
+    m, p = c // POINTS, c % POINTS
+    i, other = lasting.body[k, side], lasting.body[k, 1 - side]
+    up = scale(radius * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))
+    arm, far = row(manifolds.arm_a[m], p, 0), row(manifolds.arm_b[m], p, 0)
+    if side == 1:
+        arm, far = far, arm
+    at_other = add(row(bodies.twist, other, 0), cross(row(bodies.twist, other, 3), add(far, up)))
+    own = add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), add(arm, up)))
+    local, passing = times_transposed(bodies.axes, i, arm), times_transposed(bodies.axes, i, sub(at_other, own))
+    for d in range(3):
+        half = bodies.geometry[i, d]
+        if d != face and half - abs(local[d]) <= AT_EDGE * half and passing[d] * local[d] > 0.0:
+            return True
+    return False
 
 
 @inner_kernel

@@ -131,6 +131,10 @@ def _largest_turn(run: Run, rows: Indices) -> Array:
         places.append(_pose(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
     apart = np.linalg.norm(places[0] - places[1], axis=1)
     apart = np.where(apart > 0.0, apart, run.size)
+    shapes = [run.model.bodies[int(i[rows[0]])].shape for i in (pieces.body_a, pieces.body_b)]
+    radii = [shape.radius for shape in shapes if hasattr(shape, "radius")]
+    if len(radii) == 1:  # about a corner or an edge, what is round turns by its own radius
+        apart = np.minimum(apart, radii[0])
     length = pieces.length[run.contact_owner[rows]]
     return np.asarray(length * (spins + np.linalg.norm(passing, axis=1) / apart) + 1e-12)
 
