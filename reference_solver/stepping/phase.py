@@ -386,9 +386,9 @@ def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
 
 @inner_kernel
 def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
-    """Project poses on closed gaps, orthogonally, or velocities on the rows that are held, with the friction of slips.
+    """Project poses on closed gaps, or velocities on the rows that are held (an orthogonal projection).
 
-    An impulse along a normal alone would leave Coulomb's cone.
+    Without the friction of slips: near a jam what that brings along has no bound.
     """
     kept = list_rows(lasting)
     count = 0
@@ -401,7 +401,7 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
         count += 1
     if count == 0:
         return True
-    assemble(lasting, count, not poses)
+    assemble(lasting, count, False)
     solve_rows(lasting, count, 0.0)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
@@ -409,13 +409,8 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
     for i in range(count):
         k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
         push(lasting, lasting.acceleration, k, row, lasting.answer[i])
-        if poses:
-            continue
-        give(bodies, lasting, k, row, lasting.answer[i])
-        for t in range(lasting.size[TANGENTS] if row == 0 and lasting.mode[k] == SLIP else 0):
-            friction = -lasting.friction[k] * lasting.answer[i] * lasting.direction[k, t]
-            push(lasting, lasting.acceleration, k, 1 + t, friction)
-            give(bodies, lasting, k, 1 + t, friction)
+        if not poses:
+            give(bodies, lasting, k, row, lasting.answer[i])
     for i in range(lasting.size[BODIES]):
         if not is_free(bodies, i):
             continue
