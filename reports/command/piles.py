@@ -34,7 +34,7 @@ def show_piles(console: Console, as_json: bool, most: int, seed: int) -> None:
 
 def _costs(told: list[Row]) -> Table:
     table = Table(title="CPU time of a step of a pile: median, 95 % interval", title_justify="left", box=SIMPLE_HEAD)
-    for heading in ("pile", "bodies", "reference", "fixed_step", "ratio"):
+    for heading in ("pile", "bodies", "located", "fixed_step", "ratio"):
         table.add_column(heading, no_wrap=True)
     for row in told:
         seconds = (_seconds(row.reference), _seconds(row.fixed_step))
@@ -45,7 +45,7 @@ def _costs(told: list[Row]) -> Table:
 
 def _exponents(told: list[Row]) -> Table:
     table = Table(title="Cost of a step ~ bodies^p", title_justify="left", box=SIMPLE_HEAD)
-    for heading in ("pile", "bodies", "p, reference", "p, fixed_step"):
+    for heading in ("pile", "bodies", "p, located", "p, fixed_step"):
         table.add_column(heading, no_wrap=True)
     for kind, fits in exponents(told).items():
         sizes = [row.bodies for row in told if row.kind == kind]

@@ -337,7 +337,8 @@ def test_table_that_no_product_gives_is_refused_in_one_line():
     names = ("a", "b", "c")
     pairs = tuple(Pair(i, j, friction=0.5) for i, j in zip(names, names[1:] + names[:1], strict=True))
     bodies = (FLOOR, *(ball(5.0 + 2 * k, name=n) for k, n in enumerate(names)))
-    scene = scene_of(*bodies, pairs=(*pairs, Pair("floor", "*", friction=0.2), Pair("floor", "a", friction=0.9)))
+    table = (*pairs, Pair("floor", "*", friction=0.2), Pair("floor", "a", friction=0.9))
+    scene = scene_of(*bodies, gravity=(0.0, 0.0, -9.81), duration=2.0, pairs=table)  # in which all can meet
     reason = ENGINE.refuses(scene, "tuned")
     assert reason.startswith("friction: ") and "\n" not in reason
     with pytest.raises(EngineError, match="friction: "):
@@ -428,7 +429,7 @@ def test_bad_steps_are_refused(dt):
         (scene_of(Body("b", Sphere(1e-3), 1.0, (1.0,) * 3)), "b.shape: "),
         (scene_of(Body("b", Sphere(0.5), 1e-13, (1.0,) * 3)), "b: "),
         (scene_of(Body("b", Sphere(0.5), 1.0, (1.0, 1.0, 1e-14))), "b: "),
-        (scene_of(FLOOR, ball(2.0), mu=11.0), "friction: "),
+        (scene_of(FLOOR, ball(2.0), gravity=(0.0, 0.0, -9.81), duration=2.0, mu=11.0), "friction: "),
     ],
 )
 def test_what_bullet_cannot_hold_is_refused_with_a_reason(scene, message):

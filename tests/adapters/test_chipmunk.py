@@ -197,7 +197,7 @@ def test_a_body_without_friction_among_others_gets_none() -> None:
 
 def test_a_table_no_product_represents_is_refused_with_its_reason() -> None:
     bodies = (FLOOR, unit_box("a", 0.0, 0.5), unit_box("b", 0.0, 1.5))
-    scene = make(*bodies, mu=0.5, pairs=(Pair("a", "b", friction=0.0),))
+    scene = make(*bodies, mu=0.5, gravity=(0.0, -9.81), pairs=(Pair("a", "b", friction=0.0),))  # all can meet
     reason = ENGINE.refuses(scene, "default")
     assert reason is not None and reason.startswith("pairs: friction") and "\n" not in reason
     with pytest.raises(EngineError, match=r"^pairs: friction"):

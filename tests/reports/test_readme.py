@@ -103,6 +103,8 @@ NOT_RUN = {
     "crosscheck bench [SCENES]": "half a minute at least: run by test_bench_command.py",
     "crosscheck report --open": "opens a browser: the page is made by test_page.py, looked at by the tests beside it",
     "crosscheck bundle": "a quarter of a minute: run by test_bundle.py",
+    "crosscheck bench --piles 80": "ten minutes: a smaller one is run by tests/validation/test_bench_piles.py",
+    "crosscheck certify --random 60": "a minute: fewer scenes are run by test_fuzzing_command.py",
     "crosscheck certify [--order|--self-test]": "compiles and runs the solver's gates: run by test_certify_command.py",
     "crosscheck compile": "minutes where the kernels are not there yet: `make test` begins with it",
     "crosscheck findings --prove ID": "runs an engine again with one setting switched: run by test_proving_command.py",
