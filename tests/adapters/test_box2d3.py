@@ -86,10 +86,12 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
 
 def test_what_has_no_single_number_and_tables_without_factors_are_refused():
     assert ENGINE.refuses(resting(mass=1e-40), "tuned").startswith("box.mass: ")
-    bodies = tuple(Body(name, Disc(0.5), pose=(2.0 * k, 0.0, 0.0)) for k, name in enumerate("abc"))
+    bodies = tuple(
+        Body(name, Disc(0.5), pose=(2.0 * k, 0.0, 0.0), twist=(1.0, 0.0, 0.0)) for k, name in enumerate("abc")
+    )
     for field, values in (("friction", (0.9, 0.9, 0.0)), ("restitution", (0.9, 0.5, 0.1))):
         pairs = tuple(Pair(a, b, **{field: value}) for (a, b), value in zip(("ab", "bc", "ac"), values, strict=True))
-        refused = ENGINE.refuses(Scene("odd", 1, 2, bodies, pairs, (0.0, 0.0), 1.0), "tuned")
+        refused = ENGINE.refuses(Scene("odd", 1, 2, bodies, pairs, (0.0, 0.0), 10.0), "tuned")
         assert refused.startswith(f"pairs: {field}") and len(refused.splitlines()) == 1
 
 
@@ -99,7 +101,8 @@ def test_numbers_of_bodies_give_each_pair_its_own():
     pairs = (Pair("floor", "a", 0.9, 0.1), Pair("floor", "b", 0.4, 0.2), Pair("floor", "c", 0.0, 0.05),
              Pair("a", "b", 0.9, 0.1), Pair("b", "c", 0.4, 0.1), Pair("a", "c", 0.9, 0.05))  # fmt: skip
     scene = Scene("pairs", 1, 2, bodies, pairs, (0.0, 0.0), 0.1)
-    e, mu = restitutions(scene), frictions(replace(scene, pairs=(*pairs[:3], Pair("*", "*", 0.0, 0.1))))
+    table = (*pairs[:3], Pair("*", "*", 0.0, 0.1))
+    e, mu = restitutions(scene), frictions(replace(scene, duration=5.0, pairs=table))  # in which all can meet
     assert e == [0.0, 0.9, 0.4, 0.0] and mu is None
     found = drive(replace(scene, pairs=tuple(replace(pair, friction=0.1) for pair in pairs)))
     for k, pair in enumerate(pairs[:3], start=1):

@@ -70,11 +70,14 @@ def test_loads_act_in_every_step_and_contacts_carry_the_weight():
 
 
 def test_what_cannot_be_said_in_numbers_of_single_bodies_is_refused():
-    a, b, c = (Body(n, Sphere(0.5), 1.0, (1.0, 1.0, 1.0), (2.0 * k, 0, 0, 1.0, 0, 0, 0)) for k, n in enumerate("abc"))
+    a, b, c = (
+        Body(n, Sphere(0.5), 1.0, (1.0, 1.0, 1.0), (2.0 * k, 0, 0, 1.0, 0, 0, 0), (1.0, 0, 0, 0, 0, 0))
+        for k, n in enumerate("abc")
+    )
     odd = (Pair("a", "b", 0.9), Pair("b", "c", 0.5), Pair("a", "c", 0.0))
-    assert ENGINE.refuses(Scene("odd", 1, 3, (a, b, c), odd, (0.0, 0.0, 0.0), 0.1), "default").startswith("pairs: rest")
+    assert ENGINE.refuses(Scene("odd", 1, 3, (a, b, c), odd, (0.0, 0.0, 0.0), 9.0), "default").startswith("pairs: rest")
     rough = (Pair("a", "b", 0.0, 0.9), Pair("b", "c", 0.0, 0.9), Pair("a", "c", 0.0, 0.1))
-    assert "friction" in ENGINE.refuses(Scene("rough", 1, 3, (a, b, c), rough, (0.0, 0.0, 0.0), 0.1), "default")
+    assert "friction" in ENGINE.refuses(Scene("rough", 1, 3, (a, b, c), rough, (0.0, 0.0, 0.0), 9.0), "default")
     moved = Scene("moved", 1, 3, (FLOOR, replace(a, motion="prescribed")), (Pair(),), (0.0, 0.0, 0.0), 0.1)
     assert ENGINE.refuses(moved, "default").startswith("a.motion: ")
 
