@@ -28,6 +28,7 @@ def _model(bodies: list[Body], friction: float, restitution: float = 0.0, gravit
 
 def _plane(normal: Array, **fields: object) -> Body:
     motion = "prescribed" if fields else "fixed"
+    # normal (3,) is a tuple of three numbers, of which a type checker knows only that there are some
     return Body(HalfSpace(tuple(normal)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion=motion, **fields)  # type: ignore[arg-type]
 
 
