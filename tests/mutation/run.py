@@ -95,7 +95,12 @@ SUBJECTS = {
     "adapters/trajectory.py": ("adapters/test_stepping.py",),
     "adapters/stepping.py": ("adapters/test_stepping.py",),
     "adapters/receipts.py": ("adapters/test_receipts.py",),
-    "validation/geometry.py": ("validation/test_geometry.py", "validation/test_metrics.py"),
+    "validation/geometry.py": (
+        "validation/test_geometry.py",
+        "validation/test_solids.py",
+        "validation/test_metrics.py",
+    ),
+    "validation/solids.py": ("validation/test_solids.py",),
     "validation/files/invariants.py": ("validation/test_invariants.py",),
     "validation/files/mass_properties.py": ("validation/test_invariants.py",),
     "validation/questions/convergence.py": ("validation/test_convergence.py",),
@@ -113,6 +118,7 @@ pytest_add_cli_args_test_selection = {tests}
 """
 #: Reasons that the form of a change tells.
 WORDS, ENCODING = "words of a sentence", "the same encoding by another name"
+LETTERS = "the same sum by other letters"
 STRICT = "a guard against slips of our own: both are of one length wherever it is called"
 #: Exit codes of a mutant that its tests let live: they passed, or no test reaches it.
 ALIVE = (0, 5, 33)
@@ -304,6 +310,8 @@ def known_by_form(change: str) -> str:
         return ""
     if "utf-8" in old and "XX" not in new:
         return ENCODING
+    if "einsum(" in old and "XX" not in new:
+        return LETTERS
     start = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), len(old))
     inside = old[:start].count("{") > old[:start].count("}")  # in a replacement field only its own literals are words
     quote = "'" if inside else '"'

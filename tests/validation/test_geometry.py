@@ -7,7 +7,7 @@ import pytest
 
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import Trajectory
-from validation import metrics
+from validation import geometry, metrics
 from validation.files import invariants
 from validation.geometry import deepest, least_gap, overlap, separation
 
@@ -101,6 +101,43 @@ def test_shortcuts_give_the_exact_depth(pair):
     assert deepest(a, pose_a[apart], b, pose_b[apart]) == 0.0
 
 
+def test_between_round_bodies_the_centre_line_bounds_exactly():
+    for (a, b), dimension in ((PLANAR[0], 2), (SPATIAL[0], 3)):
+        pose_a, pose_b = poses(dimension, 7, 200), poses(dimension, 8, 200)
+        np.testing.assert_allclose(least_gap(a, pose_a, b, pose_b), separation(a, pose_a, b, pose_b), atol=1e-14)
+
+
+@pytest.mark.parametrize("pair", [*PLANAR, *SPATIAL], ids=str)
+def test_bodies_at_one_place_overlap_and_nothing_is_divided_by_zero(pair):
+    a, b = pair
+    place = (0.2, 0.1) if pair in PLANAR else (0.2, 0.1, 0.4)
+    turns = ((0.3,), (0.9,)) if pair in PLANAR else ((0.8, 0.6, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
+    here, there = (np.array([[*place, *turn]]) for turn in turns)
+    with np.errstate(all="raise"):
+        bound = least_gap(a, here, b, there)
+    exact = separation(a, here, b, there)
+    assert exact < 0.0 and bound <= exact + 1e-14
+    assert overlap(a, here, b, there) == pytest.approx(-exact, abs=1e-14)
+
+
+def test_what_is_apart_or_less_deep_than_what_was_found_is_not_measured(monkeypatch):
+    """A run of 100 000 samples is measured where bodies can overlap, or a report would take minutes."""
+    asked = []
+
+    def counted(a, pose_a, b, pose_b):
+        asked.append(len(pose_a))
+        return separation(a, pose_a, b, pose_b)
+
+    monkeypatch.setattr(geometry, "separation", counted)
+    disc, still = Disc(0.5), np.zeros((640, 3))
+    away = np.column_stack([np.linspace(0.2, 3.0, 640), np.zeros((640, 2))])  # apart from sample 183 on
+    assert overlap(disc, still, disc, away).max() == pytest.approx(0.8) and sum(asked) == 183
+    asked.clear()
+    assert deepest(disc, still, disc, away) == pytest.approx(0.8) and sum(asked) == geometry.BATCH
+    asked.clear()
+    assert deepest(disc, still[183:], disc, away[183:]) == 0.0 and not asked
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_round_body_clear_of_a_corner_does_not_overlap(dimension):
     """6.6 cm clear of a corner, seen along the line of centres it used to be 1.5 cm deep."""
@@ -132,3 +169,7 @@ def test_a_tilted_half_space_is_measured_along_its_normal():
     touching = np.array([[*centre, 0.3]])
     assert separation(face, np.zeros((1, 3)), box, touching)[0] == pytest.approx(0.0, abs=1e-15)
     assert separation(box, touching, face, np.zeros((1, 3)))[0] == pytest.approx(0.0, abs=1e-15)
+    low, high = np.array([[*(0.4 * centre), 0.7]]), np.array([[*(9.0 * centre), 0.7]])
+    for pose in (low, high):
+        assert least_gap(face, np.zeros((1, 3)), box, pose) == separation(face, np.zeros((1, 3)), box, pose)
+        assert least_gap(box, pose, face, np.zeros((1, 3))) == separation(box, pose, face, np.zeros((1, 3)))

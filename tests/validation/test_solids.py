@@ -44,6 +44,11 @@ def test_a_cylinder_s_distance_in_closed_form():
         truth = 0.75 - 0.5 * math.sin(lean) - 0.3 * math.cos(lean)
         assert separation(cylinder, pose, floor, at(0, 0, 0)) == pytest.approx([truth], abs=1e-9)
         assert separation(floor, at(0, 0, 0.1), cylinder, pose) == pytest.approx([truth - 0.1], abs=1e-9)
+    for q in np.random.default_rng(5).normal(size=(5, 4)):  # turned about its axis as well it is the same body
+        q /= np.linalg.norm(q)
+        rise = 2.0 * (q[1] * q[3] - q[0] * q[2])  # of its axis
+        truth = 0.75 - 0.5 * abs(rise) - 0.3 * math.sqrt(1.0 - rise**2)
+        assert separation(cylinder, at(0, 0, 1.0, q), floor, at(0, 0, 0)) == pytest.approx([truth], abs=1e-9)
     sunk = np.concatenate([at(0, 0, z) for z in (1.0, 0.5, 0.6)])
     depth = overlap(cylinder, sunk, floor, np.tile(at(0, 0, 0), (3, 1)))
     assert depth == pytest.approx([0.0, 0.05, 0.0], abs=1e-9)
@@ -105,6 +110,11 @@ def test_mass_properties_of_corners_are_those_of_the_box():
     whole, centre, tensor = hull_properties(np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float) + 5.0)
     assert whole == pytest.approx(1 / 6) and centre == pytest.approx([5.25] * 3)
     assert tensor * 6 == pytest.approx(np.where(np.eye(3) > 0, 3 / 80, -1 / 80))
+    # A pyramid of side 2 and height 4: its centroid is a quarter of the way up, the mean of its corners a fifth.
+    pyramid = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 4)], float)
+    whole, centre, tensor = hull_properties(pyramid + (3.0, -2.0, 1.0))
+    assert whole == pytest.approx(16 / 3) and centre == pytest.approx([3.0, -2.0, 2.0])
+    assert tensor == pytest.approx(16 / 3 * np.diag([4 / 20, 4 / 20, 3 * 16 / 80]), abs=1e-12)
     with pytest.raises(SceneError, match="number 4 lies within"):
         hull_properties(np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.1, 0.1, 0.1)], float))
 
