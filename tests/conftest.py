@@ -6,9 +6,14 @@ import sys
 import textwrap
 
 import pytest
+from hypothesis import settings
 
 from adapters import registry
 from adapters.engine import EngineError
+
+# Hypothesis fails an example that takes 200 ms: on a busy machine that says nothing of the code.
+settings.register_profile("without_deadline", deadline=None)
+settings.load_profile("without_deadline")
 
 
 def pytest_configure():
