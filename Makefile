@@ -103,6 +103,6 @@ mutants-check: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
 	$(BIN)/python tests/mutation/run.py --check 40
 
-# What every check and receipt can see, from planted faults.
+# What every check and receipt can see, from faults planted in our solver, which passes them all; two minutes of CPU.
 detection: $(STAMP)
-	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity --engine chipmunk --profile tuned > validation/questions/detection.txt
+	COLUMNS=100 $(BIN)/crosscheck list checks --sensitivity > validation/questions/detection.txt

@@ -1,18 +1,24 @@
 """What the terminal says of a run: the matrix first, then the short answers, then where the details are.
 
 alarms (if any) -> matrix -> which engine for which scene -> what is wrong and what cures it -> where to look
+
+More scenes than fit a screen are told by family (`reports.overview`), unless every one is asked for.
 """
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
+from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, versions_of
@@ -21,12 +27,25 @@ from reports.wording import plural
 Plain = Mapping[str, Any]
 #: Families of alarms that are named one by one; `crosscheck findings --new` names all.
 MOST_ALARMS = 6
+#: Lines of a table above its first row.
+HEAD = 2
 
 
-def show(rows: Sequence[Plain], console: Console, costs: Costs | None = None, files: Iterable[Path] = ()) -> None:
-    """Print everything about a run that a first look wants, fit to the width of ``console``."""
+def show(
+    rows: Sequence[Plain], console: Console, costs: Costs | None = None, files: Iterable[Path] = (), every: bool = False
+) -> None:
+    """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene."""
     matrix = matrix_of(rows)
-    for table in tables_of(matrix, versions_of(rows), console.width):
+    tables = tables_of(matrix, versions_of(rows), console.width)
+    families = overview.families_of(rows)
+    short = overview.table_of(overview.by_family(rows, families), list(families))
+    long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
+    fits = console.measure(short, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
+    if long and fits and not every:
+        _show_families(rows, families, short, console)
+        _where(rows, console, files, {"crosscheck show --all": "matrix and answers of every scene"})
+        return
+    for table in tables:
         console.print(table)
     if any(row["outcome"] not in REFUSED for row in rows):
         console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
@@ -38,6 +57,27 @@ def show(rows: Sequence[Plain], console: Console, costs: Costs | None = None, fi
     _choices(rows, console, costs)
     _answers(rows, console)
     _where(rows, console, files)
+
+
+def _show_families(
+    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console
+) -> None:
+    """The same by family of scenes."""
+    console.print(table)
+    console.print(_folded(overview.legend(overview.by_family(rows, families)), console, ""), style="dim")
+    ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
+    console.print(_folded(ran, console, ""), style="dim")
+    for line in refusals(rows):
+        console.print(_folded(line, console, ""))
+    _alarms(rows, console)
+    _heading("Which engine for what: who passes every row, else who fails the fewest", console)
+    wide = max(map(len, families))
+    for name, line in overview.choices(rows, families):
+        console.print(_folded(f"{name:<{wide}}  {line}", console))
+    worst, total = overview.worst_answers(rows, families)
+    _heading(f"What is wrong as shipped, and what cures it: the worst of each family, {len(worst)} of {total}", console)
+    for answer in worst:
+        console.print(_folded(answer.line, console))
 
 
 def _heading(text: str, console: Console) -> None:
@@ -89,12 +129,14 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
         console.print(_folded(answer.line, console))
 
 
-def _where(rows: Sequence[Plain], console: Console, files: Iterable[Path]) -> None:
+def _where(
+    rows: Sequence[Plain], console: Console, files: Iterable[Path], more: Mapping[str, str] = MappingProxyType({})
+) -> None:
     found = families(rows)
     failing = sum(len(family.rows) for family in found)
     _heading("Where the details are", console)
     engine = found[0].engine if found else ""
-    commands = [("crosscheck report --open", "one page about all of it")]
+    commands = [*more.items(), ("crosscheck report --open", "one page about all of it")]
     if found:
         commands = [
             ("crosscheck findings", f"{plural(failing, 'failing row')}, in {plural(len(found), 'family')}"),

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from reports.cures import setting_text
 from reports.wording import number, quantity
+from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
 #: Columns of each listing: heading and field.
@@ -156,8 +157,10 @@ def health(data: Plain, console: Console) -> None:
         console.print(Text(f"  {problem}"))
 
 
-def sensitivity(entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], console: Console) -> None:
-    """Print from which size on every check and receipt sees a planted fault, and what no check of a scene sees."""
+def sensitivity(
+    entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], blind: Sequence[BlindSpot], console: Console
+) -> None:
+    """Print from which size on every check and receipt sees a planted fault, what no check of a scene sees, and why."""
     table = grid("check or receipt", "sees a fault from this size on")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
@@ -171,3 +174,15 @@ def sensitivity(entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[
         "1 % of flicker: impulses 1 % too high and too low in turn; of damping: speeds lose 1 % in a second",
     ):
         console.print(Text(line))
+    _heading("Primary quantities that hang on a parameter and do not see 1 % of it,", console)
+    for line in (
+        "because it changes them by less than one step may miss, which their check must allow. Seen from:",
+        "the fault that would change them by as much. Seen by: other checks of the scene that see 1 %.",
+    ):
+        console.print(Text(line))
+    table = grid("quantity", "1 % of", "changes it by", "a step may miss", "seen from", "seen by")
+    for spot in blind:
+        numbers = (number(spot.moved), number(spot.allowed), f"{spot.seen_from:.1f} %")
+        others = ", ".join(spot.seen_by) or "receipts only"
+        table.add_row(*(Text(cell) for cell in (f"{spot.scene}/{spot.metric}", spot.fault, *numbers, others)))
+    console.print(table)

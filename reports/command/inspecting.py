@@ -18,7 +18,7 @@ from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
-from validation.questions.detection import Seen, detection, lines, only_by_receipts
+from validation.questions.detection import Detected, detection, lines, only_by_receipts
 from validation.records.store import Store
 
 
@@ -36,7 +36,7 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     receipt; takes a minute.
     """
     data: list[Any]
-    seen: list[Seen] = []
+    found = Detected([], [])
     if sensitivity:
         if what != "checks":
             raise SceneError("sensitivity: checks have one, not " + what)
@@ -44,8 +44,8 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
         profile = profile or registry.profile_of(engine, "solution")
         if profile is None:
             raise EngineError(f"profile: {engine} has none that promises a solution; name one with --profile")
-        seen = detection(registry.load(engine), profile, 2)
-        data = list(lines(seen))
+        found = detection(registry.load(engine), profile, 2)
+        data = list(lines(found.seen))
     elif what == "runs":
         store = Store(out, create=False)
         names = ("id", "date", "commit", "title", "finished")
@@ -55,7 +55,7 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     if as_json:
         click.echo(json.dumps(data, indent=1))
     elif sensitivity:
-        tables.sensitivity(data, only_by_receipts(seen), terminal())
+        tables.sensitivity(data, only_by_receipts(found.seen), found.blind, terminal())
     else:
         tables.listed(what, data, terminal())
 

@@ -67,16 +67,17 @@ def load(out: Path, run: str) -> tuple[list[Plain], list[Observation], Costs]:
 
 @main.command()
 @click.argument("run", default="latest")
+@click.option("--all", "every", is_flag=True, help="Every scene, where there are so many that families are shown.")
 @AS_JSON
 @OUT
-def show(run: str, as_json: bool, out: Path) -> None:
+def show(run: str, every: bool, as_json: bool, out: Path) -> None:
     """Show RUN (the latest by default) as `run` did at its end: matrix, short answers, where the details are."""
     rows, _, costs = load(out, run)
     if as_json:
         click.echo(json.dumps(_as_plain(rows, costs) | _counted(out, run), indent=1))
         return
     console = terminal()
-    show_summary(rows, console, costs)
+    show_summary(rows, console, costs, every=every)
     _say_missing(out, run)
     report = out / "report.html"
     if report.is_file():

@@ -7,7 +7,7 @@ each is written down when it ends, so a run that was stopped goes on where it wa
 whatever they are; ``--survivors`` runs only those of their mutants that survived last time. ``--check N`` runs N
 mutants of one subject, both chosen by the commit, writes nothing, and fails on a survivor that is not listed. It
 chooses among the subjects that are as they were when they ran: survivors of another are nobody's yet. Which those are
-is said, and more than a third of all is a failure.
+is said, and more than half of all is a failure.
 
 A survivor is listed by its function and its change, so that an edit elsewhere does not make it new. Its reason is
 written by hand, but for the few that `known_by_form` can tell; survivors without one are *open*. What only a time limit
@@ -46,7 +46,7 @@ ALIVE = (0, 5, 33)
 #: Exit codes of a mutant that ran out of CPU or wall time.
 OUT_OF_TIME = (-24, 24, 36, 152, 255)
 #: Share of the subjects that may have changed since they ran before a check fails.
-STALE_SHARE = 1.0 / 3.0
+STALE_SHARE = 0.5
 
 
 class NothingRanError(RuntimeError):

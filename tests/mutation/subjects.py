@@ -64,7 +64,7 @@ SUBJECTS = {
     "adapters/plain.py": ("adapters/test_plain.py",),
     "adapters/needs.py": ("adapters/test_needs.py",),
     "adapters/scene.py": ("adapters/test_scene.py",),
-    "adapters/shapes.py": ("adapters/test_scene.py",),
+    "adapters/shapes.py": ("adapters/test_scene.py", "adapters/test_shapes.py", "validation/test_solids.py"),
     "adapters/materials.py": ("adapters/test_needs.py", "adapters/test_scene.py"),
     "adapters/trajectory.py": ("adapters/test_stepping.py",),
     "adapters/stepping.py": ("adapters/test_stepping.py",),
@@ -76,7 +76,7 @@ SUBJECTS = {
     ),
     "validation/solids.py": ("validation/test_solids.py",),
     "validation/files/invariants.py": ("validation/test_invariants.py",),
-    "validation/files/mass_properties.py": ("validation/test_invariants.py",),
+    "validation/files/mass_properties.py": ("validation/test_invariants.py", "validation/test_solids.py"),
     "validation/questions/convergence.py": ("validation/test_convergence.py",),
     "validation/bench/statistics.py": ("validation/test_bench_statistics.py",),
 }

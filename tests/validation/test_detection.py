@@ -1,5 +1,8 @@
 """Detection power: a fault of two per cent cannot be blessed away, and every check sees one that is planted for it."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,7 @@ from adapters import registry
 from adapters.needs import Needs, needs
 from adapters.planted_faults import REPORTED, SIZED, Planted
 from adapters.receipts import receipts
+from validation import questions
 from validation.catalogue import CATALOGUE
 from validation.questions.detection import SIZES, detection, lines, only_by_receipts
 
@@ -35,9 +39,14 @@ def test_two_per_cent_of_impulses_or_friction_break_a_receipt_of_every_engine_an
 
 
 @pytest.fixture(scope="module")
-def seen():
+def detected():
     pytest.importorskip("pymunk")
     return detection(registry.load("chipmunk"), "tuned", 2)
+
+
+@pytest.fixture(scope="module")
+def seen(detected):
+    return detected.seen
 
 
 def test_every_fault_is_seen_from_one_per_cent_on_by_something(seen):
@@ -83,6 +92,53 @@ def test_every_check_and_receipt_sees_a_fault(seen):
     assert {line["name"] for line in lines(seen) if not any(list(line.values())[1:])} == (
         FAILED_ANYWAY | LEFT_FROM_RIGHT
     )
+
+
+def test_a_blind_spot_is_told_with_what_the_fault_changes_and_what_a_step_may_miss(detected):
+    """A slide of v^2/(2 mu g) is 1/0.99 as long with 1 % less friction; what sees that is the braking beside it."""
+    canonical = CATALOGUE["slide"]
+    scene = canonical.scene(2)
+    check = next(check for check in canonical.checks(scene, DT) if check.metric == "stopping_distance")
+    for fault in ("friction", "gravity"):
+        (spot,) = [b for b in detected.blind if (b.scene, b.metric, b.fault) == ("slide", "stopping_distance", fault)]
+        # the places of a run at steps of 1/240 s: the last step of a slide is lost or not, v^2/(2 a) each
+        assert spot.moved == pytest.approx(check.truth * (1 / 0.99 - 1.0), rel=0.01)
+        assert spot.allowed == check.bound and spot.seen_by == ("braking",)
+        assert spot.seen_from == pytest.approx(spot.allowed / spot.moved)
+    # every apex hangs on restitution, but a cell without it sees nothing; mass cancels in all of a slide
+    assert not [b for b in detected.blind if (b.scene, b.fault) in (("slide", "mass"), ("impact", "restitution"))]
+
+
+def test_no_blind_spot_is_one_that_a_check_of_the_same_name_sees(detected):
+    sharp = {(e.scene, e.watcher, e.fault) for e in detected.seen if e.size is not None and e.size <= 0.01}
+    assert not [b for b in detected.blind if (b.scene, b.metric, b.fault) in sharp]
+    assert all(0.0 < b.moved <= 2.0 * b.allowed for b in detected.blind)  # with the fault and without it hold
+
+
+def committed():
+    """Sections of validation/questions/detection.txt: the lines of what is seen, and of what is not."""
+    lines = Path(questions.__file__).with_name("detection.txt").read_text(encoding="utf-8").splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("Primary quantities"))
+    return lines[:at], lines[at:]
+
+
+def test_the_table_that_is_committed_has_every_check_of_every_scene():
+    """`make detection` writes it; a scene that came since is not in it."""
+    names = {found[0] for line in committed()[0] if (found := re.match(r"\w+/\w+(?=  )", line))}
+    expected = set()
+    for name, canonical in CATALOGUE.items():
+        for params in canonical.planted if 2 in canonical.dimensions else ():
+            checks = canonical.checks(canonical.scene(2, params), DT)
+            expected |= {f"{name}/{check.metric.partition('[')[0]}" for check in checks if check.truth is not None}
+    assert names == expected
+
+
+def test_the_table_s_blind_spots_are_those_that_a_step_hides():
+    """Planted in our solver, which has no step's error of its own: it changes what the law changes."""
+    rows = [line.split() for line in committed()[1] if "/" in line and "%" in line]
+    assert len(rows) > 20
+    for name, fault, moved, allowed, *_ in rows:
+        assert float(moved) < float(allowed), f"{name}: 1 % of {fault} should have been seen"
 
 
 def test_what_no_check_sees_is_said(seen):

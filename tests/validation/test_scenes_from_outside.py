@@ -90,8 +90,8 @@ def test_a_fault_fails_the_recipe_s_check(drop):
 
     pytest.importorskip("pymunk")
     engine = registry.load("chipmunk")
-    assert _watchers(engine, "tuned", "drop", {}, 2, 1 / 240)["rest_height"]
-    assert not _watchers(Planted(engine, "extent", 0.1), "tuned", "drop", {}, 2, 1 / 240)["rest_height"]
+    assert _watchers(engine, "tuned", "drop", {}, 2, 1 / 240)["rest_height"].holds
+    assert not _watchers(Planted(engine, "extent", 0.1), "tuned", "drop", {}, 2, 1 / 240)["rest_height"].holds
 
 
 def test_ours_come_first_and_only_its_own_code_is_in_a_scene_s_identity(drop, site):

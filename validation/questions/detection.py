@@ -4,25 +4,35 @@
                                        |
                                        +--the scenes' cells--> checks that pass on the healthy engine and fail now
 
-What no check of a scene sees must be seen by a receipt: that is what receipts are for.
+What no check of a scene sees must be seen by a receipt: that is what receipts are for. A scene's primary quantity that
+is blind to one per cent of what it hangs on is a `BlindSpot`, with what the fault changes beside what the check allows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from adapters.engine import Engine
 from adapters.needs import needs
 from adapters.planted_faults import SIZED, Planted
 from adapters.receipts import receipts
 from adapters.stepping import run
+from adapters.trajectory import Measured
+from validation.canonical import Params
 from validation.catalogue import CATALOGUE
 from validation.judging.verdicts import Physics, judge_physics
 from validation.running.plan import QUICK_DT
 
 #: Ten per cent, one, and one in a thousand.
 SIZES = (0.1, 0.01, 0.001)
+#: What a scene asks of contacts and bodies: no primary quantity may miss one per cent of these without a word why.
+ASKED = ("restitution", "friction", "gravity", "mass", "inertia")
+ONE_PER_CENT = 0.01
+#: A quantity hangs on a parameter if one per cent of it changes it by this share of what its check allows: what moves
+#: less would have to be off by more than all of itself.
+HANGS_ON = 0.01
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,49 @@ class Seen:
     size: float | None
 
 
-def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT) -> list[Seen]:
+@dataclass(frozen=True)
+class BlindSpot:
+    """A primary quantity that does not see one per cent of a parameter: the fault changes it by ``moved``.
+
+    ``allowed`` is what its check allows, in the same unit: by how far one step of ``dt`` may miss. ``seen_by`` are
+    checks of the same scene that do see it.
+    """
+
+    scene: str
+    metric: str
+    fault: str
+    moved: float
+    allowed: float
+    seen_by: tuple[str, ...]
+
+    @property
+    def seen_from(self) -> float:
+        """Size of the fault that would change the quantity by what is allowed [%], were the two proportional."""
+        return 100.0 * ONE_PER_CENT * self.allowed / self.moved
+
+
+@dataclass(frozen=True)
+class Detected:
+    """What sees which fault, and what does not although it hangs on it."""
+
+    seen: list[Seen]
+    blind: list[BlindSpot]
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Whether a receipt or check holds; of a check also what was measured, and what is allowed."""
+
+    holds: bool
+    value: float | None = None
+    allowed: float | None = None
+
+
+#: Receipts and checks of one cell, by name.
+Watchers = dict[str, Watched]
+
+
+def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT) -> Detected:
     """Plant every fault in ``engine``, and say what sees it from which size on.
 
     Parameters
@@ -45,41 +97,95 @@ def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT
 
     Returns
     -------
-    One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault.
+    One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault; and the blind spots.
     """
     seen: dict[tuple[str, str, str], float | None] = {}
+    missed: dict[tuple[str, str, str], tuple[float, float]] = {}
     there = {name: canonical for name, canonical in CATALOGUE.items() if dimension in canonical.dimensions}
     cells = [(name, params) for name, canonical in there.items() for params in canonical.planted]
     for scene, params in cells:
         healthy = _watchers(engine, profile, scene, params, dimension, dt)
+        primary = _primary(scene, params, dimension, dt, healthy)
         for fault in SIZED:
             smallest: dict[str, float] = {}
             for size in sorted(SIZES, reverse=True):
                 faulty = _watchers(Planted(engine, fault, size), profile, scene, params, dimension, dt)
-                smallest |= {name: size for name, holds in healthy.items() if holds and not faulty[name]}
-            for name, holds in healthy.items():
-                if holds:
+                smallest |= {name: size for name, own in healthy.items() if own.holds and not faulty[name].holds}
+                if size == ONE_PER_CENT and fault in ASKED:
+                    for name, found in _missed(primary, healthy, faulty):
+                        key = (scene, name.partition("[")[0], fault)
+                        missed[key] = max(missed.get(key, found), found, key=lambda each: each[0] / each[1])
+            for name, own in healthy.items():
+                if own.holds:
                     watched = "any" if name.startswith("receipt ") else scene  # probes are the same for every scene
                     key = (watched, name.partition("[")[0], fault)
                     sizes = [s for s in (seen.get(key), smallest.get(name)) if s is not None]
                     seen[key] = min(sizes, default=None)
-    return [Seen(*key, size) for key, size in seen.items()]
+    return Detected([Seen(*key, size) for key, size in seen.items()], list(_blind(seen, missed)))
 
 
-def _watchers(
-    engine: Engine, profile: str, scene: str, params: Mapping[str, float], dimension: int, dt: float
-) -> dict[str, bool]:
-    """Every receipt and every check of one cell, and whether it holds."""
+def _missed(primary: Iterable[str], healthy: Watchers, faulty: Watchers) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Primary quantities that hold with the fault and without it though it changes them: by how much, and the bound."""
+    for name in primary:
+        own, other = healthy[name], faulty[name]
+        if own.holds and other.holds and own.value is not None and other.value is not None and own.allowed:
+            moved = abs(other.value - own.value)
+            if moved > HANGS_ON * own.allowed:
+                yield name, (moved, own.allowed)
+
+
+def _blind(
+    seen: Mapping[tuple[str, str, str], float | None], missed: Mapping[tuple[str, str, str], tuple[float, float]]
+) -> Iterator[BlindSpot]:
+    """Quantities that no cell of their scene sees by one per cent, each with the checks of the scene that do."""
+    sharp = {key for key, size in seen.items() if size is not None and size <= ONE_PER_CENT}
+    for (scene, metric, fault), (moved, allowed) in missed.items():
+        if (scene, metric, fault) not in sharp:
+            by = tuple(
+                name for where, name, what in seen if (where, what) == (scene, fault) and (where, name, what) in sharp
+            )
+            yield BlindSpot(scene, metric, fault, moved, allowed, by)
+
+
+def _primary(scene: str, params: Params, dimension: int, dt: float, healthy: Watchers) -> list[str]:
+    """Judged quantities that the scene's primary error is made of: those that it asks for."""
+    canonical = CATALOGUE[scene]
+    if canonical.primary is None:
+        return []
+    asked = _Asked({name: (own.value, "") for name, own in healthy.items()})
+    canonical.primary.error(canonical.scene(dimension, params), dt, asked)
+    return [name for name in dict.fromkeys(asked.names) if name in healthy]
+
+
+class _Asked(dict[str, Measured]):
+    """Metrics that remember which of them were asked for."""
+
+    def __init__(self, metrics: Mapping[str, Measured]) -> None:
+        super().__init__(metrics)
+        self.names: list[str] = []
+
+    def __getitem__(self, name: str) -> Measured:
+        self.names.append(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self.names.append(name)
+        return super().get(name, default)
+
+
+def _watchers(engine: Engine, profile: str, scene: str, params: Params, dimension: int, dt: float) -> Watchers:
+    """Every receipt and every check of one cell."""
     canonical = CATALOGUE[scene]
     made = canonical.scene(dimension, params)
     wanted = needs(made)
     settings = {setting.name: setting.value for setting in engine.settings(profile, wanted, dt)}
-    holds = {f"receipt {slip.quantity}": slip.holds for slip in receipts(engine, profile, wanted, dt)}
+    found = {f"receipt {slip.quantity}": Watched(slip.holds) for slip in receipts(engine, profile, wanted, dt)}
     trajectory = run(engine, made, dt, settings, canonical.sampling(made))
     measured = canonical.measure(made, trajectory) if trajectory.finish == "completed" else {}
     for check in canonical.checks(made, dt):
-        holds[check.metric] = judge_physics(measured.get(check.metric, (None, ""))[0], check) is Physics.PASS
-    return holds
+        value = measured.get(check.metric, (None, ""))[0]
+        found[check.metric] = Watched(judge_physics(value, check) is Physics.PASS, value, check.bound)
+    return found
 
 
 def lines(found: list[Seen]) -> Iterator[dict[str, str]]:

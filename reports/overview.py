@@ -1,0 +1,144 @@
+"""The first look at a run of many scenes: one matrix of families that fits a screen, and an answer per family.
+
+A matrix of forty scenes is two hundred lines on a terminal of eighty columns, and its answers five hundred. Where the
+scenes of a run do not fit a screen (`FIRST_LOOK`), families of scenes stand in their place; ``crosscheck show --all``
+prints every scene, and so does the report.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from reports.answers import Answer, answers, configured
+from reports.findings import ALARMING
+from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
+from reports.wording import plural
+from validation.canonical import FAMILIES
+from validation.posed import resolve
+
+Plain = Mapping[str, Any]
+#: Lines of a terminal that are looked at without scrolling.
+FIRST_LOOK = 30
+#: What an alarm, or the worst standing of a share that fails, is called where there are seven columns for it.
+SHORTEST = {
+    "crashed": "CRASH", "timed_out": "TIME", "missing": "MISS", "invalid": "INVAL", "new": "NEW", "drifted": "drift",
+    "fail": "f", "known": "k", "explained": "e",
+}  # fmt: skip
+#: Profiles that are named in a line of who is nearest.
+NEAREST = 3
+
+
+def families_of(rows: Sequence[Plain]) -> dict[str, list[str]]:
+    """Family -> its scenes in the order of the rows: the known families in their order, then others by name."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        found[resolve(scene).family].append(scene)
+    names = [name for name in FAMILIES if name in found] + sorted(set(found) - set(FAMILIES))
+    return {name: found[name] for name in names}
+
+
+def by_family(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Matrix:
+    """Matrix with a family in the place of its scenes; dimension 0 stands for all of them together."""
+    family = {scene: name for name, scenes in families.items() for scene in scenes}
+    return matrix_of({**row, "scene": family[row["scene"]], "dimension": 0} for row in rows)
+
+
+def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
+    """Terminal table: a line per engine and profile, a column per family, headings a word a line."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
+    table.add_column("engine,\nprofile", no_wrap=True)
+    for name in families:
+        table.add_column(name.replace(" ", "\n"), no_wrap=True)
+    for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
+        table.add_row(Text(engine, style="bold"))
+        for column in (column for column in matrix.columns if column[0] == engine):
+            fields = [matrix.fields.get(((name, 0), column)) for name in families]
+            table.add_row(Text(f"  {column[1]}"), *(_cell(field) for field in fields))
+    return table
+
+
+def _cell(field: Field | None) -> Text:
+    """``pass``, the share that fails with the letter of its worst standing, how many alarms, or ``-``."""
+    if field is None:
+        return Text("")
+    if field.mark in ALARMING:
+        return Text(f"{SHORTEST[field.mark]} {field.marks[field.mark]}", style=ALARM)
+    if field.mark not in SHORTEST:
+        return Text("pass" if field.mark == "pass" else "-", style=STYLES.get(field.mark, ""))
+    return Text(f"{SHORTEST[field.mark]} {share(field.missed, field.judged)}", style=STYLES.get(field.mark, ""))
+
+
+def share(part: int, whole: int) -> str:
+    """Per cent without digits; what is not all of it, or not nothing, never reads as if it were."""
+    per_cent = 100.0 * part / whole
+    if 0.0 < per_cent < 1.0:
+        return "<1 %"
+    return f"{math.floor(per_cent) if per_cent > 99.0 else round(per_cent)} %"
+
+
+def legend(matrix: Matrix) -> str:
+    """What the letters mean, of those that occur."""
+    marks = {field.mark for field in matrix.fields.values()}
+    said = ["share of the rows of all its scenes, 2-D and 3-D, that FAIL"]
+    words = {
+        "explained": "e: as laws of the engine predict",
+        "known": "k: some listed with a reason",
+        "fail": "f: of an engine without a list",
+    }
+    said += [text for mark, text in words.items() if mark in marks]
+    return "; ".join(said) + ("; -: cannot be asked" if "unsupported" in marks else "")
+
+
+def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
+    """Family, and who passes every row of all its scenes; then who else comes nearest."""
+    matrix = by_family(rows, families)
+    asked: dict[tuple[str, tuple[str, str]], set[str]] = defaultdict(set)
+    family = {scene: name for name, scenes in families.items() for scene in scenes}
+    for row in configured(rows):
+        asked[family[row["scene"]], (row["engine"], row["profile"])].add(row["scene"])
+    for name, scenes in families.items():
+        own = {c: f for (line, c), f in matrix.fields.items() if line[0] == name and f.judged}
+        good = [_named(c, len(asked[name, c]), len(scenes)) for c, f in own.items() if not f.missed]
+        others = sorted((f.missed / f.judged, c) for c, f in own.items() if f.missed)
+        near = [f"{'/'.join(c)} {share(own[c].missed, own[c].judged)}" for _, c in others][:NEAREST]
+        said = ", ".join(good) if good else "nobody passes every row" if own else "no verdict: it cannot be asked"
+        yield name, said + (f"; nearest: {', '.join(near)}" if near and len(good) < NEAREST else "")
+
+
+def _named(column: tuple[str, str], asked: int, scenes: int) -> str:
+    """``engine/profile``, with how many of the scenes it could be asked where that is not all of them."""
+    return "/".join(column) + (f" ({asked} of {plural(scenes, 'scene')})" if asked < scenes else "")
+
+
+def shortened(answer: Answer) -> Answer:
+    """The answer without the settings that would do, where a whole profile does: ``explain`` has them."""
+    cure, _, _ = answer.cure.partition("; ")
+    return replace(answer, cure=cure.partition(", by ")[0]) if " cures it" in cure else answer
+
+
+def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> tuple[list[Answer], int]:
+    """Of each engine and family the answer about the scene most rows of which fail, and how many there are in all.
+
+    Only profiles as an engine is shipped: what `reports.answers` says of others is what they make worse.
+    """
+    found = answers(rows)
+    family = {scene: name for name, scenes in families.items() for scene in scenes}
+    shipped: dict[str, str] = {}
+    for row in rows:
+        shipped.setdefault(row["engine"], row["profile"])
+    worst: dict[tuple[str, str], Answer] = {}
+    for answer in found:
+        key = answer.engine, family[answer.scene]
+        if answer.profile == shipped[answer.engine] and (key not in worst or answer.failing > worst[key].failing):
+            worst[key] = answer
+    order = list(families)
+    chosen = sorted(worst.values(), key=lambda a: (list(shipped).index(a.engine), order.index(family[a.scene])))
+    return [shortened(answer) for answer in chosen], len(found)
