@@ -10,7 +10,7 @@ import pytest
 
 from adapters.engine import Contacts
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, lowered
-from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Harmonic, Hull, Pair, Polygon, Scene, Sphere
 
 
 def planar_scene(pose: tuple[float, ...], twist: tuple[float, ...]) -> Scene:
@@ -124,6 +124,32 @@ def test_a_lifted_scene_lowers_to_itself() -> None:
         assert replace(back, bodies=flat.bodies) == flat
 
 
+def test_a_belt_and_a_course_lift_to_the_vertical_plane_and_the_belt_comes_back() -> None:
+    scene = replace(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pairs=(Pair(),))
+    belt = replace(scene.bodies[0], surface_velocity=(0.8, 0.6))
+    shaken = replace(scene.bodies[2], course=Harmonic((0.02, 0.03), 2.0))
+    lifted = lift(replace(scene, bodies=(belt, scene.bodies[1], shaken)))
+    assert lifted.bodies[0].surface_velocity == (0.8, 0.0, 0.6)
+    assert lifted.bodies[2].course == Harmonic((0.02, 0.0, 0.03), 2.0) and lifted.bodies[1].course is None
+    assert lowered(lifted) is None  # a course has no way back
+    back = lowered(lift(replace(scene, bodies=(belt, scene.bodies[1]))))
+    assert back is not None and back.bodies[0].surface_velocity == (0.8, 0.6)
+
+
+def test_a_polygon_becomes_a_prism_as_deep_as_it_reaches_and_a_capsule_stays_what_it_is() -> None:
+    scene = replace(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pairs=(Pair(),))
+    corners = ((0.3, 0.4), (-0.3, 0.4), (-0.3, -0.4), (0.3, -0.4))
+    odd = replace(scene.bodies[1], shape=Polygon(corners))
+    round_ = replace(scene.bodies[1], name="round", shape=Capsule(0.4, 0.1))
+    prism, capsule = lift(replace(scene, bodies=(odd, round_))).bodies
+    assert isinstance(prism.shape, Hull)
+    assert set(prism.shape.vertices) == {(x, y, z) for x, z in corners for y in (-0.5, 0.5)}
+    assert capsule.shape == round_.shape
+    back = lowered(lift(replace(scene, bodies=(round_,))))
+    assert back is not None and back.bodies[0].shape == round_.shape
+    assert lowered(lift(replace(scene, bodies=(odd,)))) is None  # nobody knows that a hull was a polygon
+
+
 def spatial_scene(**changes: object) -> Scene:
     """A box in the plane whose three sides and moments all differ."""
     values = {
@@ -177,3 +203,5 @@ def test_gravity_or_a_face_across_the_plane_makes_a_scene_spatial() -> None:
     assert lowered(replace(scene, gravity=(1.0, 0.5, -9.0))) is None
     across = replace(scene.bodies[0], shape=HalfSpace((0.0, 0.6, 0.8), 0.25))
     assert lowered(replace(scene, bodies=(across, scene.bodies[1]))) is None
+    running = replace(scene.bodies[0], shape=HalfSpace((0.0, 0.0, 1.0)), surface_velocity=(0.0, 1.0, 0.0))
+    assert lowered(replace(scene, bodies=(running, scene.bodies[1]))) is None

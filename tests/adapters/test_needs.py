@@ -3,12 +3,13 @@
 import itertools
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
 from adapters.materials import Materials, Pair
 from adapters.needs import Needs, needs
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene, SceneError
+from adapters.scene import Body, Box, Disc, HalfSpace, Harmonic, Scene, SceneError
 
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
 
@@ -79,6 +80,15 @@ def test_bodies_rest_where_a_load_presses_them_together_and_nothing_rebounds(gra
 )
 def test_something_slides_where_friction_meets_motion_or_load_along_a_face(changes, friction, slides):
     assert needs(scene(FLOOR, ball(**changes), pair=Pair(friction=friction))).slide is slides
+
+
+@pytest.mark.parametrize(
+    "mover", [{"surface_velocity": (0.5, 0.0)}, {"motion": "prescribed", "course": Harmonic((0.02, 0.0), 2.0)}]
+)
+def test_something_slides_where_a_surface_runs_or_what_others_lie_on_is_shaken(mover):
+    moved = replace(FLOOR, **mover)
+    assert needs(scene(moved, ball(), pair=Pair(friction=0.25))).slide is True
+    assert needs(scene(FLOOR, ball(), pair=Pair(friction=0.25))).slide is False
 
 
 def test_load_straight_into_a_tilted_face_is_no_slide_however_its_normal_is_rounded():

@@ -180,6 +180,14 @@ def test_all_files_are_written_in_utf_8(tmp_path):
     assert "3 µm" in texts[1] and "3 µm" in texts[2]
 
 
+def test_rows_of_nulls_have_a_file_of_their_own_where_there_are_any(tmp_path):
+    nulls = plain(replace(ROW, engine="none", profile="did nothing"))
+    paths = exports.write_all(tmp_path, plain(ROW), nulls)
+    assert list(paths) == ["rows.jsonl", "rows.csv", "summary.md", "nulls.csv"]
+    (only,) = csv.DictReader(io.StringIO((tmp_path / "nulls.csv").read_text(encoding="utf-8")))
+    assert (only["engine"], only["profile"]) == ("none", "did nothing")
+
+
 @pytest.fixture
 def two_runs(tmp_path, monkeypatch):
     """A folder of results with two runs: one cell each, with the rebound at 0.5 and at 0.8 of 0.8."""
@@ -211,6 +219,12 @@ def test_load_reads_the_last_run_of_the_usual_folder_or_any_other(two_runs, tmp_
     rows = exports.load_rows()
     assert {row.run for row in rows} == {last} and [r.value for r in rows if r.metric == "rebound_ratio"] == [0.8]
     assert {row.run for row in exports.load_rows("crosscheck-out", first)} == {first}
+
+
+def test_load_has_the_answers_of_nulls_behind_the_rows_where_they_are_asked_for(two_runs):
+    alone, both = exports.load(), exports.load(nulls=True)
+    assert set(alone["engine"]) == {"nameless"} and set(both["engine"]) == {"nameless", "none"}
+    assert both["engine"].tolist()[: len(alone)] == alone["engine"].tolist()
 
 
 def test_a_folder_without_results_is_not_made(tmp_path):
