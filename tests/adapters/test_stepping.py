@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Scheme, Setting, Simulation
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import posed_for, run, step_count
 from adapters.trajectory import ContactRecord, Sampling, load_trajectory
 
@@ -73,6 +74,7 @@ class Toy(Engine):
         return None
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        self.settings = settings
         self.built.append(Flight(scene, dt, self.spoil))
         return self.built[-1]
 
@@ -192,6 +194,27 @@ def test_spin_torque_and_force_explain_speed_without_gravity(body: Body) -> None
     assert run(Toy({2}, spoiled("_twist", (0, 0), 1.0)), alone, 0.1, {}).finish == "completed"
 
 
+# Loads of size 2 on a body of 4 kg, 0.5 kg m^2 and 0.5 m for 0.5 s; in space the least of its moments counts.
+@pytest.mark.parametrize(
+    ("dimension", "load", "gained"),
+    [(2, {"force": (2.0, 0.0)}, 0.25), (2, {"torque": (2.0,)}, 1.0), (3, {"torque": (0.0, 0.0, 2.0)}, 1.0)],
+)
+@pytest.mark.parametrize(("share", "finish"), [(999.0, "completed"), (1001.0, "diverged")])
+def test_what_a_load_explains_is_its_acceleration_of_the_outermost_point_times_the_duration(
+    dimension: int, load: dict[str, Any], gained: float, share: float, finish: str
+) -> None:
+    shape, moment = (Disc(0.5), 0.5) if dimension == 2 else (Sphere(0.5), (2.0, 1.0, 0.5))
+    loaded = scene(bodies=(Body("a", shape, 4.0, moment, **load),), gravity=(0.0,) * dimension, dimension=dimension)
+    short = replace(loaded, duration=0.5)
+    assert run(Toy({dimension}, spoiled("_twist", (0, 0), share * gained)), short, 0.1, {}).finish == finish
+
+
+@pytest.mark.parametrize(("speed", "finish"), [(4e3, "completed"), (6e3, "diverged")])
+def test_where_nothing_is_free_only_gravity_and_what_is_prescribed_explain_speed(speed: float, finish: str) -> None:
+    held = scene(bodies=(Body("a", Disc(0.5), motion="fixed"),), duration=0.5)  # 10 m/s^2 for half a second
+    assert run(Toy({2}, spoiled("_twist", (0, 0), speed)), held, 0.1, {}).finish == finish
+
+
 def test_a_body_that_nothing_moves_must_not_move() -> None:
     still = scene(bodies=(Body("a", Disc(0.5)),), gravity=(0.0, 0.0))
     assert run(Toy({2}, spoiled("_twist", (0, 0), 1.0)), still, 0.1, {}).finish == "diverged"
@@ -225,6 +248,55 @@ def test_what_leaves_the_plane_at_any_sample_is_kept() -> None:
 
 def test_an_engine_of_both_dimensions_gets_the_scene_as_it_is() -> None:
     assert posed_for(Toy({2, 3}), scene()).dimension == 2
+    assert run(Toy({2, 3}), scene(), 0.1, {}).out_of_plane == 0.0
+    alone = Scene("s", 1, 3, (Body("a", Sphere(0.5), 1.0, (0.1,) * 3),), (), (0.0, 0.0, -9.81), 1.0)
+    assert posed_for(Toy({2, 3}), alone) == alone
+
+
+def with_abilities(toy: Toy, *abilities: str) -> Toy:
+    toy.facts = replace(toy.facts, abilities=frozenset(abilities))
+    return toy
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_belt_that_an_engine_has_as_a_moving_half_space_is_read_back_as_one_that_stands(dimension: int) -> None:
+    """The half-space is carried along by its motion; the scene's own stands, and its surface runs."""
+
+    def carried(flight: Flight) -> None:
+        flight._pose[0, 0] = flight.steps * flight.dt * 2.0
+
+    belt = Body("belt", HalfSpace((0.0, 1.0), 0.25), motion="fixed", surface_velocity=(2.0, 0.0))
+    toy = with_abilities(Toy({dimension}, carried), "moving half-space")
+    trajectory = run(toy, scene(bodies=(belt, scene().bodies[0])), 0.1, {}, Sampling(1, 0.0))
+    moved = toy.built[0].scene.bodies[0]
+    assert moved.motion == "prescribed" and moved.twist[0] == 2.0 and not any(moved.surface_velocity)
+    assert not trajectory.pose[:, 0].any() and not trajectory.twist[:, 0].any()
+    assert np.allclose(trajectory.pose[:, 1, :2], (0.0, 2.0)) and np.allclose(trajectory.twist[:, 1, 0], 1.0)
+    assert trajectory.contacts is not None and len(trajectory.contacts.rows.a) > 0
+
+
+def test_an_engine_that_knows_belts_gets_them_and_one_that_knows_nothing_refuses_by_the_field() -> None:
+    belt = Body("belt", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
+    box = Body("top", Box((0.5, 0.5)), motion="fixed", surface_velocity=(2.0, 0.0))
+    running, topped = scene(bodies=(belt, scene().bodies[0])), scene(bodies=(box, scene().bodies[0]))
+    knows = with_abilities(Toy({2}), "surface velocity", "moving half-space")
+    assert posed_for(knows, running) == running and posed_for(knows, topped) == topped
+    with pytest.raises(EngineError, match=r"^belt.surface_velocity: the adapter of toy has no surface velocity$"):
+        posed_for(Toy({2}), running)
+    with pytest.raises(EngineError, match=r"^top.surface_velocity: in toy only the surface of a fixed half-space"):
+        posed_for(with_abilities(Toy({2}), "moving half-space"), topped)
+    capsule = scene(bodies=(Body("c", Capsule(0.5, 0.1)),))
+    with pytest.raises(EngineError, match=r"^c.shape: the adapter of toy has no capsule$"):
+        posed_for(with_abilities(Toy({2}), "moving half-space"), capsule)
+
+
+def test_a_run_says_its_step_how_long_it_took_and_hands_over_its_settings() -> None:
+    toy, before = Toy({2}), time.perf_counter()
+    trajectory = run(toy, scene(), 0.1, {"iterations": 7})
+    assert 0.0 <= trajectory.wall_time <= time.perf_counter() - before and trajectory.dt == 0.1
+    assert toy.settings == {"iterations": 7}
+    recorded = run(toy, scene(), 0.1, {}, Sampling(1, 99.0)).contacts  # from a time that never comes
+    assert recorded is not None and recorded.step.dtype == recorded.offset.dtype == np.int64
 
 
 def test_a_spatial_scene_is_refused_by_a_planar_engine() -> None:
