@@ -15,6 +15,8 @@ from reports.wording import number, quantity
 from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
+#: Scenes of a run that its line names; a quick suite of forty would take a screen of its own.
+FEW = 4
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
@@ -57,6 +59,10 @@ def _field(entry: Plain, name: str) -> str:
         return "yes" if value else "no"
     if isinstance(value, list):
         return ", ".join(map(str, value))
+    if name == "date":
+        return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
+    if name == "title" and len(scenes := str(value).partition(": ")[2].split()) > FEW:
+        return f"{str(value).partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
     return setting_text(value) if value is not None else "-"
 
 
