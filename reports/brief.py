@@ -28,8 +28,9 @@ from validation.running.plan import QUICK_DT
 FILE = "dashboard.sqlite"
 #: Outcomes that say something of an engine's physics.
 ANSWERED = ("ok", "diverged")
-#: Brief of one cell: error or None, checks that fail, checks that are judged.
-Brief = tuple[float | None, int, int]
+#: Brief of one cell: error or None, checks that fail, checks that are judged, checks that fail by more than their noise
+#: floor: a start moved by the last place may mend the others.
+Brief = tuple[float | None, int, int, int]
 #: What a panel is about.
 Key = tuple[str, str, str, int]
 
@@ -51,7 +52,9 @@ def from_text(text: str) -> Summary:
     """Inverse of `Summary.as_text`."""
     data = json.loads(text)
     cells = {
-        (str(key[0]), str(key[1]), str(key[2]), int(key[3])): {slot: tuple(brief) for slot, brief in briefs.items()}
+        (str(key[0]), str(key[1]), str(key[2]), int(key[3])): {
+            slot: (error, fails, judged, sure) for slot, (error, fails, judged, sure) in briefs.items()
+        }
         for key, briefs in data["cells"]
     }
     return Summary(cells, data["versions"])
@@ -64,22 +67,30 @@ def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = 
     """
     observations = [o for o in observations if _shown(o.slot)]
     judged = list(rows) if rows is not None else rows_of("", observations)
-    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
+    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
     for row in judged:
         if row.cells and len(row.cells) == 1 and row.outcome not in ALARMING_OUTCOMES and row.physics:
             count = counts[json.dumps(row.slot, sort_keys=True)]
             count[0] += row.physics == "fail"
             count[1] += 1
+            count[2] += row.physics == "fail" and not _within_noise(row)
     cells: dict[Key, dict[str, Brief]] = defaultdict(dict)
     versions = {}
     for observation in observations:
         slot = observation.slot
-        fails, all_of_them = counts[json.dumps(slot.as_dict(), sort_keys=True)]
-        brief = (_error(observation), fails, all_of_them)
+        fails, all_of_them, sure = counts[json.dumps(slot.as_dict(), sort_keys=True)]
+        brief = (_error(observation), fails, all_of_them, sure)
         if all_of_them or brief[0] is not None:
             cells[slot.engine, slot.profile, slot.scene, slot.dimension][slot.key()] = brief
         versions[slot.engine] = observation.engine_version
     return Summary(cells, versions)
+
+
+def _within_noise(row: Row) -> bool:
+    """Whether a value misses its tolerance by no more than moved starts change it."""
+    if row.floor is None or row.error is None or row.tolerance is None:
+        return False
+    return abs(row.error) - row.tolerance <= row.floor
 
 
 def _shown(slot: Slot) -> bool:

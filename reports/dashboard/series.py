@@ -20,6 +20,9 @@ from validation.releases import history
 from validation.releases.timing import CALLED
 from validation.running.plan import QUICK_DT
 
+#: Places in a `reports.brief.Brief`.
+FAILS, SURE = 1, 3
+
 
 @dataclass(frozen=True)
 class Point:
@@ -34,7 +37,8 @@ class Point:
     fails, judged
         Checks of those cells.
     lost, mended
-        Cells in which a check began or ceased to fail since the point before that ran them.
+        Cells in which a check began or ceased to fail since the point before that ran them, by more than its noise
+        floor where that is known.
     """
 
     label: str
@@ -196,7 +200,7 @@ def _point(
     wanted = {slot for slot, brief in newest.items() if brief[0] is not None}
     errors = [cells[slot][0] for slot in wanted if slot in cells and cells[slot][0] is not None]
     complete = bool(wanted) and len(errors) == len(wanted)
-    both = [(before[slot][1] > 0, cells[slot][1] > 0) for slot in cells if slot in before and cells[slot][2]]
+    both = [(before[slot], cells[slot]) for slot in cells if slot in before and cells[slot][2]]
     return Point(
         entry.label,
         entry.title,
@@ -205,8 +209,8 @@ def _point(
         max(error for error in errors if error is not None) if complete else None,
         sum(brief[1] for brief in cells.values()),
         sum(brief[2] for brief in cells.values()),
-        sum(now and not was for was, now in both),
-        sum(was and not now for was, now in both),
+        sum(bool(now[SURE] and not was[FAILS]) for was, now in both),
+        sum(bool(was[SURE] and not now[FAILS]) for was, now in both),
         entry.ratios[key][0] if key in entry.ratios else None,
     )
 

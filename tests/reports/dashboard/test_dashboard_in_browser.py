@@ -93,7 +93,7 @@ def test_a_name_that_is_markup_is_text(browser, tmp_path):
 
     evil = "<img src=x onerror=window.hacked=1>"
     entries = [
-        _Entry(evil, evil, "r", Summary({(evil, evil, "impact", 2): {"a": (0.1 * (1 + k), 0, 1)}}, {evil: evil}))
+        _Entry(evil, evil, "r", Summary({(evil, evil, "impact", 2): {"a": (0.1 * (1 + k), 0, 1, 0)}}, {evil: evil}))
         for k in range(2)
     ]
     path = tmp_path / "evil.html"

@@ -13,6 +13,7 @@ from reports.dashboard import events
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
 from validation.cells import Outcome, Slot
+from validation.judging.rows import rows_of
 from validation.records.store import Store
 
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
@@ -43,7 +44,7 @@ def without_steps(seed):
         cells, ratios = {}, {}
         for who in SERIES:
             key = (*who, "impact", 2)
-            cells[key] = {"s": (0.05 * float(np.exp(0.03 * rng.normal())), 1, 1)}
+            cells[key] = {"s": (0.05 * float(np.exp(0.03 * rng.normal())), 1, 1, 1)}
             ratios[key] = (float(np.exp(0.08 * rng.standard_t(4))), "reference/reference")
         out.append(_Entry(str(k), str(k), str(k), Summary(cells, {}), ratios))
     return out
@@ -86,16 +87,43 @@ def test_a_time_that_stands_out_alone_is_no_step_and_one_that_stays_is():
 def test_a_flip_is_marked_once_and_says_in_which_direction():
     entries = []
     for k, fails in enumerate([0, 0, 1, 1, 0]):
-        cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1)}}
+        cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1, fails)}}
         entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
     (panel,) = _divided(entries, "runs")
     assert [(event.at, event.kind, event.worse) for event in events(panel)] == [(2, "flip", True), (4, "flip", False)]
 
 
+def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():
+    """Of the four that fail in turn two miss by less than their noise floor: they neither begin nor cease to fail."""
+    entries = []
+    for k, (fails, sure) in enumerate([(0, 0), (1, 0), (0, 0), (1, 1), (1, 0), (0, 0)]):
+        cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1, sure)}}
+        entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
+    (panel,) = _divided(entries, "runs")
+    assert [(i, point.lost, point.mended) for i, point in enumerate(panel.points) if point.lost + point.mended] == [
+        (3, 1, 0)
+    ]
+    assert [point.fails for point in panel.points] == [0, 1, 0, 1, 1, 0]
+
+
+def test_a_check_fails_for_sure_where_it_misses_by_more_than_its_floor(observation):
+    who = ("chipmunk", "tuned")
+    bad = observation(who, 0.2)
+    rows = [row for row in rows_of("", [bad]) if row.physics == "fail"]
+    assert rows
+    for floor, sure in ((None, len(rows)), (0.0, len(rows)), (1e9, 0)):
+        ((brief,),) = (c.values() for c in summarise([bad], [replace(r, floor=floor) for r in rows]).cells.values())
+        assert brief[1] == len(rows) and brief[3] == sure
+    exact = [replace(r, floor=abs(r.error) - r.tolerance) for r in rows]
+    ((brief,),) = (c.values() for c in summarise([bad], exact).cells.values())
+    assert brief[3] == 0
+
+
 def test_runs_that_asked_something_else_bring_no_step():
     """A cell that the newest run does not have decides nothing; a run that lacks one has no error."""
     key = ("e", "p", "impact", 2)
-    cells = [{"a": (0.1, 0, 1)}, {"a": (0.1, 0, 1), "b": (9.0, 1, 1)}, {"b": (9.0, 1, 1)}, {"a": (0.1, 0, 1)}]
+    good, bad = (0.1, 0, 1, 0), (9.0, 1, 1, 1)
+    cells = [{"a": good}, {"a": good, "b": bad}, {"b": bad}, {"a": good}]
     (panel,) = _divided([_Entry(str(k), "", "", Summary({key: c}, {})) for k, c in enumerate(cells)], "runs")
     assert [point.error for point in panel.points] == [0.1, 0.1, None, 0.1] and not panel.moved
 
@@ -104,7 +132,7 @@ def test_errors_that_are_exact_are_one_level():
     key = ("e", "p", "impact", 2)
     sizes = [1e-16, 3e-9, 0.0, 2e-12]
     (panel,) = _divided(
-        [_Entry(str(k), "", "", Summary({key: {"a": (s, 0, 1)}}, {})) for k, s in enumerate(sizes)], "runs"
+        [_Entry(str(k), "", "", Summary({key: {"a": (s, 0, 1, 0)}}, {})) for k, s in enumerate(sizes)], "runs"
     )
     assert not panel.moved
 
@@ -142,6 +170,14 @@ def test_where_nothing_can_be_kept_it_is_made_each_time(tmp_path):
     kept = Kept(tmp_path / "missing")
     kept.put("run", Summary({}, {}))
     assert kept.get("run") is None
+    kept.close()
+
+
+def test_a_summary_that_older_code_wrote_is_made_again(tmp_path):
+    kept, key = Kept(tmp_path), ("e", "p", "impact", 2)
+    kept.put("old", Summary({key: {"s": (0.1, 0, 1)}}, {}))  # without the fourth number
+    kept.put("new", Summary({key: {"s": (0.1, 0, 1, 0)}}, {}))
+    assert kept.get("old") is None and kept.get("new").cells == {key: {"s": (0.1, 0, 1, 0)}}
     kept.close()
 
 
