@@ -42,6 +42,7 @@ class Lasting(NamedTuple):
     kind: Indices  # (k, KINDS): which features, the dimension's own
     place: Array  # (k, PLACES): features in body axes, the dimension's own
     friction: Array  # (k,): mu
+    parts: Indices  # (k,): 1 where it parts at the start of the phase, by noise, and is back before it ends
     slides: Indices  # (k,): 1 where it slips at the start of the phase, 0 where it may begin to
     speeds: Array  # (k,): reference speed [m/s], `noise.NOISE` of which is round-off
     extent: Array  # (k,): smaller half width of its bodies [m]
@@ -98,6 +99,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         kind=np.zeros((k, KINDS), np.int64),
         place=np.zeros((k, PLACES)),
         friction=np.zeros(k),
+        parts=np.zeros(k, np.int64),
         slides=np.zeros(k, np.int64),
         speeds=np.zeros(k),
         extent=np.zeros(k),

@@ -163,12 +163,6 @@ def end_rocking(island: Any, length: float) -> tuple[float, float]:
 
 
 @operation
-def hop_time(island: Any) -> float:
-    """How long until contacts that part by mere noise, and turn, have come back [s]; 0 if there are none."""
-    raise NotImplementedError
-
-
-@operation
 def end_solve(island: Any) -> None:
     """Keep the velocities with which the sub-step ends."""
 
@@ -318,7 +312,6 @@ OF_ISLANDS = (
     press_for,
     end_series,
     end_rocking,
-    hop_time,
     end_solve,
     enter_path,
     return_to_start,

@@ -36,7 +36,7 @@ from reference_solver.stepping.lasting import (
     VELOCITIES,
     Lasting,
 )
-from reference_solver.stepping.modes import decide, friction_size, inverse_mass, set_slip
+from reference_solver.stepping.modes import decide, friction_size, inverse_mass, normal_gain, set_slip
 from reference_solver.stepping.noise import FORCE_NOISE, NOISE
 from reference_solver.stepping.operations import (
     Bodies,
@@ -623,6 +623,21 @@ def soften(lasting: Lasting, place: int) -> None:
 
 
 @inner_kernel
+def first_return(lasting: Lasting, left: float) -> float:
+    """Until when contacts that part by less than what is seen of a gap have come back, ``left`` at most [s].
+
+    Held from the start they would be pulled. They fly, and land with the speed that they left with: an impact, whose
+    law knows cone and sign.
+    """
+    first = left
+    for k in range(lasting.size[CONTACTS]):
+        gain = normal_gain(lasting, k)
+        if lasting.parts[k] == 1 and gain < 0.0:
+            first = min(first, -2.0 * lasting.speed[k, 0] / gain)
+    return first
+
+
+@inner_kernel
 def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, int]:
     """Go from the present state to the end of a phase of lasting contact, within ``left``; its length and what it was.
 
@@ -634,7 +649,9 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     if not decide(lasting) or not start_slopes(bodies, lasting):
         go_back(bodies, lasting)
         return 0.0, FAILED
-    length, outcome = left, WHOLE
+    length, outcome = first_return(lasting, left), WHOLE
+    if length < left:
+        left, outcome = length, SHORTENED
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
         error = step_phase(bodies, lasting, length)
         if error < 0.0:
