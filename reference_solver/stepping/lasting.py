@@ -50,6 +50,7 @@ class Lasting(NamedTuple):
     usual: Array  # (k, 1 + T): forces at the start of the phase, from which redundant ones are told [N]
     gap: Array  # (k,) [m]
     frame: Array  # (k, 1 + T, D): normal, tangents, world axes
+    normal: Array  # (k, D): at the start of the phase
     jacobian: Array  # (k, 2, 1 + T, V): u = J_A v_A + J_B v_B
     response: Array  # (k, 2, 1 + T, V): rows of J M^-1
     speed: Array  # (k, 1 + T): u = J v [m/s]
@@ -107,6 +108,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         usual=np.zeros((k, 1 + t)),
         gap=np.zeros(k),
         frame=np.zeros((k, 1 + t, dimension)),
+        normal=np.zeros((k, dimension)),
         jacobian=np.zeros((k, 2, 1 + t, v)),
         response=np.zeros((k, 2, 1 + t, v)),
         speed=np.zeros((k, 1 + t)),
