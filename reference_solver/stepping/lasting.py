@@ -20,9 +20,10 @@ OPEN, STICK, SLIP = 0, 1, 2
 MOST_ROWS = 64
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
-#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a feature.
-LOAD, GRIP, ONWARD, FEATURE = 0, 1, 2, 3
-MONITORS = 4
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a line or a face, and how far
+#: the normal still looks out of an edge or a corner. What comes over an edge starts at the one, and may pass the other.
+LOAD, GRIP, ONWARD, FEATURE, OUTLOOK = 0, 1, 2, 3, 4
+MONITORS = 5
 #: Places in `Lasting.monitor`: start of the phase; near and far end of a search; the step made last; its stages.
 START, NEAR, FAR, LAST, BETWEEN = 0, 1, 2, 3, 4
 PLACES_WATCHED = 5

@@ -94,8 +94,11 @@ def displacement_curvature(bodies: Any, lasting: Any, i: int, end: int) -> None:
 
 
 @operation
-def feature_limit(bodies: Any, lasting: Any, k: int) -> float:
-    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m]."""
+def feature_limit(bodies: Any, lasting: Any, k: int, normals: bool) -> float:
+    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m].
+
+    ``normals``: from where the normal looks out of an edge or a corner no more; else from the ends of lines and faces.
+    """
     raise NotImplementedError
 
 

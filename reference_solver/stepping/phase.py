@@ -24,6 +24,7 @@ from reference_solver.stepping.lasting import (
     NEAR,
     ONWARD,
     OPEN,
+    OUTLOOK,
     SLIP,
     STAGES,
     START,
@@ -296,23 +297,26 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
             for t in range(lasting.size[TANGENTS]):
                 along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
             monitor[ONWARD] = along / lasting.speeds[k]
-        monitor[FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        monitor[FEATURE] = feature_limit(bodies, lasting, k, False) / lasting.extent[k]
+        monitor[OUTLOOK] = feature_limit(bodies, lasting, k, True) / lasting.extent[k]
 
 
 @inner_kernel
 def keep_limits(bodies: Bodies, lasting: Lasting) -> None:
     """Keep how far all contacts are from where their features end, at the start of a path."""
     for k in range(lasting.size[CONTACTS]):
-        lasting.monitor[START, k, FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        for m in range(FEATURE, OUTLOOK + 1):
+            lasting.monitor[START, k, m] = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
 
 
 @inner_kernel
 def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
     """Whether the features of any contact end between there and here: it goes on with others, or parts."""
     for k in range(lasting.size[CONTACTS]):
-        limit = feature_limit(bodies, lasting, k) / lasting.extent[k]
-        if lasting.monitor[START, k, FEATURE] >= -FORCE_NOISE and limit < -FORCE_NOISE:
-            return True
+        for m in range(FEATURE, OUTLOOK + 1):
+            limit = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
+            if lasting.monitor[START, k, m] >= -FORCE_NOISE and limit < -FORCE_NOISE:
+                return True
     return False
 
 
@@ -372,7 +376,7 @@ def end_first(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
     """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
-    if what == LOAD or what == FEATURE:
+    if what == LOAD or what >= FEATURE:
         lasting.mode[which] = OPEN
     elif what == ONWARD:
         lasting.mode[which], lasting.slides[which] = STICK, 0
