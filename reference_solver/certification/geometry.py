@@ -112,19 +112,41 @@ def distinct(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Neares
     return Nearest(*(field[which] for field in found))
 
 
-def partings(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> tuple[Array, Array]:
-    """Return how far apart planar cores are along each of their edges' normals (s, m), and those from A to B (s, m, 2).
+class Partings(NamedTuple):
+    """Directions in which two cores of corners can part.
+
+    Parameters
+    ----------
+    apart
+        (s, m) how far apart they are along each [m].
+    axes
+        (s, m, d) unit vectors from A to B, world axes: normals of faces (planar: of edges), and in space what is square
+        to an edge of each.
+    faces
+        (m,) whether it is a face's.
+    """
+
+    apart: Array
+    axes: Array
+    faces: Array
+
+
+def partings(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Partings:
+    """Return along which directions two bodies with corners can part at poses (s, 3 | 7).
 
     Raises
     ------
     ValueError
-        For shapes whose cores have no edges: discs.
+        For shapes whose cores have neither edges (planar) nor faces (spatial).
     """
-    a, b = _core(shape_a, pose_a), _core(shape_b, pose_b)
-    axes = _edge_normals(a, b)
+    a, b = core_of(shape_a, pose_a), core_of(shape_b, pose_b)
+    axes = _edge_normals(a, b) if a.centre.shape[1] == 2 else _face_normals(a, b)
     if axes is None:
-        raise ValueError("shapes: two points have no edges")
-    return _parted(a, b, axes), axes
+        raise ValueError("shapes: cores have no normals of their own")
+    faces = np.ones(axes.shape[1], bool)
+    if a.centre.shape[1] == 3:
+        faces = np.arange(len(faces)) % (len(faces) // 2) < 3 * ((a.kind == "box") + (b.kind == "box"))
+    return Partings(_parted(a, b, axes), axes, faces)
 
 
 def rotation(pose: Array) -> Array:
@@ -152,7 +174,7 @@ def reach(shape: Any) -> float:
     if hasattr(shape, "normal"):
         return float("inf")
     size = 7 if len(getattr(shape, "half_extents", ())) == 3 else 3
-    core = _core(shape, np.eye(1, size, 3) if size == 7 else np.zeros((1, 3)))
+    core = core_of(shape, np.eye(1, size, 3) if size == 7 else np.zeros((1, 3)))
     return float(np.linalg.norm(core.vertex - core.centre[:, None], axis=2).max() + core.radius)
 
 
@@ -160,11 +182,11 @@ def _nearest(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Neares
     if hasattr(shape_a, "normal") and hasattr(shape_b, "normal"):
         raise ValueError("shapes: two half-spaces have no finite distance")
     if hasattr(shape_a, "normal"):
-        return _over_plane(shape_a, pose_a, _core(shape_b, pose_b))
+        return _over_plane(shape_a, pose_a, core_of(shape_b, pose_b))
     if hasattr(shape_b, "normal"):
-        found = _over_plane(shape_b, pose_b, _core(shape_a, pose_a))
+        found = _over_plane(shape_b, pose_b, core_of(shape_a, pose_a))
         return Nearest(found.gap, -found.normal, found.point_b, found.point_a)
-    a, b = _core(shape_a, pose_a), _core(shape_b, pose_b)
+    a, b = core_of(shape_a, pose_a), core_of(shape_b, pose_b)
     between = _between_planar if pose_a.shape[1] == 3 else _between_spatial
     apart, point_a, point_b = between(a, b)
     along, normal = _deepest(a, b)
@@ -181,8 +203,14 @@ def _nearest(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array) -> Neares
     return Nearest(apart - a.radius - b.radius, normal, point_a + a.radius * normal, point_b - b.radius * normal)
 
 
-def _core(shape: Any, pose: Array) -> Core:
-    """Corners, edges and axes of a shape's core at poses (s, 3 | 7)."""
+def core_of(shape: Any, pose: Array) -> Core:
+    """Return corners, edges and axes of a shape's core at poses (s, 3 | 7).
+
+    Raises
+    ------
+    ValueError
+        For what is no shape of that dimension, half-spaces included.
+    """
     d = 2 if pose.shape[1] == 3 else 3
     axes, centre = rotation(pose), pose[:, :d]
     half, radius, kind = np.zeros(d), 0.0, "point"

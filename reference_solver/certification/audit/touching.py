@@ -1,7 +1,7 @@
 """Whether bodies touch where contacts say, along their normals, and only there, by the certificate's own geometry.
 
 Along a normal bodies are as far apart as they are at all. Where one of them is round, and their cores are apart, one
-direction alone is that; of corners that meet there are many, and the one is right along which they close last (E50).
+direction alone is that; of corners that meet there are many: `audit.choice` tells which the law takes.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from reference_solver.certification.audit.choice import closes_sooner, is_cornered, strayed
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
-from reference_solver.certification.geometry import distinct, partings, rotation
+from reference_solver.certification.geometry import distinct, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
 NO_GAP = 1e-13
-#: Angle up to which two normals are one [rad], and share of the half width within which two gaps tie.
-ONE_NORMAL, TIED = 1e-6, 1e-12
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
@@ -54,35 +53,18 @@ def _touching(run: Run) -> tuple[float, float, float, float]:
         radius = _radius(shape_a) + _radius(shape_b)
         if radius > 0.0:  # a normal's error is of second order in the gap along it, its tilt of the impulse is not
             off = np.linalg.norm(n - found.normal, axis=1) - noise / radius
+        sooner, cornered = 0.0, is_cornered((shape_a, shape_b))
+        if cornered:
+            off = strayed(n, (shape_a, shape_b), (pose_a, pose_b), found)
+        if cornered and (hit := run.is_impact[run.contact_owner[rows]]).any():
+            at = pose_a[hit], pose_b[hit]
+            sooner = float(closes_sooner(run, rows[hit], (shape_a, shape_b), at, found.gap[hit]).max())
         place = placed(pieces.point[rows], run.d)
         sides = [distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
-        strayed = max((np.abs(side) - np.abs(found.gap) - noise).max() for side in sides) / size
-        here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), strayed)
-        worst = np.maximum(worst, [*here, _worse(run, rows, (shape_a, shape_b), (pose_a, pose_b), found.gap)])
+        off_surface = max((np.abs(side) - np.abs(found.gap) - noise).max() for side in sides) / size
+        here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), off_surface)
+        worst = np.maximum(worst, [*here, sooner])
     return float(worst[0]), float(worst[1]), float(worst[2]), float(worst[3])
-
-
-def _worse(run: Run, rows: Indices, shapes: tuple[Any, Any], poses: tuple[Array, Array], gap: Array) -> float:
-    """How much faster (a share of the speeds) planar corners close along a normal than along one that ties with it."""
-    pieces = run.pieces
-    rows_at = run.is_impact[run.contact_owner[rows]]
-    if run.d == 3 or _radius(shapes[0]) + _radius(shapes[1]) > 0.0 or not rows_at.any():
-        return 0.0
-    rows, gap = rows[rows_at], gap[rows_at]
-    a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
-    if any(isinstance(shape, HalfSpace) for shape in shapes):
-        return 0.0
-    apart, axes = partings(shapes[0], poses[0][rows_at], shapes[1], poses[1][rows_at])
-    sides = [run.velocity_at(run.side[k][rows], pieces.body_a[rows], pieces.point[rows], False) for k in range(2)]
-    closing = -((sides[1] - sides[0])[:, None] * axes).sum(axis=2)
-    own = -((sides[1] - sides[0]) * pieces.normal[rows]).sum(axis=1)
-    other = np.linalg.norm(axes - pieces.normal[rows][:, None], axis=2) > ONE_NORMAL
-    noise = 16.0 * np.spacing(np.abs(pieces.point[rows]).max()) + TIED * min(run.extent[a], run.extent[b])
-    ties = other & (apart >= (gap - noise)[:, None])
-    least = np.where(ties, closing.clip(min=0.0), np.inf).min(axis=1)
-    speed = sum(np.linalg.norm(side, axis=1) for side in sides)
-    share = np.divide(own - least, speed, out=np.zeros(len(own)), where=np.isfinite(least) & (speed > 0.0))
-    return float(share.max())
 
 
 def _left_out(run: Run) -> float:

@@ -74,12 +74,13 @@ def wedge(space: Space, rng: Rng) -> Motion:
     moved = min(time, spin / slows)
     angle = spin * moved - 0.5 * slows * moved**2
     x, y = np.linalg.solve(normals, np.full(2, radius))
-    bodies = [_plane(space, normal) for normal in normals]
+    bodies = [plane(space, normal) for normal in normals]
     bodies.append(space.ball(float(x), float(y), space.twist(spin=spin), radius, mass))
     return Motion(_world(space, bodies, mu), time, np.array(space.pose(float(x), float(y), angle)))
 
 
-def _plane(space: Space, normal: Array) -> Body:
+def plane(space: Space, normal: Array) -> Body:
+    """Return a fixed half-space through the origin."""
     return Body(HalfSpace(space.vector(float(normal[0]), float(normal[1]))), pose=space.pose(0.0, 0.0), motion="fixed")
 
 

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from reference_solver.certification.known.motion import Motion, integrated, spun
+from reference_solver.certification.known.motion import Motion, complementary, integrated, spun
 from reference_solver.certification.known.planar import STICKS
 from reference_solver.certification.rotation import rotation_matrix
 from reference_solver.certification.space import GRAVITY
@@ -173,7 +173,7 @@ def three_corners(rng: Rng) -> Motion:
         w_, u = rows @ inverse @ rows.T, rows @ np.concatenate([v, w])
         if u.max() > -0.05:  # all approach
             continue
-        found = _complementary(w_, (1.0 + e) * u)
+        found = complementary(w_, (1.0 + e) * u)
         after = np.concatenate([v, w]) + inverse @ rows.T @ found
         # No corner comes down on any plane again while it flies.
         flown = [(after[:3] * t, _flown(q, after[3:], moments, t)) for t in np.linspace(0.0, time, 11)[1:]]
@@ -202,15 +202,3 @@ def _flown(q: Array, w: Array, moments: Array, time: float) -> Array:
 
     end, _ = integrated(rate, q, time)
     return np.asarray(end / np.linalg.norm(end))
-
-
-def _complementary(w: Array, q: Array) -> Array:
-    """Return the p >= 0 with w p + q >= 0 and p.(w p + q) = 0."""
-    for pressed in product((False, True), repeat=len(q)):
-        held = np.flatnonzero(pressed)
-        p = np.zeros(len(q))
-        if len(held):
-            p[held] = np.linalg.solve(w[np.ix_(held, held)], -q[held])
-        if (p >= 0.0).all() and (w @ p + q >= -1e-12).all():
-            return p
-    raise ValueError("no set of corners fits")

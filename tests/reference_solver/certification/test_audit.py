@@ -169,6 +169,12 @@ def test_corners_close_along_the_edge_along_which_they_close_last():
     assert "choice" not in seen[0] and "choice" in seen[1]
 
 
+def test_a_ball_that_spins_fast_turns_as_it_says():
+    """A radian and more a step, of unequal moments: integrated in more steps, not refused for the integration."""
+    ball = Body(Sphere(0.3), 1.0, (0.03, 0.035, 0.04), (0.0, 0.0, 5.0, *UPRIGHT), (0.0, 0.0, 0.0, 30.0, 20.0, 25.0))
+    assert refused(Model(3, [floor(3), ball], (0.0, 0.0, -G), 0.0, 0.0), 10, 1.0 / 30.0) == set()
+
+
 def test_turns_of_what_touches_are_looked_at():
     """A disc has no corner by which its geometry would tell of its angle."""
     name = "angle of what touches [rad]"
