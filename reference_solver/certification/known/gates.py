@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from reference_solver.certification import Gate
-from reference_solver.certification.known import blows, edges, planar, rubbing, spatial
+from reference_solver.certification.known import blows, crossing, edges, planar, rubbing, spatial
 from reference_solver.certification.known.motion import TRUTH, Miss, Motion, miss
 from reference_solver.certification.space import SPACES
 
@@ -51,6 +51,7 @@ MOTIONS: dict[str, Draw] = {
     "ball slipping over an edge": partial(edges.ball_over_a_box, "slips"),
     "smooth ball over an edge": partial(edges.ball_over_a_box, "smooth"),
     "box that spins on its base": partial(rubbing.spinning_boxes, 1),
+    "rod that crosses a rod": crossing.crossed_rods,
     "ball on a turntable": spatial.turntable,
     "lopsided ball that rolls": spatial.lopsided_ball,
     "ball slipping along a groove": spatial.groove,
