@@ -13,7 +13,7 @@ import sqlite3
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,8 @@ from validation.running.plan import QUICK_DT
 FILE = "dashboard.sqlite"
 #: Outcomes that say something of an engine's physics.
 ANSWERED = ("ok", "diverged")
-#: Brief of one cell: error or None, checks that fail, checks that are judged, checks that fail by more than their noise
-#: floor: a start moved by the last place may mend the others.
+#: Brief of one cell: error or None, checks that fail, checks that are judged, checks that fail for sure: a start moved
+#: by the last place mends the others.
 Brief = tuple[float | None, int, int, int]
 #: What a panel is about.
 Key = tuple[str, str, str, int]
@@ -65,7 +65,12 @@ def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = 
 
     ``rows`` are theirs, where they were judged already.
     """
-    observations = [o for o in observations if _shown(o.slot)]
+    everything = list(observations)
+    moved: dict[str, list[Observation]] = defaultdict(list)
+    for observation in everything:
+        if observation.slot.ulp:
+            moved[json.dumps(replace(observation.slot, ulp=0).as_dict(), sort_keys=True)].append(observation)
+    observations = [o for o in everything if _shown(o.slot)]
     judged = list(rows) if rows is not None else rows_of("", observations)
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
     for row in judged:
@@ -73,7 +78,7 @@ def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = 
             count = counts[json.dumps(row.slot, sort_keys=True)]
             count[0] += row.physics == "fail"
             count[1] += 1
-            count[2] += row.physics == "fail" and not _within_noise(row)
+            count[2] += row.physics == "fail" and not _mended(row, moved[json.dumps(row.slot, sort_keys=True)])
     cells: dict[Key, dict[str, Brief]] = defaultdict(dict)
     versions = {}
     for observation in observations:
@@ -86,11 +91,12 @@ def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = 
     return Summary(cells, versions)
 
 
-def _within_noise(row: Row) -> bool:
-    """Whether a value misses its tolerance by no more than moved starts change it."""
-    if row.floor is None or row.error is None or row.tolerance is None:
+def _mended(row: Row, moved: Iterable[Observation]) -> bool:
+    """Whether one of the same cell's moved starts passes the check that this row fails."""
+    if row.truth is None or row.tolerance is None:
         return False
-    return abs(row.error) - row.tolerance <= row.floor
+    values = (observation.metrics.get(row.metric, (None, ""))[0] for observation in moved)
+    return any(value is not None and abs(value - row.truth) <= row.tolerance for value in values)
 
 
 def _shown(slot: Slot) -> bool:

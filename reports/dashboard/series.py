@@ -37,8 +37,8 @@ class Point:
     fails, judged
         Checks of those cells.
     lost, mended
-        Cells in which a check began or ceased to fail since the point before that ran them, by more than its noise
-        floor where that is known.
+        Cells in which a check began or ceased to fail since the point before that ran them, and not from a start
+        alone that was moved by the last place, where those were asked.
     """
 
     label: str

@@ -22,6 +22,7 @@ from adapters.scene import (
     Polygon,
     Scene,
     SceneError,
+    Sphere,
     scene_from_dict,
 )
 from adapters.shapes import area_and_centroid, reach
@@ -203,3 +204,37 @@ def test_engines_refuse_the_shapes_they_do_not_claim():
     with pytest.raises(EngineError, match=r"body\.shape: the adapter of reference has no hull"):
         posed_for(load("reference"), spatial(BRICK, (1.0,) * 3, 1.0))
     assert posed_for(load("reference"), planar(RECTANGLE, 1.0, 1.0)).dimension == 2
+
+
+def test_a_star_that_goes_round_twice_is_no_polygon_and_one_with_64_corners_is():
+    """Every corner of a pentagram turns left by less than half a turn: only the sum tells."""
+    five = [2.0 * math.pi * k / 5 for k in range(5)]
+    corners = [(math.cos(a), math.sin(a)) for a in five]
+    Polygon(tuple(corners)).validate("b")
+    with pytest.raises(SceneError, match=r"^b.shape.vertices: go round more than once$"):
+        Polygon(tuple(corners[2 * k % 5] for k in range(5))).validate("b")
+    many = tuple((math.cos(2.0 * math.pi * k / 64), math.sin(2.0 * math.pi * k / 64)) for k in range(64))
+    Polygon(many).validate("b")
+    Polygon(tuple((1e3 * x, 1e3 * y) for x, y in corners)).validate("b")  # what is round-off grows with the size
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        (Sphere(-1.0), "b.shape.radius: "),
+        (Cylinder(0.5, -1.0), "b.shape.radius: "),
+        (HalfSpace((0.0, math.nan)), "b.shape.normal: "),
+        (Hull(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0))), "b.shape.vertices"),
+        (Polygon(((1.0, 0.0), (0.0, 1.0), "c")), "b.shape.vertices.2: 'c' is no point"),
+    ],
+    ids=str,
+)
+def test_a_shape_is_refused_by_the_name_of_its_field(shape, said):
+    with pytest.raises(SceneError) as refusal:
+        shape.validate("b")
+    assert str(refusal.value).startswith(said)
+
+
+def test_how_far_a_shape_reaches():
+    for shape, far in ((Disc(0.4), 0.4), (Sphere(0.3), 0.3), (Box((0.3, 0.4)), 0.5), (HalfSpace((0.0, 1.0)), 0.0)):
+        assert reach(shape) == pytest.approx(far)

@@ -137,6 +137,23 @@ def test_the_worst_answer_of_a_family_is_of_the_scene_that_fails_most_rows():
     assert worst[0].cure == "tuned or one cures it"
 
 
+def test_what_another_profile_makes_worse_is_not_how_an_engine_is_shipped():
+    rows = catalogue(lambda scene, engine, profile: "known" if (scene, profile) == ("slide", "one") else "pass")
+    assert overview.worst_answers(rows, overview.families_of(rows))[0] == []
+
+
+def test_the_nearest_come_in_the_order_of_what_they_fail():
+    wrong = {"one": ("slide", "masse", "wedge"), "tuned": ("slide", "masse"), "default": ("slide",)}
+    rows = catalogue(
+        lambda scene, engine, profile: "known" if engine == "bullet" and scene in wrong[profile] else "pass"
+    )
+    rows = [row for row in rows if row["engine"] == "bullet"]
+    said = dict(overview.choices(rows, overview.families_of(rows)))["friction"]
+    assert [said.index(f"bullet/{profile}") for profile in ("default", "tuned", "one")] == sorted(
+        said.index(f"bullet/{profile}") for profile in wrong
+    )
+
+
 def test_scenes_of_files_make_families_of_their_own(tmp_path):
     path = tmp_path / "drop.toml"
     path.write_text(

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from adapters.scene import Box, Capsule, Cylinder, HalfSpace, Hull, Polygon, SceneError, Sphere
+from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, SceneError, Sphere
 from validation.files.mass_properties import moments, volume
 from validation.files.scene_files import stated_from_text
 from validation.geometry import deepest, overlap, separation
@@ -99,6 +99,14 @@ def test_mass_properties_by_integration():
     assert volume(Cylinder(0.4, 0.3)) == pytest.approx(whole, rel=5e-3)
     found = moments(Cylinder(0.4, 0.3), 2.0, 3)
     assert found == pytest.approx([2.0 * m / whole for m in (yy + zz, zz + xx, xx + yy)], rel=5e-3)
+
+
+def test_a_solid_ball_has_two_fifths_and_a_disc_a_half_of_its_mass_times_its_radius_squared():
+    assert moments(Sphere(0.5), 3.0, 3) == pytest.approx((0.3,) * 3)
+    assert moments(Disc(0.5), 3.0, 2) == pytest.approx(0.375)
+    for measure in (volume, lambda shape: moments(shape, 1.0, 2)):
+        with pytest.raises(ValueError, match="a half-space has no "):
+            measure(HalfSpace((0.0, 1.0)))
 
 
 def test_mass_properties_of_corners_are_those_of_the_box():

@@ -94,7 +94,7 @@ def test_a_flip_is_marked_once_and_says_in_which_direction():
 
 
 def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():
-    """Of the four that fail in turn two miss by less than their noise floor: they neither begin nor cease to fail."""
+    """Of the four that fail in turn two pass from a moved start: they neither begin nor cease to fail."""
     entries = []
     for k, (fails, sure) in enumerate([(0, 0), (1, 0), (0, 0), (1, 1), (1, 0), (0, 0)]):
         cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1, sure)}}
@@ -106,17 +106,23 @@ def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():
     assert [point.fails for point in panel.points] == [0, 1, 0, 1, 1, 0]
 
 
-def test_a_check_fails_for_sure_where_it_misses_by_more_than_its_floor(observation):
+def test_a_check_fails_for_sure_where_no_moved_start_mends_it(observation):
     who = ("chipmunk", "tuned")
-    bad = observation(who, 0.2)
-    rows = [row for row in rows_of("", [bad]) if row.physics == "fail"]
-    assert rows
-    for floor, sure in ((None, len(rows)), (0.0, len(rows)), (1e9, 0)):
-        ((brief,),) = (c.values() for c in summarise([bad], [replace(r, floor=floor) for r in rows]).cells.values())
-        assert brief[1] == len(rows) and brief[3] == sure
-    exact = [replace(r, floor=abs(r.error) - r.tolerance) for r in rows]
-    ((brief,),) = (c.values() for c in summarise([bad], exact).cells.values())
-    assert brief[3] == 0
+    bad, good = observation(who, 0.2), observation(who, 0.0)
+    worse = observation(who, 0.3)  # chaos: far from the other, and as wrong
+    count = sum(row.physics == "fail" for row in rows_of("", [bad]))
+    assert count
+
+    def moved(of, ulp):
+        return replace(of, slot=replace(of.slot, ulp=ulp))
+
+    for others, sure in (
+        ([], count),
+        ([moved(worse, 1), moved(bad, 2)], count),
+        ([moved(worse, 1), moved(good, 2)], 0),
+    ):
+        ((brief,),) = (c.values() for c in summarise([bad, *others]).cells.values())
+        assert (brief[1], brief[3]) == (count, sure)
 
 
 def test_runs_that_asked_something_else_bring_no_step():
