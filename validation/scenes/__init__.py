@@ -37,6 +37,7 @@ OURS = (
     "thin_wall",
     "overhang",
     "ladder",
+    "card_tent",
     "pyramid",
     "seam",
     "far_origin",
