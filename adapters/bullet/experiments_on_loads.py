@@ -150,4 +150,21 @@ ON_LOADS: tuple[Experiment, ...] = (
         )
         for profile in ("default", "tuned", "one")
     ),
+    *(
+        Experiment(
+            "arch-hull-margin",
+            "without Baumgarte nothing is lifted, as shipped without drag and solved to the end; solving alone does "
+            "nothing",
+            profile,
+            "arch",
+            "moved",
+            off,
+            idle=(_SOLVED,),
+        )
+        for profile, off in (
+            ("default", {"contactERP": 0.0} | _SOLVED | _NO_DRAG),
+            ("tuned", {"contactERP": 0.0}),
+            ("one", {"contactERP": 0.0}),
+        )
+    ),
 )

@@ -158,4 +158,56 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
             )
             for metric in ("given_way", "acceleration", "momentum", "off_the_face", "turned")
         ),
+        *(
+            Experiment(
+                "arch-viscous-friction",
+                "with friction ten thousand times stiffer than its normal the springers hold; solving further does "
+                "nothing",
+                profile,
+                "arch",
+                "moved",
+                off,
+                idle=({"tolerance": 0.0, "iterations": 1000},),
+            )
+            for profile, off in (("default", hold | {"impratio": 1e4}), ("tuned", {"impratio": 1e4}))
+        ),
+        *(
+            Experiment(
+                "arch-smooth-pyramid",
+                "on a round cone the loads are right; a single row for smooth contacts does not do it",
+                "default",
+                "arch",
+                metric,
+                {"cone": "elliptic"},
+                idle=({"smooth_condim": 1},),
+            )
+            for metric in ("face_load[left]", "face_load[right]", "floor_load[left]", "floor_load[right]")
+        ),
+        *(
+            Experiment(
+                "arch-smooth-pyramid",
+                "on a rigid round cone, with friction that lifts nothing, it gives way as it should; solving further "
+                "or a single row for smooth contacts does not do it",
+                "default",
+                "arch",
+                metric,
+                hold | _SLOW,
+                {"ratio": 0.8},
+                idle=({"tolerance": 0.0}, {"smooth_condim": 1}),
+            )
+            for metric in ("parting[left]", "parting[right]", "sinking", "face_load[left]", "face_load[right]")
+        ),
+        *(
+            Experiment(
+                "arch-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing; solving further does nothing",
+                "tuned",
+                "arch",
+                metric,
+                _SLOW,
+                {"ratio": 0.8},
+                idle=({"tolerance": 0.0, "iterations": 1000},),
+            )
+            for metric in ("parting[left]", "parting[right]", "sinking", "face_load[left]", "face_load[right]")
+        ),
     )

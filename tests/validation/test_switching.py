@@ -56,7 +56,7 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`.
 MEASURED_ONLY = {
     "mujoco": {"kane-convex-cone", "rack-impedance"},
-    "bullet": {"wedge-hull-points"},
+    "bullet": {"arch-hull-points", "wedge-hull-points"},
     "rapier": {
         "cradle-stopped-in-small-steps",
         "domino-rebound-last",

@@ -38,6 +38,7 @@ OURS = (
     "overhang",
     "ladder",
     "card_tent",
+    "arch",
     "pyramid",
     "seam",
     "far_origin",
