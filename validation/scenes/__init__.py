@@ -8,6 +8,7 @@ from __future__ import annotations
 
 OURS = (
     "impact",
+    "restitution_above_one",
     "bounce",
     "stack",
     "incline",

@@ -103,13 +103,7 @@ def outcome(scene: Scene, truth: Mapping[str, float], found: Mapping[str, Measur
     if "moved" in truth:
         value, reason = found["moved"]
         return (None, reason) if value is None else (value / scene.params["length"], "")
-    off = []
-    for metric in (name for name in truth if name.startswith("passing_time")):
-        value, reason = found[metric]
-        if value is None:
-            return None, reason
-        off.append(abs(value / truth[metric] - 1.0))
-    return max(off), ""
+    return metrics.relative_error(found, truth, [name for name in truth if name.startswith("passing_time")])
 
 
 # ---- what is owed ----
