@@ -13,7 +13,7 @@ from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.files.mass_properties import moments, volume
 from validation.geometry import overlap
-from validation.scenes.arch import TALL, motion, needed
+from validation.scenes.arch import BASE, KEY, NARROW, TALL, _held, motion, needed
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
@@ -193,6 +193,43 @@ def test_the_replay_s_ghost_sinks_with_the_keystone():
     canonical, scene = made(ratio=0.8)
     record = run(scene)
     assert canonical.track(scene).position(record.t[-1]) == pytest.approx(tuple(record.pose[-1, 3, :2]), abs=1e-12)
+
+
+def test_all_stones_that_rise_together_fail():
+    canonical, scene = made(ratio=0.8)
+    raised = run(scene)
+    raised.pose[-1, 1:, 1] += 1e-3
+    assert "off_the_faces" in failing(canonical, scene, raised)
+
+
+def within_base(p):
+    """Whether the right springer does not turn with the floor's load within its base: torques about its centre."""
+    canonical = CATALOGUE["arch"]
+    beta, heavy = math.radians(p["beta"]), p["heavy"]
+    out, load = motion(p)
+    share = 0.5 * BASE * (TALL + TALL) - 0.5 * KEY * KEY * math.tan(beta)  # a rectangle without a triangle
+    corner = 0.5 * KEY * KEY * math.tan(beta)
+    x = (BASE * TALL * (NARROW + 0.5 * BASE) - corner * (NARROW + KEY * math.tan(beta) / 3.0)) / share
+    y = (BASE * TALL * 0.5 * TALL - corner * (TALL - KEY / 3.0)) / share
+    press = heavy + load * math.sin(beta)
+    grip = load * math.cos(beta) - heavy * out / canonical.complete({})["g"]  # friction, inwards
+    for up in (0.0, KEY):
+        arm = NARROW + up * math.tan(beta) - x, TALL - KEY + up - y
+        torque = arm[0] * -load * math.sin(beta) - arm[1] * load * math.cos(beta) - y * grip
+        if not NARROW < x - torque / press < NARROW + BASE:
+            return False
+    return True
+
+
+def test_what_tips_is_what_the_floor_cannot_hold_at_rest_and_on_its_way():
+    canonical, said = CATALOGUE["arch"], []
+    for ratio in (0.05, 0.2, 0.5, 1.05):
+        for beta in np.linspace(10.0, 45.0, 36):
+            for heavy in np.geomspace(1.0, 10.0, 21):
+                p = canonical.complete({"ratio": ratio, "beta": float(beta), "heavy": float(heavy)})
+                said.append(_held(p))
+                assert said[-1] == within_base(p), p
+    assert 0.01 < np.mean(said) < 0.99  # both happen
 
 
 def test_springers_that_would_tip_are_refused_by_name():

@@ -13,7 +13,7 @@ from adapters.scene import SceneError
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.files.mass_properties import moments
-from validation.scenes.card_tent import friction, needed
+from validation.scenes.card_tent import _forces, friction, needed
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
@@ -149,6 +149,25 @@ def test_a_tent_slides_out_as_forces_at_feet_and_heads_move_its_cards(params, ra
     for name in ("passing_time[left]", "passing_time[right]", "passing_spin[left]", "passing_spin[right]"):
         assert measured[name][0] == pytest.approx(truth[name], rel=1e-5)
     assert measured["let_go"][0] == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("params", SHAPES)
+def test_feet_and_heads_push_as_forces_at_them_say_all_the_way(params):
+    _, scene = made(ratio=0.5, **params)
+    record, p = sliding(scene), scene.params
+    for k in (0, 30, 60):
+        q, v = record.pose[k, 1:].ravel(), record.twist[k, 1:].ravel()
+        loads = accelerations(scene, q, v, friction(p), p["g"])[6:] / (p["mass"] * p["g"])
+        _, foot, heads = _forces(p, q[2], v[2] ** 2)
+        assert loads == pytest.approx([foot, foot, heads], rel=1e-5)
+
+
+def test_an_end_that_is_found_a_step_late_passes_and_one_that_is_three_late_does_not():
+    canonical, scene = made(ratio=0.8)
+    for steps, said in ((1.0, set()), (3.0, {"let_go"})):
+        found = sliding(scene, 1 / 60)
+        found.pose[5, 1, 1] -= 1.4 * steps * 9.81 * found.dt**2
+        assert failing(canonical, scene, found) == said
 
 
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])

@@ -70,6 +70,9 @@ def test_another_gain_and_a_speed_across_fail(size):
 def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
     canonical, scene = made()
     assert failing(canonical, scene, thrown(scene, e=1.0)) == {"growth", "blows"}
+    tired = thrown(scene)
+    tired.twist[-1] *= 0.99
+    assert failing(canonical, scene, tired) == {"growth"}
     stopped = thrown(scene)
     stopped.twist[100:, 2] = 0.0
     assert failing(canonical, scene, stopped) == {"growth", "blows"}
