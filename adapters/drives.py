@@ -23,9 +23,11 @@ from adapters.shapes import HalfSpace, SceneError, check_finite, check_length, c
 if TYPE_CHECKING:
     from adapters.scene import Body, Scene
 
-#: What a scene may ask for beyond discs, balls, boxes, fixed half-spaces and constant twists. An adapter names what it
-#: honours (`adapters.engine.EngineFacts.abilities`); the rest is refused before the adapter sees it.
-Ability = Literal["surface velocity", "moving half-space", "course", "capsule", "polygon", "cylinder", "hull"]
+#: What a scene may ask for beyond discs, balls, boxes, fixed half-spaces, constant twists and passive contacts. An
+#: adapter names what it honours (`adapters.engine.EngineFacts.abilities`); the rest is refused before it sees it.
+Ability = Literal[
+    "surface velocity", "moving half-space", "course", "capsule", "polygon", "cylinder", "hull", "restitution above 1"
+]
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:
             yield f"{body.name}.course", "course"
         if isinstance(body.shape, HalfSpace) and body.motion == "prescribed":
             yield f"{body.name}.motion", "moving half-space"
+    if scene.gaining and any(restitution > 1.0 for restitution, _ in scene.materials()):
+        yield "pairs", "restitution above 1"
 
 
 def as_moving(scene: Scene) -> Scene:

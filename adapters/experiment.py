@@ -31,6 +31,8 @@ class Experiment:
     within
         How near the truth counts as a PASS with the mechanism off, in the metric's unit: round-off of an engine whose
         numbers are coarser than what the check allows. A row that is this near as it is shows nothing.
+    dt
+        Step of the row [s], where it fails at another than that of the quick suite.
     """
 
     family: str
@@ -44,6 +46,7 @@ class Experiment:
     iterations: int | None = None
     idle: Sequence[Mapping[str, Any]] = ()
     within: float = 0.0
+    dt: float | None = None
 
 
 @dataclass(frozen=True)

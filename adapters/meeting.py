@@ -7,7 +7,8 @@ partners, e <= 1, friction) leave
     V(t) <= V(0) + t sqrt(sum m a^2 + torque^2 / I)      (Cauchy and Schwarz, of the loads' power),
 
 so that a body of mass m is never faster than ``V(t)/sqrt(m)`` and never farther from its start than t times that. A
-prescribed body or a surface that runs does work: what can reach one may be anywhere afterwards.
+prescribed body or a surface that runs does work: what can reach one may be anywhere afterwards. So does a contact that
+gains energy.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def representable(scene: Scene, solve: Callable[[Sequence[Meeting]], list[float]
 def meeting_pairs(scene: Scene) -> list[Meeting]:
     """Pairs with a free body that can come to touch within the scene's duration."""
     pairs = list(scene.contact_pairs())
-    if sum(body.motion == "free" for body in scene.bodies) > MOST_BODIES:
+    if scene.gaining or sum(body.motion == "free" for body in scene.bodies) > MOST_BODIES:
         return pairs
     group = list(range(len(scene.bodies)))
     while True:

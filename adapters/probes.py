@@ -87,9 +87,9 @@ def _vector(case: Case, x: float, up: float) -> tuple[float, ...]:
 
 def _scene(case: Case, name: str, bodies: list[Body], duration: float, gravity: tuple[float, ...] = ()) -> Scene:
     pair = Pair(restitution=case.restitution, friction=case.friction)
-    return Scene(
-        f"probe_{name}", 1, case.dimension, tuple(bodies), (pair,), gravity or _vector(case, 0.0, 0.0), duration
-    )
+    falling = gravity or _vector(case, 0.0, 0.0)
+    gaining = case.restitution > 1.0  # as the scene that is asked about
+    return Scene(f"probe_{name}", 1, case.dimension, tuple(bodies), (pair,), falling, duration, gaining=gaining)
 
 
 def _pose(case: Case, x: float, up: float) -> tuple[float, ...]:

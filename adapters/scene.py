@@ -73,6 +73,9 @@ __all__ = [
 Motion = Literal["free", "fixed", "prescribed"]
 ImpactLaw = Literal["N-SIM", "N-SEQ"]
 
+#: Largest restitution of a scene that means to gain energy: a blow doubles the speed.
+MOST_RESTITUTION = 2.0
+
 
 @dataclass(frozen=True)
 class Body:
@@ -135,6 +138,8 @@ class Scene:
         What `validation` made it from; kept for identity and display.
     impact_law
         Law for several simultaneous contacts: ``N-SIM`` or ``N-SEQ``.
+    gaining
+        Whether restitution above 1 is meant: contacts that gain energy are no passive process, and ask who takes them.
 
     Raises
     ------
@@ -151,6 +156,7 @@ class Scene:
     duration: float
     params: Mapping[str, float] = field(default_factory=dict)
     impact_law: ImpactLaw = "N-SIM"
+    gaining: bool = False
 
     def __post_init__(self) -> None:
         if self.dimension not in (2, 3):
@@ -193,7 +199,7 @@ class Scene:
                 yield i, j, self.material(self.bodies[i].name, self.bodies[j].name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data (JSON-ready) that `scene_from_dict` reads back; drives only of bodies that have one."""
+        """Plain data (JSON-ready) that `scene_from_dict` reads back; drives, and gains, only where there are any."""
         data = asdict(self)
         for body, raw in zip(self.bodies, data["bodies"], strict=True):
             raw["shape"] = {"type": SHAPE_NAMES[type(body.shape)], **raw["shape"]}
@@ -201,6 +207,8 @@ class Scene:
                 del raw["surface_velocity"]
             if body.course is None:
                 del raw["course"]
+        if not self.gaining:
+            del data["gaining"]
         data["params"] = dict(self.params)
         return data
 
@@ -283,7 +291,7 @@ def _validate_scene(scene: Scene) -> None:
     for body in scene.bodies:
         _validate_body(body, scene.dimension)
     for pair in scene.pairs:
-        _validate_pair(pair, names)
+        _validate_pair(pair, names, MOST_RESTITUTION if scene.gaining else 1.0)
     scene.materials()  # an ambiguous one raises
 
 
@@ -326,14 +334,14 @@ def _validate_body(body: Body, dimension: int) -> None:
     check_drive(body, dimension)
 
 
-def _validate_pair(pair: Pair, names: Mapping[str, int]) -> None:
+def _validate_pair(pair: Pair, names: Mapping[str, int], most: float) -> None:
     label = f"pair {pair.a}-{pair.b}"
     for side in (pair.a, pair.b):
         if side != "*" and side not in names:
             raise SceneError(f"{label}: there is no body called {side!r}")
     check_finite(f"{label}.restitution", pair.restitution)
     check_finite(f"{label}.friction", pair.friction)
-    if not 0.0 <= pair.restitution <= 1.0:
-        raise SceneError(f"{label}.restitution: {pair.restitution!r} must lie in [0, 1]")
+    if not 0.0 <= pair.restitution <= most:
+        raise SceneError(f"{label}.restitution: {pair.restitution!r} must lie in [0, {most:g}]")
     if pair.friction < 0.0:
         raise SceneError(f"{label}.friction: {pair.friction!r} must not be negative")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -204,6 +204,17 @@ def crossing(t: Array, value: Array, rate: Array, level: float) -> tuple[Measure
     inside = real[(real > -1e-9) & (real < 1.0 + 1e-9)]
     s = float(np.clip(inside.min(), 0.0, 1.0)) if len(inside) else float((level - a) / (b - a))
     return (float(t[k] + s * h), ""), (float(np.polyval(np.polyder(np.array(cubic)), s) / h), "")
+
+
+def relative_error(found: Mapping[str, Measured], truth: Mapping[str, float], names: Iterable[str]) -> Measured:
+    """Largest error of these metrics relative to their truths; None and why of the first that has no value."""
+    off = []
+    for name in names:
+        value, reason = found[name]
+        if value is None:
+            return None, reason
+        off.append(abs(value / truth[name] - 1.0))
+    return max(off), ""
 
 
 def deepest_overlap(scene: Scene, trajectory: Trajectory, pairs: Sequence[tuple[int, int]] | None = None) -> float:

@@ -100,7 +100,7 @@ class BulletEngine(Engine):
         scheme=Scheme("contacts at the old pose -> velocity (forces, then impulses) -> position", +1),
         customary_dt=1.0 / 240.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned", "one": "one"}),
-        abilities=frozenset({"moving half-space", "course", "capsule", "cylinder", "hull"}),
+        abilities=frozenset({"moving half-space", "course", "capsule", "cylinder", "hull", "restitution above 1"}),
         colour="#12a38d",
         quirks=_QUIRKS,
     )

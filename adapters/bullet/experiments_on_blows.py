@@ -13,7 +13,10 @@ _NO_PUSH = {"contactERP": 0.0, "contactSlop": 0.0}
 
 def on_blows(bare: Mapping[str, Any]) -> tuple[Experiment, ...]:
     """Experiments with ``bare``: a blow without anything that its law does not have."""
-    cells = (("closing_wall", "speed[1]", 2), ("edge_drop", "rise", 3), ("edge_drop", "spin", 3))
+    cells = (
+        ("closing_wall", "speed[1]", 2), ("edge_drop", "rise", 3), ("edge_drop", "spin", 3),
+        ("restitution_above_one", "growth", 2),
+    )  # fmt: skip
     return (
         *(
             Experiment(
@@ -26,7 +29,7 @@ def on_blows(bare: Mapping[str, Any]) -> tuple[Experiment, ...]:
                 dimension=dimension,
                 idle=(_NO_DRAG,),
             )
-            for scene, metric, dimension in cells
+            for scene, metric, dimension in (*cells, ("restitution_above_one", "blows", 2))
         ),
         *(
             Experiment(

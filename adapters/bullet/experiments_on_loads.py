@@ -150,4 +150,59 @@ ON_LOADS: tuple[Experiment, ...] = (
         )
         for profile in ("default", "tuned", "one")
     ),
+    *(
+        Experiment(
+            "arch-hull-margin",
+            "without Baumgarte nothing is lifted, as shipped without drag and solved to the end; solving alone does "
+            "nothing",
+            profile,
+            "arch",
+            "moved",
+            off,
+            idle=(_SOLVED,),
+        )
+        for profile, off in (
+            ("default", {"contactERP": 0.0} | _SOLVED | _NO_DRAG),
+            ("tuned", {"contactERP": 0.0}),
+            ("one", {"contactERP": 0.0}),
+        )
+    ),
+    *(
+        Experiment(
+            "conveyor-drag",
+            "without drag it is pulled and slips as it should; solving to the end does nothing",
+            "default",
+            "conveyor",
+            metric,
+            _NO_DRAG,
+            params,
+            dimension,
+            idle=(_SOLVED,),
+        )
+        for metric, params, dimension in (
+            ("pull", {"mu": 0.1}, 2),
+            ("slipped", {"mu": 0.1}, 2),
+            ("pull", {"heading": 45.0}, 3),
+        )
+    ),
+    *(
+        Experiment(
+            "conveyor-unfinished",
+            "solved to the end it stays on the belt and does not turn; no drag does nothing",
+            "default",
+            "conveyor",
+            metric,
+            _SOLVED,
+            params,
+            dimension,
+            idle=(_NO_DRAG,),
+            dt=1.0 / 60.0,
+        )
+        for metric, params, dimension in (
+            ("hop", {"mu": 0.1}, 2),
+            ("turned", {"mu": 0.1}, 2),
+            ("turned", dict[str, float](), 3),
+            ("slip_speed", dict[str, float](), 3),
+        )
+    ),
 )

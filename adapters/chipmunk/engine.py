@@ -35,7 +35,9 @@ class ChipmunkEngine(Engine):
         customary_dt=1.0 / 60.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
         colour="#a8600c",
-        abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "polygon"}),
+        abilities=frozenset(
+            {"surface velocity", "moving half-space", "course", "capsule", "polygon", "restitution above 1"}
+        ),
         quirks=(
             Quirk("external forces are cleared by every step", "they are set again before each", "cpBody.c:502"),
             Quirk(

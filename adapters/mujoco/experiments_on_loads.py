@@ -158,4 +158,103 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
             )
             for metric in ("given_way", "acceleration", "momentum", "off_the_face", "turned")
         ),
+        *(
+            Experiment(
+                "arch-viscous-friction",
+                "with friction ten thousand times stiffer than its normal the springers hold; solving further does "
+                "nothing",
+                profile,
+                "arch",
+                "moved",
+                off,
+                idle=({"tolerance": 0.0, "iterations": 1000},),
+            )
+            for profile, off in (("default", hold | {"impratio": 1e4}), ("tuned", {"impratio": 1e4}))
+        ),
+        *(
+            Experiment(
+                "arch-smooth-pyramid",
+                "on a round cone the loads are right; a single row for smooth contacts does not do it",
+                "default",
+                "arch",
+                metric,
+                {"cone": "elliptic"},
+                idle=({"smooth_condim": 1},),
+            )
+            for metric in ("face_load[left]", "face_load[right]", "floor_load[left]", "floor_load[right]")
+        ),
+        *(
+            Experiment(
+                "arch-smooth-pyramid",
+                "on a rigid round cone, with friction that lifts nothing, it gives way as it should; solving further "
+                "or a single row for smooth contacts does not do it",
+                "default",
+                "arch",
+                metric,
+                hold | _SLOW,
+                {"ratio": 0.8},
+                idle=({"tolerance": 0.0}, {"smooth_condim": 1}),
+            )
+            for metric in ("parting[left]", "parting[right]", "sinking", "face_load[left]", "face_load[right]")
+        ),
+        *(
+            Experiment(
+                "arch-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing; solving further does nothing",
+                "tuned",
+                "arch",
+                metric,
+                _SLOW,
+                {"ratio": 0.8},
+                idle=({"tolerance": 0.0, "iterations": 1000},),
+            )
+            for metric in ("parting[left]", "parting[right]", "sinking", "face_load[left]", "face_load[right]")
+        ),
+        *(
+            Experiment(
+                "conveyor-slow-friction",
+                "with friction damped as the normal it sticks; stiffer friction does not do it",
+                "tuned",
+                "conveyor",
+                "slip_speed",
+                {"solreffriction": None},
+                {"v": 0.5},
+                dimension,
+                idle=({"impratio": 1e4},),
+            )
+            for dimension in (2, 3)
+        ),
+        *(
+            Experiment(
+                "conveyor-soft-contact",
+                "with rigid contacts, whose friction lifts nothing where it hops, it rides; solving does nothing",
+                "default",
+                "conveyor",
+                metric,
+                off,
+                params,
+                dimension,
+                idle=({"tolerance": 0.0},),
+            )
+            for metric, off, params, dimension in (
+                ("slip_speed", hold, {"heading": 45.0}, 3),
+                ("turned", hold, {"heading": 45.0}, 3),
+                ("hop", hold | _SLOW, {"heading": 45.0}, 3),
+            )
+        ),
+        *(
+            Experiment(
+                "conveyor-pyramid",
+                "on a round cone it is pulled along the belt, but for what a slip lifts; solving further does nothing",
+                "default",
+                "conveyor",
+                metric,
+                {"cone": "elliptic"},
+                {"heading": heading},
+                3,
+                idle=({"tolerance": 0.0},),
+                within=within,
+            )
+            for metric, heading, within in (("slipped", 45.0, 0.0), ("pull", 45.0, 0.06), ("astray", 22.5, 4e-3))
+        ),
     )

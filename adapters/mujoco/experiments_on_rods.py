@@ -120,6 +120,37 @@ def on_rods(reflect: Mapping[str, Any], hold: Mapping[str, Any]) -> tuple[Experi
         ),
         *(
             Experiment(
+                "card-tent-slow-slippage",
+                "with friction stiffer than its normal the tent stands; a round cone or solving further does not do it",
+                "default",
+                "card_tent",
+                metric,
+                {"impratio": 1e4},
+                idle=({"cone": "elliptic"}, _FURTHER),
+            )
+            for metric in ("moved", "head_load")
+        ),
+        *(
+            Experiment(
+                "card-tent-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing but what a soft rest sinks",
+                profile,
+                "card_tent",
+                metric,
+                {**hold, **_GENTLE},
+                {"ratio": 0.8},
+                idle=({"tolerance": 0.0, "impratio": 1e4},),
+                within=within,
+            )
+            for profile, metric, within in (
+                ("default", "let_go", 5.1e-4),
+                ("tuned", "let_go", 5.1e-4),
+                ("tuned", "passing_spin[left]", 0.0),
+                ("tuned", "passing_spin[right]", 0.0),
+            )
+        ),
+        *(
+            Experiment(
                 "shove-smooth-pyramid",
                 "without friction rows for what is smooth both boxes move as they should; a margin does nothing",
                 "default",

@@ -73,6 +73,12 @@ def test_a_named_family_is_listed_with_values_and_bands_and_the_run_is_quiet_the
     assert call(*CELL, "--out", out).exit_code == 0
     again = accept(out, "--family", "starved")
     assert members(findings) == listed, again.output
+    # More digits than a band needs are somebody's, and none of ours to take away.
+    finer = (findings / files.MEMBERS).read_text().replace("e-", "00e-").encode()
+    (findings / files.MEMBERS).write_bytes(finer)
+    files.findings_of.cache_clear()
+    accept(out, "--family", "starved")
+    assert (findings / files.MEMBERS).read_bytes() == finer
 
 
 def test_a_terminal_is_asked_for_the_reason_of_every_family(out, findings, monkeypatch):

@@ -317,6 +317,13 @@ def test_members_are_written_as_lines_that_git_can_compare(findings):
     )
 
 
+@pytest.mark.parametrize("engine", [name for name in ENGINES if files.findings_of(name) is not None])
+def test_members_that_are_written_again_keep_every_digit_of_the_file(engine, tmp_path):
+    before = (files.findings_folder(engine) / files.MEMBERS).read_bytes()
+    files.write_members(tmp_path, files.findings_of(engine).members)
+    assert (tmp_path / files.MEMBERS).read_bytes() == before
+
+
 def test_families_are_appended_in_words_that_people_read(tmp_path):
     folder = tmp_path / "not" / "there yet"
     family = Family("soft", ("a", "b"), "stack", ("drift",), "sinks 3 µm \x7f", "its manual", "==1.*")

@@ -56,7 +56,7 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`.
 MEASURED_ONLY = {
     "mujoco": {"kane-convex-cone", "rack-impedance"},
-    "bullet": {"wedge-hull-points"},
+    "bullet": {"arch-hull-points", "wedge-hull-points"},
     "rapier": {
         "cradle-stopped-in-small-steps",
         "domino-rebound-last",
@@ -80,7 +80,9 @@ def test_every_family_has_an_experiment_and_every_experiment_a_family_that_cover
     silent = MEASURED_ONLY.get(engine, set()) | set(families) - {
         member.family.id for member in members if member.value is not None or member.diverged
     }
-    assert {experiment.family for experiment in experiments} == set(families) - silent
+    # A family that speaks about rows outside the quick suite alone has no members, and its experiments all the same.
+    proven = {experiment.family for experiment in experiments}
+    assert set(families) - silent <= proven <= set(families) - MEASURED_ONLY.get(engine, set())
     for experiment in experiments:
         family = families[experiment.family]
         assert experiment.profile in family.profiles

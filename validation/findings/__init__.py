@@ -14,7 +14,7 @@ its FAILs have no standing and do not fail the command.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 from packaging.specifiers import SpecifierSet
@@ -110,12 +110,15 @@ class Finding:
         It is the same finding as long as it is this close.
     diverged
         The cell ended in numbers that are none.
+    text
+        Value and band as they stand in the file, which writing it again must not change.
     """
 
     family: Family
     value: float | None
     band: float = 0.0
     diverged: bool = False
+    text: tuple[str, str] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

@@ -153,18 +153,18 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
     if profile in solutions_of(engine):
         raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
     if value in ("", DIVERGED):
-        return key, Finding(family, None, diverged=value == DIVERGED)
+        return key, Finding(family, None, diverged=value == DIVERGED, text=(value, band))
     try:
         found, width = float(value), float(band)
     except ValueError:
         raise FindingsError(f"{label}: value {value!r} and band {band!r} must be numbers") from None
     if not (math.isfinite(found) and math.isfinite(width) and width > 0.0):
         raise FindingsError(f"{label}: value {value} and band {band} must be finite, the band above 0")
-    return key, Finding(family, found, width)
+    return key, Finding(family, found, width, text=(value, band))
 
 
 def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
-    """Write all members, sorted by family and row; values to a tenth of their band."""
+    """Write all members, sorted by family and row; new values to a tenth of their band, others as they were read."""
     lines = sorted(_line(key, finding) for key, finding in members.items())
     with (folder / MEMBERS).open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
@@ -175,8 +175,8 @@ def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
 
 def _line(key: Key, finding: Finding) -> tuple[str, ...]:
     profile, _scene, *cell = key
-    value, band = DIVERGED if finding.diverged else "", ""
-    if finding.value is not None:
+    value, band = finding.text or (DIVERGED if finding.diverged else "", "")
+    if finding.value is not None and finding.text is None:
         value, band = _digits(finding.value, finding.band), f"{finding.band:.1e}"
     return (finding.family.id, profile, *cell, value, band)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 OURS = (
     "impact",
+    "restitution_above_one",
     "bounce",
     "stack",
     "incline",
@@ -37,6 +38,8 @@ OURS = (
     "thin_wall",
     "overhang",
     "ladder",
+    "card_tent",
+    "arch",
     "pyramid",
     "seam",
     "far_origin",

@@ -22,13 +22,7 @@ from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, tilted, upward
-from validation.truths.leaning import Turn, turn
-
-#: Turn at which a ladder that slides is told [rad], and how long it goes on [s]: whoever is late by what a step of
-#: 1/60 s may cost is told as well.
-TOLD, AFTERMATH = math.radians(8.0), 0.2
-#: Duration of a run in which it stands [s].
-DURATION = 2.0
+from validation.truths import leaning
 
 
 def needed(p: Params) -> float:
@@ -68,21 +62,11 @@ def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -
 
 
 @lru_cache(maxsize=64)
-def _slides(key: tuple[tuple[str, float], ...], off: float = 0.0) -> Turn | None:
+def _slides(key: tuple[tuple[str, float], ...], off: float = 0.0) -> leaning.Turn | None:
     """The fall of a ladder from a lean that is ``off`` [rad]; None if it stays."""
     p = dict(key)
     start = math.radians(p["lean"]) + off
-    return turn(lambda lean, square: (_forces(p, lean, square)[0], 0.0), start, start - TOLD)
-
-
-def _key(p: Params) -> tuple[tuple[str, float], ...]:
-    return tuple(sorted(p.items()))
-
-
-def _fall(p: Params) -> Turn:
-    found = _slides(_key(p))
-    assert found is not None  # `make` has refused it
-    return found
+    return leaning.turn(lambda lean, square: (_forces(p, lean, square)[0], 0.0), start, start - leaning.TOLD)
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -96,13 +80,13 @@ def make(dimension: int, params: Params) -> Scene:
     p, lean = params, math.radians(params["lean"])
     if needed(p) <= 0.0:
         raise SceneError(f"ladder.lean: a ladder as thick as {p['aspect']:g} stands by itself at {p['lean']:g} degrees")
-    duration = DURATION
+    duration = leaning.DURATION
     if p["ratio"] < 1.0:
-        found = _slides(_key(p))
-        loads = [] if found is None else _forces(p, lean - TOLD, found.spin**2)[1:]
+        found = _slides(leaning.key(p))
+        loads = [] if found is None else _forces(p, lean - leaning.TOLD, found.spin**2)[1:]
         if found is None or min(loads) <= 0.0:
             raise SceneError(f"ladder.ratio: at {p['ratio']:g} the ladder does not slide down along the wall")
-        duration = found.time + AFTERMATH
+        duration = found.time + leaning.AFTERMATH
     half, thick = 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
     place = -half * math.cos(lean) - thick * math.sin(lean), half * math.sin(lean) + thick * math.cos(lean)
     body = block("ladder", dimension, p["mass"], 2.0 * thick, p["length"])
@@ -118,28 +102,25 @@ def exact(scene: Scene) -> dict[str, float]:
     p = scene.params
     if p["ratio"] >= 1.0:
         return {"moved": 0.0, "wall_load": needed(p), "floor_load": 1.0}
-    found = _fall(p)
+    found = _slides(leaning.key(p))
+    assert found is not None  # `make` has refused it
     return {"passing_time": found.time, "passing_spin": found.spin, "let_go": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Largest way of a point of the ladder, loads at the end, its passage through a turn, and gaps of its two ends."""
     p, d, t = scene.params, scene.dimension, trajectory.t
-    pose = trajectory.pose[:, 2]
     turned, rate = metrics.tilt(trajectory, 2), metrics.tilt_rate(trajectory, 2)
-    time, spin = metrics.crossing(t, turned[0] - turned, -rate, TOLD)
+    time, spin = metrics.crossing(t, turned[0] - turned, -rate, leaning.TOLD)
     half, thick = 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
     foot = metrics.point(trajectory, 2, along(d, thick, -half))[:, d - 1]
     head = metrics.point(trajectory, 2, along(d, thick, half))[:, 0]
     until = t <= (t[-1] if time[0] is None else time[0])
-    way = float(np.linalg.norm(pose[:, :d] - pose[0, :d], axis=1).max())
     weight = p["mass"] * p["g"] * trajectory.dt
-    loads: dict[str, Measured] = {}
-    for name, body, axis, sign in (("floor_load", 0, d - 1, 1.0), ("wall_load", 1, 0, -1.0)):
-        late = metrics.late_impulses(trajectory, body, 2, bounds.WINDOW)
-        loads[name] = (None, metrics.UNAVAILABLE) if late is None else (sign * float(late[:, axis].mean()) / weight, "")
-    return loads | {
-        "moved": (way + metrics.turned(pose) * metrics.reach(scene.bodies[2].shape), ""),
+    return {
+        "floor_load": leaning.load(trajectory, 0, 2, d - 1, weight),
+        "wall_load": leaning.load(trajectory, 1, 2, 0, -weight),
+        "moved": (leaning.way(scene, trajectory, 2), ""),
         "passing_time": time,
         "passing_spin": spin,
         "let_go": (float(max(np.abs(foot[until]).max(), np.abs(head[until]).max())), ""),
@@ -147,51 +128,26 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What stands may be found one step late at either end; a fall owes what steps of first order leave out.
-
-    An end that nothing holds accelerates by at most 3/2 g, as that of a rod which falls about its other end; the way of
-    the centre and that of a corner by the turn are added, so that each end counts twice.
-    """
-    p, g = scene.params, scene.params["g"]
-    place = bounds.ROUND_OFF * p["length"]
+    """What stands may be found one step late at either end; a fall owes what steps of first order leave out."""
+    p = scene.params
     if p["ratio"] >= 1.0:
         source = "forces and moments in balance: N_w = W/2 (cot(lean) - w/L)"
-        still = bounds.Bound(
-            6.0 * g * dt * dt + place, "both ends found one step late, 3/2 g dt^2 each, at the centre and by the turn"
-        )
-        carried = bounds.carried(dt)
-        lever = bounds.Bound(
-            carried.value / math.sin(math.radians(p["lean"])), f"{carried.because}, over the height of the head"
-        )
-        return [
-            still.check("moved", "m", truth["moved"], "friction of the floor holds"),
-            lever.check("wall_load", "weights", truth["wall_load"], source),
-            carried.check("floor_load", "weights", truth["floor_load"], source),
-        ]
-    lean, found = math.radians(p["lean"]), _fall(p)
-    # Both ends turn about a point at most L from either: steps carry them off by L (w dt)^2/2 each.
-    carried_away = 0.5 * p["length"] * dt * found.path + 1.5 * g * dt * dt
-    others = [_slides(_key(p), side * carried_away / p["length"]) for side in (-1.0, 1.0)]
-    fast = max(abs(_forces(p, lean - TOLD, found.spin**2)[0]), abs(_forces(p, lean, 0.0)[0]))
-    because = "half a step by the order of a step, one for a contact found late, and ends that steps carry away"
-    time = 1.5 * dt + max(math.inf if other is None else abs(other.time - found.time) for other in others)
-    spin = 1.5 * dt * fast + max(math.inf if other is None else abs(other.spin - found.spin) for other in others)
+        heights = {"wall_load": math.sin(math.radians(p["lean"])), "floor_load": 1.0}
+        return leaning.standing_checks(p, dt, truth, heights, source)
     source = "Newton's and Euler's laws with Coulomb's friction at the foot, integrated"
-    stays = bounds.Bound(carried_away + place, "steps carry the ends away, L (w dt)^2/2 each; one found a step late")
-    return [
-        bounds.Bound(time, because).check("passing_time", "s", truth["passing_time"], source),
-        bounds.Bound(spin, because).check("passing_spin", "rad/s", truth["passing_spin"], source),
-        stays.check("let_go", "m", truth["let_go"], "both ends push until it is told"),
-    ]
+    return leaning.sliding_checks(
+        p,
+        dt,
+        truth,
+        lambda off: _slides(leaning.key(p), off),
+        lambda lean, square: _forces(p, lean, square)[0],
+        source,
+    )
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Way of a ladder that should stand, in lengths; error of the time of one that slides, relative to it."""
-    metric = "moved" if scene.params["ratio"] >= 1.0 else "passing_time"
-    value, reason = found[metric]
-    if value is None:
-        return None, reason
-    return (value / scene.params["length"] if metric == "moved" else abs(value / exact(scene)[metric] - 1.0)), ""
+    return leaning.outcome(scene, exact(scene), found)
 
 
 SCENE = CanonicalScene(

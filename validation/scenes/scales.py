@@ -100,13 +100,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Larger of the relative errors of the way of the box and of the apex of the ball."""
-    truth, off = exact(scene), []
-    for metric in ("stopping_distance", "apex"):
-        value, reason = found[metric]
-        if value is None:
-            return None, reason
-        off.append(abs(value / truth[metric] - 1.0))
-    return max(off), ""
+    return metrics.relative_error(found, exact(scene), ("stopping_distance", "apex"))
 
 
 SCENE = CanonicalScene(

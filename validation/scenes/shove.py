@@ -138,13 +138,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Larger of the relative errors of both accelerations."""
-    truth, off = exact(scene), []
-    for metric in ("down", "ahead"):
-        value, reason = found[metric]
-        if value is None:
-            return None, reason
-        off.append(abs(value / truth[metric] - 1.0))
-    return max(off), ""
+    return metrics.relative_error(found, exact(scene), ("down", "ahead"))
 
 
 SCENE = CanonicalScene(

@@ -168,13 +168,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     if "moved" in truth:
         value, reason = found["moved"]
         return (None, reason) if value is None else (value / FACE, "")
-    off = []
-    for metric in ("given_way", "acceleration"):
-        value, reason = found[metric]
-        if value is None:
-            return None, reason
-        off.append(abs(value / truth[metric] - 1.0))
-    return max(off), ""
+    return metrics.relative_error(found, truth, ("given_way", "acceleration"))
 
 
 SCENE = CanonicalScene(

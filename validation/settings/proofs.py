@@ -84,7 +84,9 @@ def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list
 def slot_of(engine: str, experiment: Experiment) -> Slot:
     """The cell of an experiment's row, as the profile has it."""
     e = experiment
-    return Slot(e.scene, tuple(sorted(e.params.items())), e.dimension, engine, e.profile, QUICK_DT, e.iterations)
+    return Slot(
+        e.scene, tuple(sorted(e.params.items())), e.dimension, engine, e.profile, e.dt or QUICK_DT, e.iterations
+    )
 
 
 def _versions(engine: str, experiment: Experiment) -> list[Slot]:

@@ -7,16 +7,30 @@ r"""What leans on its contacts and turns from rest: one angle, whose acceleratio
 
 Ends that slide with Coulomb's friction are of this kind as long as none stops or lifts: friction is a share of a force
 that angle and spin decide. There is no energy to keep, so the square is integrated step by step.
+
+What leans and is held by friction stands, or slides down: what is measured and owed of both stands here as well.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+import numpy as np
+
+from adapters.scene import Scene
+from adapters.trajectory import Trajectory
+from validation import bounds, metrics
+from validation.canonical import Check, Measured, Params
 
 #: Steps of the classical method of fourth order: twice as many change nothing at 1e-9.
 STEPS = 200
+#: Turn at which what slides down is told [rad], and how long it goes on [s]: whoever is late by what a step of 1/60 s
+#: may cost is told as well.
+TOLD, AFTERMATH = math.radians(8.0), 0.2
+#: Duration of a run of what stands [s].
+DURATION = 2.0
 
 #: ``rates(angle, square)`` of an angle [rad] and the square of its rate [1/s^2]: its acceleration [rad/s^2], and
 #: something else whose integral over time is asked.
@@ -61,3 +75,89 @@ def turn(rates: Rates, start: float, end: float) -> Turn | None:
         )
         path += 0.5 * abs(way) * ((s + step) ** 2 - s * s) * (before + (s + step) * math.sqrt(max(0.0, under)))
     return None if math.isnan(time) else Turn(time, math.sqrt(under), gathered, path)
+
+
+def key(p: Params) -> tuple[tuple[str, float], ...]:
+    """Parameters as something to remember a fall by."""
+    return tuple(sorted(p.items()))
+
+
+# ---- what is measured ----
+
+
+def way(scene: Scene, trajectory: Trajectory, body: int) -> float:
+    """Largest way of a point of a body [m]: that of its centre, and what its turn moves its outermost point by."""
+    pose, d = trajectory.pose[:, body], scene.dimension
+    centre = float(np.linalg.norm(pose[:, :d] - pose[0, :d], axis=1).max())
+    return centre + metrics.turned(pose) * metrics.reach(scene.bodies[body].shape)
+
+
+def load(trajectory: Trajectory, a: int, b: int, axis: int, weight: float) -> Measured:
+    """Mean force of body a on body b along an axis at the end, over ``weight`` [N s a step]."""
+    late = metrics.late_impulses(trajectory, a, b, bounds.WINDOW)
+    return (None, metrics.UNAVAILABLE) if late is None else (float(late[:, axis].mean()) / weight, "")
+
+
+def outcome(scene: Scene, truth: Mapping[str, float], found: Mapping[str, Measured]) -> Measured:
+    """Way of what should stand, in lengths; largest error of the times of what slides, relative to each."""
+    if "moved" in truth:
+        value, reason = found["moved"]
+        return (None, reason) if value is None else (value / scene.params["length"], "")
+    return metrics.relative_error(found, truth, [name for name in truth if name.startswith("passing_time")])
+
+
+# ---- what is owed ----
+
+
+def standing_checks(
+    p: Params, dt: float, truth: Mapping[str, float], heights: Mapping[str, float], source: str
+) -> list[Check]:
+    """What stands may be found one step late at either end.
+
+    An end that nothing holds accelerates by at most 3/2 g, as that of a rod which falls about its other end; the way of
+    the centre and that of a corner by the turn are added, so that each end counts twice. ``heights`` are the loads that
+    are told, each with the share of the length over which its moment acts.
+    """
+    still = bounds.Bound(
+        6.0 * p["g"] * dt * dt + bounds.ROUND_OFF * p["length"],
+        "both ends found one step late, 3/2 g dt^2 each, at the centre and by the turn",
+    )
+    found = [still.check("moved", "m", truth["moved"], "friction of the floor holds")]
+    carried = bounds.carried(dt)
+    for name, height in heights.items():
+        because = carried.because if height == 1.0 else f"{carried.because}, over the height of the head"
+        found.append(bounds.Bound(carried.value / height, because).check(name, "weights", truth[name], source))
+    return found
+
+
+def sliding_checks(
+    p: Params,
+    dt: float,
+    truth: Mapping[str, float],
+    again: Callable[[float], Turn | None],
+    bent: Callable[[float, float], float],
+    source: str,
+) -> list[Check]:
+    """A fall owes what steps of first order leave out.
+
+    Both ends turn about a point at most a length from either: steps carry them off by L (w dt)^2/2 each. ``again`` is
+    the fall from a lean that is so much off [rad], ``bent`` the acceleration of the lean at a lean and a spin's square.
+    """
+    fall, length, g = again(0.0), p["length"], p["g"]
+    assert fall is not None  # whoever made the scene has refused it
+    carried_away = 0.5 * length * dt * fall.path + 1.5 * g * dt * dt
+    others = [again(side * carried_away / length) for side in (-1.0, 1.0)]
+    start = math.radians(p["lean"])
+    fast = max(abs(bent(start - TOLD, fall.spin**2)), abs(bent(start, 0.0)))
+    because = "half a step by the order of a step, one for a contact found late, and ends that steps carry away"
+    time = 1.5 * dt + max(math.inf if other is None else abs(other.time - fall.time) for other in others)
+    spin = 1.5 * dt * fast + max(math.inf if other is None else abs(other.spin - fall.spin) for other in others)
+    bound = {"passing_time": ("s", bounds.Bound(time, because)), "passing_spin": ("rad/s", bounds.Bound(spin, because))}
+    found = []
+    for name in (name for name in truth if name.startswith("passing")):
+        unit, owed = bound[name.partition("[")[0]]
+        found.append(owed.check(name, unit, truth[name], source))
+    stays = bounds.Bound(
+        carried_away + bounds.ROUND_OFF * length, "steps carry the ends away, L (w dt)^2/2 each; one found a step late"
+    )
+    return [*found, stays.check("let_go", "m", truth["let_go"], "both ends push until it is told")]

@@ -1,0 +1,106 @@
+"""A ball that gains speed: blows one by one against the closed form, planted faults; who may ask for it at all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import failing
+
+from adapters import registry
+from adapters.drives import asked_abilities
+from adapters.lift import lift
+from adapters.meeting import meeting_pairs
+from adapters.needs import needs
+from adapters.scene import Pair, Scene, SceneError, scene_from_dict
+from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
+
+DT = 1 / 240
+SIZES = (0.1, 0.01, 0.001)
+
+
+def made(**params):
+    canonical = CATALOGUE["restitution_above_one"]
+    return canonical, canonical.scene(2, params)
+
+
+def thrown(scene, dt=DT, e=None, late=0.0):
+    """A ball that moves step by step and is turned, ``e`` times as fast, in the step in which it would touch."""
+    p, half = scene.params, 2.0
+    e = p["e"] if e is None else e
+    n = round(scene.duration / dt)
+    pose, twist = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3, 3))
+    x, v = 0.0, p["v"]
+    twist[0, 2, 0] = v
+    for k in range(1, n + 1):
+        if abs(x + v * dt) > half + late * abs(v) * dt and x * v > 0.0:
+            v = -e * v
+        x += v * dt
+        pose[k, 2, 0], twist[k, 2, 0] = x, v
+    return Trajectory(np.arange(n + 1) * dt, pose, twist, None, dt, "completed")
+
+
+@pytest.mark.parametrize("params", [{}, {"e": 1.5}, {"e": 2.0}, {"v": 0.1}, {"e": 1.0}])
+@pytest.mark.parametrize("late", [0.0, 1.0, 2.0])
+def test_a_ball_that_is_thrown_back_as_asked_passes_at_every_phase(params, late):
+    canonical, scene = made(**params)
+    assert failing(canonical, scene, thrown(scene, late=late)) == set()
+
+
+@pytest.mark.parametrize("params", [{}, {"e": 1.5}])
+def test_the_ghost_is_where_blows_one_by_one_take_it(params):
+    canonical, scene = made(**params)
+    fine = thrown(scene, 1e-5)
+    place = canonical.track(scene).position
+    off = [abs(place(t)[0] - x) for t, x in zip(fine.t[::500], fine.pose[::500, 2, 0], strict=True)]
+    assert max(off) < 1e-3
+    assert fine.twist[-1, 2, 0] == pytest.approx(-scene.params["v"] * scene.params["e"] ** 5)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_another_gain_and_a_speed_across_fail(size):
+    canonical, scene = made()
+    for e in (1.1 * (1.0 - size), 1.1 * (1.0 + size)):
+        assert "growth" in failing(canonical, scene, thrown(scene, e=e))
+    askew = thrown(scene)
+    askew.twist[-1, 2, 1] = 1e-3 * size
+    assert failing(canonical, scene, askew) == {"astray"}
+
+
+def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
+    canonical, scene = made()
+    assert failing(canonical, scene, thrown(scene, e=1.0)) == {"growth", "blows"}
+    tired = thrown(scene)
+    tired.twist[-1] *= 0.99
+    assert failing(canonical, scene, tired) == {"growth"}
+    stopped = thrown(scene)
+    stopped.twist[100:, 2] = 0.0
+    assert failing(canonical, scene, stopped) == {"growth", "blows"}
+
+
+def test_a_scene_must_mean_it_and_says_so_when_it_is_kept():
+    _, scene = made()
+    with pytest.raises(SceneError, match=r"restitution: 1\.1 must lie in \[0, 1\]"):
+        replace(scene, gaining=False)
+    with pytest.raises(SceneError, match=r"restitution: 2\.1 must lie in \[0, 2\]"):
+        replace(scene, pairs=(Pair(restitution=2.1),))
+    assert scene_from_dict(scene.as_dict()).hash() == scene.hash()
+    passive = made(e=1.0)[1]
+    assert "gaining" not in passive.as_dict() and list(asked_abilities(passive)) == []
+
+
+def test_only_adapters_that_say_so_get_it():
+    _, scene = made()
+    assert list(asked_abilities(scene)) == [("pairs", "restitution above 1")]
+    assert list(asked_abilities(lift(scene))) == [("pairs", "restitution above 1")]
+    assert needs(scene).restitution == 1.1
+    for name in ("chipmunk", "bullet"):
+        assert "restitution above 1" in registry.facts(name).abilities
+    for name in ("reference", "mujoco"):
+        assert "restitution above 1" not in registry.facts(name).abilities
+
+
+def test_nobody_says_how_far_bodies_get_that_gain_energy():
+    _, scene = made()
+    assert isinstance(scene, Scene) and len(meeting_pairs(replace(scene, duration=1e-3))) == 2
+    assert len(meeting_pairs(replace(made(e=1.0)[1], duration=1e-3))) < 2
