@@ -5,6 +5,7 @@ profiles       settings with their reasons
 translation    materials of pairs as one number per body, poses of half-spaces
 simulation     one world
 engine         the adapter
+laws           what it does by design
 """
 
 from adapters.physx.engine import PhysxEngine

@@ -65,10 +65,17 @@ def _shipped(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
     ]
 
 
+def least_rebound(needs: Needs, dt: float) -> float:
+    """Speed of approach up to which nothing rebounds in `tuned` [m/s].
+
+    What a step of gravity brings about is no impact: a body at rest would hop.
+    """
+    return max(2.0 * needs.gravity * dt, 1e-4)
+
+
 def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for what the scene needs."""
-    # What a step of gravity brings about is no impact: a body at rest would hop.
-    least = max(2.0 * needs.gravity * dt, 1e-4)
+    least = least_rebound(needs, dt)
     ahead = max(CONTACT_OFFSET, needs.top_speed * dt)
     changed = {
         "iterations": (50, "more small steps and sweeps, for loads on light bodies", "measured: columns"),

@@ -13,6 +13,7 @@ from adapters.drives import Harmonic
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.physx import PhysxEngine
+from adapters.physx.laws import DEVIATIONS
 from adapters.physx.shipped import FRICTION_GAP, TOLERANCE_LENGTH
 from adapters.physx.simulation import imported
 from adapters.physx.translation import means, turn_to
@@ -20,6 +21,7 @@ from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
 from adapters.stepping import run
 from adapters.trajectory import Sampling
+from validation.catalogue import CATALOGUE
 
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
@@ -236,3 +238,46 @@ def test_nothing_is_swept():
     ball = Body("ball", Sphere(0.05), 1.0, (0.1,) * 3, (0.0, 0.0, 0.0, *UPRIGHT), (200.0, 0, 0, 0, 0, 0))
     found = drive(Scene("wall", 1, 3, (wall, ball), (Pair(restitution=1.0),), (0.0, 0.0, 0.0), 5 * DT))
     assert found.twist[-1, 1, 0] == 200.0 and found.pose[-1, 1, 0] > 2.0
+
+
+def law_of(scene, profile, metric):
+    found = [d for d in DEVIATIONS if d.covers("physx", "3.0.3", profile, scene, metric)]
+    assert len(found) == 1
+    return found[0].law
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("params", [{}, {"e": 0.5, "v": 1.0}, {"e": 1.0, "v": 2.0}, {"e": 0.95, "v": 0.1}], ids=str)
+def test_a_blow_is_what_its_law_says_and_a_hundred_thousandth_more_is_not(profile, params):
+    impact = CATALOGUE["impact"]
+    scene = impact.scene(3, params)
+    found = impact.measure(scene, drive(scene, profile))
+    for metric in ("rebound_ratio", "rebound_speed", "velocity_change", "impulse"):
+        value, band = law_of("impact", profile, metric)(scene, DT, impact.measure)
+        assert abs(found[metric][0] - value) <= band < 1e-4, metric
+        assert value == 0.0 or abs(found[metric][0] * 1.0001 - value) > band, metric
+    rebounds = profile == "tuned" or scene.params["v"] > 2.0
+    assert (found["rebound_ratio"][0] > 0.0) is rebounds
+
+
+def test_nothing_is_said_of_a_blow_that_tgs_finds_in_an_overlap():
+    """50 m/s make 0.2 m a step, contacts are made 0.02 m ahead; PGS rebounds from an overlap as from a touch."""
+    impact = CATALOGUE["impact"]
+    scene = impact.scene(2, {"e": 1.0, "v": 50.0})
+    assert law_of("impact", "default", "rebound_ratio")(scene, DT, impact.measure) is None
+    assert law_of("impact", "pgs", "rebound_ratio")(scene, DT, impact.measure)[0] == pytest.approx(1.0)
+    found = {
+        profile: impact.measure(scene, drive(scene, profile))["rebound_ratio"][0] for profile in ("default", "pgs")
+    }
+    assert found["default"] < 0.999 and found["pgs"] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+def test_what_no_step_finds_in_a_thin_wall_passes_it_as_its_law_says(profile):
+    wall = CATALOGUE["thin_wall"]
+    scene = wall.scene(2, {"v": 200.0})
+    found = wall.measure(scene, drive(scene, profile))
+    for metric in ("rebound_ratio", "beyond"):
+        value, band = law_of("thin_wall", profile, metric)(scene, DT, wall.measure)
+        assert abs(found[metric][0] - value) <= band < 0.02
+    assert found["rebound_ratio"][0] == -1.0
