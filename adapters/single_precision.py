@@ -84,6 +84,8 @@ class Method:
     ahead
         Distance from which a step sees a contact [m]: nothing is said of a blow of which a step sees nothing, and the
         next one finds an overlap.
+    gives
+        Share of a slip that friction leaves of what it would stop.
     """
 
     restitution: Restitution
@@ -91,6 +93,7 @@ class Method:
     unit: float = UNIT
     rebound_after_friction: bool = False
     ahead: float = math.inf
+    gives: float = 0.0
 
 
 @dataclass
@@ -354,7 +357,11 @@ class _Flight:
                 # A contact of a ball: what stops it is its approach over its response.
                 stop = max(0.0, approach[k]) / self._response(c, c.normal)
                 pressed = stop if self.method.rebound_after_friction else jn
-                rub = -slip / speed * min(c.mu * pressed, speed / self._response(c, slip / speed))
+                rub = (
+                    -slip
+                    / speed
+                    * min(c.mu * pressed, speed / self._response(c, slip / speed) / (1.0 + self.method.gives))
+                )
                 self._push(c, rub)
             given.append((c, jn * c.normal + rub))
         return given
