@@ -98,7 +98,9 @@ def test_what_is_set_is_what_the_world_holds(changes):
 
 def test_what_is_set_is_what_bodies_hold():
     changes = {"iterations": 7, "velocity_iterations": 3, "fastest_spin": 50.0, "push_out": 2.0}
-    held = drive(replace(resting(), duration=DT), **changes).readback["bodies"]["box"]
+    told = drive(replace(resting(), duration=DT), contact_offset=0.003, **changes).readback
+    assert told["contact_offset"] == pytest.approx([0.003, 0.003])
+    held = told["bodies"]["box"]
     assert {name: held[name] for name in changes} == changes
     assert held["sleep_threshold"] == 0.0 and held["damping"] == pytest.approx([0.0, 0.05])
 
