@@ -84,8 +84,6 @@ class Method:
     ahead
         Distance from which a step sees a contact [m]: nothing is said of a blow of which a step sees nothing, and the
         next one finds an overlap.
-    gives
-        Share of a slip that friction leaves of what it would stop.
     """
 
     restitution: Restitution
@@ -93,7 +91,6 @@ class Method:
     unit: float = UNIT
     rebound_after_friction: bool = False
     ahead: float = math.inf
-    gives: float = 0.0
 
 
 @dataclass
@@ -357,11 +354,7 @@ class _Flight:
                 # A contact of a ball: what stops it is its approach over its response.
                 stop = max(0.0, approach[k]) / self._response(c, c.normal)
                 pressed = stop if self.method.rebound_after_friction else jn
-                rub = (
-                    -slip
-                    / speed
-                    * min(c.mu * pressed, speed / self._response(c, slip / speed) / (1.0 + self.method.gives))
-                )
+                rub = -slip / speed * min(c.mu * pressed, speed / self._response(c, slip / speed))
                 self._push(c, rub)
             given.append((c, jn * c.normal + rub))
         return given

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from adapters.dart.falling import falling_law
 from adapters.dart.in_line import in_line_law
-from adapters.dart.profiles import PROFILES, PYRAMIDS, solved
+from adapters.dart.profiles import PROFILES, solved
 from adapters.dart.shipped import MIXING, PUSH_OUT, Rebound
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.lift import lift
@@ -23,7 +23,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
     "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
     "galperin": ("small_speed", "large_speed", "energy_defect"),
-    "oblique": ("rebound_ratio", "forward_speed"),
+    "oblique": ("rebound_ratio",),
 }
 
 
@@ -41,11 +41,6 @@ def _corners(scene: Scene) -> float:
     assert isinstance(box.shape, Box) and isinstance(box.inertia, tuple)
     a, b, _ = box.shape.half_extents
     return (1.0 + box.mass * (b * b / box.inertia[0] + a * a / box.inertia[1])) / 4.0
-
-
-def _across_an_axis(scene: Scene) -> bool:
-    """Whether a body moves along both level axes, between which a pyramid of friction is not a cone."""
-    return scene.dimension == 3 and any(body.twist[0] != 0.0 and body.twist[1] != 0.0 for body in scene.bodies)
 
 
 #: Scenes of a ball that falls straight onto a floor, and what its motion decides.
@@ -71,10 +66,8 @@ def blow_law(metric: str, profile: str) -> Law:
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         rough = any(friction > 0.0 for _, friction in scene.materials())
-        if metric != "rebound_ratio" and rough and profile in PYRAMIDS and _across_an_axis(scene):
-            return None
         unit, mixing = solved(profile, rough) / ROUNDINGS, MIXING * _corners(scene)
-        methods = (Method(Rebound(push, mixing), unit=unit, gives=MIXING) for push in _PUSHES)
+        methods = (Method(Rebound(push, mixing), unit=unit) for push in _PUSHES)
         low, high = (rounded_law(metric, method)(scene, dt, measure) for method in methods)
         if low is None or high is None:
             return None

@@ -52,8 +52,6 @@ def _sweeping(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
     ]
 
 
-#: Profiles whose friction is bounded along two axes each.
-PYRAMIDS = ("default", "pgs")
 #: Changes below which the sweeps of a profile stop, as a share.
 TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
 #: Sweeps of a profile at most.

@@ -153,9 +153,10 @@ def judged(name, dimension, params, profile="default", **changes):
     [
         ("bounce", 2, {"e": 1.0}, {"apex[1]", "apex[5]", "apex_growth"}, 1e-6),
         ("bounce", 3, {}, {"apex[1]", "rest_time"}, 1e-6),
+        ("bounce", 2, {"e": 0.0}, {"rest_time"}, 1e-6),
         ("flat_box", 2, {"aspect": 4.0, "e": 0.8}, {"rebound_ratio", "impulse"}, 1e-6),
         ("off_centre", 3, {}, {"spin", "energy_lost"}, 1e-6),
-        ("oblique", 2, {"mu": 1.0, "spin": -10.0, "v": 1.0}, {"forward_speed", "rebound_ratio"}, 1e-6),
+        ("oblique", 2, {}, {"rebound_ratio"}, 1e-6),
         ("overlap", 2, {}, {"thrown"}, 1e-4),
     ],
 )
@@ -176,15 +177,6 @@ def test_a_light_body_gives_way_to_a_heavy_load_faster_than_it_is_pushed_out():
     value, predicted, band = told["penetration"]
     assert abs(value - predicted) <= band < 1e-3 * value and value == pytest.approx(0.0155, rel=1e-2)
     assert abs(told["kinetic_energy"][0] - told["kinetic_energy"][1]) <= told["kinetic_energy"][2]
-
-
-def test_nothing_is_said_of_a_pyramid_between_its_axes_but_what_it_does_not_change():
-    """The exact cone has a law there too, and keeps it."""
-    params = {"heading": 30.0, "mu": 0.1}
-    assert {metric for metric, *_ in judged("oblique", 3, params)} == {"rebound_ratio"}
-    exact = {metric: law for metric, *law in judged("oblique", 3, params, "nsgs")}
-    value, predicted, band = exact["forward_speed"]
-    assert abs(value - predicted) <= band
 
 
 @pytest.mark.parametrize(
