@@ -203,4 +203,4 @@ def test_every_height_of_a_ball_that_falls_is_that_of_the_recurrence(e, height, 
     found = drive(scene)
     told, speeds = heights(height, 0.0, e, 9.81, len(found.t) - 1, DT)
     assert abs(found.pose[:, 1, 1] - 0.5 - told).max() < 1e-9 and abs(found.twist[:, 1, 1] - speeds).max() < 1e-9
-    assert told.min() < -1e-4
+    assert told.min() < -1e-5
