@@ -54,6 +54,16 @@ def velocity_over(body: Body, dt: float, step: int) -> tuple[float, ...]:
     return tuple(v + a * ((late - early) / dt) for v, a in zip(velocity, course.amplitude, strict=True))
 
 
+def place_after(body: Body, time: float) -> tuple[float, ...]:
+    """Place [m] of a prescribed body's centre after ``time`` [s]."""
+    size, course = len(body.force), body.course
+    place = tuple(x + v * time for x, v in zip(body.pose[:size], body.twist[:size], strict=True))
+    if course is None:
+        return place
+    swung = math.sin(2.0 * math.pi * course.frequency * time + course.phase) - math.sin(course.phase)
+    return tuple(x + a * swung for x, a in zip(place, course.amplitude, strict=True))
+
+
 def top_speed(body: Body) -> float:
     """Fastest that a body moves by what is prescribed, or its surface runs [m/s]; of a free body at the start."""
     own = math.hypot(*body.twist[: len(body.force)]) + (body.course.top_speed if body.course else 0.0)

@@ -215,8 +215,14 @@ def _starved(quantity: str, told: Declared, case: Case, iterations: int, is_decl
     A sweep clips friction at the load known so far; what is left falls faster than 1/N with N sweeps. The first one
     knows no load: anything from no friction to a stop within the window. The first and the last step of the window may
     hold a friction without its load. Impulses add up at any count where they are what moves the bodies; where a profile
-    declares that they do so to its solver's tolerance only, a solve that is cut off tells nothing about them.
+    declares that they do so to its solver's tolerance only, a solve that is cut off tells nothing about them. One sweep
+    may stop what lands a step of motion above what it touches, beside the step that any landing is allowed.
     """
+    if quantity == "size" and iterations == 1:
+        early = LANDING_SPEED * case.dt / HALF_EXTENTS[0]
+        return Declared(
+            told.value, told.band + early, f"{told.because}; 1 iteration was asked for: a step of motion more"
+        )
     if quantity == "impulse" and is_declared:
         return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations were asked for: not told")
     if quantity not in ("friction", "friction_impulse"):

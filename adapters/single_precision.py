@@ -81,12 +81,16 @@ class Method:
         Round-off of its numbers, as a share.
     rebound_after_friction
         Friction knows the impulse of compression only: what rebounds is added when friction is done.
+    ahead
+        Distance from which a step sees a contact [m]: nothing is said of a blow of which a step sees nothing, and the
+        next one finds an overlap.
     """
 
     restitution: Restitution
     sweeps: int = 0
     unit: float = UNIT
     rebound_after_friction: bool = False
+    ahead: float = math.inf
 
 
 @dataclass
@@ -175,6 +179,9 @@ def _motion(key: _Key, dt: float, method: Method) -> tuple[Trajectory, int] | No
         time, contacts = event
         free = {k for c in contacts for k in (c.a, c.b) if scene.bodies[k].motion == "free"}
         if any(time - last.get(k, -math.inf) < APART * dt for k in free) or len(blows) > 100:
+            return None
+        late = time - dt * math.floor(time / dt)
+        if any(-flight._closing(c) * late > method.ahead for c in contacts):
             return None
         given = flight.strike(time, contacts)
         if given is None:

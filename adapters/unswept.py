@@ -20,7 +20,7 @@ from adapters.trajectory import Trajectory
 ROUND_OFF = 1e-12
 
 
-def passing_law(metric: str) -> Law:
+def passing_law(metric: str, round_off: float = ROUND_OFF) -> Law:
     """A ball that flies straight at a fixed box in free space, and is never in it where a step ends: it flies on."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -39,6 +39,6 @@ def passing_law(metric: str) -> Law:
         pose[:, 1, 0] = x
         twist = np.array([[body.twist for body in scene.bodies]] * len(times))
         value = measure(scene, Trajectory(times, pose, twist, None, dt, "completed"))[metric][0]
-        return None if value is None else (value, ROUND_OFF * (1.0 + abs(ball.twist[0]) * scene.duration))
+        return None if value is None else (value, round_off * (1.0 + abs(ball.twist[0]) * scene.duration))
 
     return law

@@ -18,8 +18,8 @@ LINE = ["reference_solver", "adapters", "validation", "reports"]
 #: Folders of our engines, by name.
 FOLDERS = {name: folder_of(name) for name in registry.names() if registry.is_ours(registry.entry(name))}
 SOLVER = registry.solver()
-#: What their folders import beside the standard library, numpy and us: the engines themselves.
-COMMON = {*sys.stdlib_module_names, "numpy", "packaging", *LINE}
+#: What their folders import beside the standard library, numpy, scipy and us: the engines themselves.
+COMMON = {*sys.stdlib_module_names, "numpy", "packaging", "scipy", *LINE}
 
 
 def imported(path):

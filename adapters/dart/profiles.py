@@ -38,29 +38,30 @@ def _pivoting(needs: Needs, dt: float) -> list[Setting]:
     ]
 
 
-def _sweeping(solver: str, count: int, tolerance: float, why: str, needs: Needs, dt: float) -> list[Setting]:
+def _sweeping(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
     return [
         Setting("solver", solver, why, _SOURCE),
         Setting("detector", "fcl", "as shipped", "World.getCollisionDetector"),
         Setting(
-            "iterations", count, "30 as shipped leave a column unsolved" if solver == "pgs" else "as shipped", _SOURCE
+            "iterations",
+            SWEEPS[solver],
+            "30 as shipped leave a column unsolved" if solver == "pgs" else "as shipped",
+            _SOURCE,
         ),
-        Setting("tolerance", tolerance, "changes below it stop the sweeps", _SOURCE),
+        Setting("tolerance", TOLERANCES[solver], "changes below it stop the sweeps", _SOURCE),
     ]
 
 
 #: Changes below which the sweeps of a profile stop, as a share.
 TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
+#: Sweeps of a profile at most.
+SWEEPS = {"pgs": 200, "nsgs": 1000, "fbf": 1000}
 
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": _pivoting,
-    "pgs": partial(
-        _sweeping, "pgs", 200, TOLERANCES["pgs"], "the sweeps of a textbook on the pyramid of the shipped solver"
-    ),
-    "nsgs": partial(
-        _sweeping, "nsgs", 1000, TOLERANCES["nsgs"], "the exact cone: friction opposes the slip, whatever its direction"
-    ),
-    "fbf": partial(_sweeping, "fbf", 1000, TOLERANCES["fbf"], "the exact cone by another method"),
+    "pgs": partial(_sweeping, "pgs", "the sweeps of a textbook on the pyramid of the shipped solver"),
+    "nsgs": partial(_sweeping, "nsgs", "the exact cone: friction opposes the slip, whatever its direction"),
+    "fbf": partial(_sweeping, "fbf", "the exact cone by another method"),
 }
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
@@ -71,5 +72,13 @@ def solved(profile: str, rough: bool) -> float:
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
-    return settings.checked("dart", PIVOTING if asked.get("solver") == "dantzig" else SWEEPING, asked)
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`.
+
+    A solver that is asked for in the place of Dantzig's, alone, brings the sweeps and the tolerance of its own profile.
+    """
+    name = asked.get("solver")
+    if name == "dantzig":
+        return settings.checked("dart", PIVOTING, asked)
+    if name in TOLERANCES and not {"iterations", "tolerance"} & set(asked):
+        asked = {**asked, "iterations": SWEEPS[name], "tolerance": TOLERANCES[name]}
+    return settings.checked("dart", SWEEPING, asked)

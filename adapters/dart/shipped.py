@@ -12,6 +12,8 @@ MIXING = 1e-5
 THRESHOLD, FASTEST = 0.1, 100.0
 #: Largest speed at which an overlap is pushed out, where nothing rebounds [m/s]; measured: 2.0 m/s leave 1e-3 m/s.
 PUSH_OUT = 1e-3
+#: Share of an overlap that a step pushes out, up to that speed. [`ContactConstraint`, error reduction parameter]
+PUSHED_SHARE = 0.01
 #: What a solver leaves of a single contact without friction, as a share: measured 7e-16 at most, for all four, at
 #: ratios of mass from 1e-4 to 1e4 and speeds from 0.3 to 50 m/s; the round-off that any engine is allowed.
 SOLVED = 1e-12
@@ -25,9 +27,12 @@ class Rebound:
     ----------
     push
         Speed at which an overlap is pushed out [m/s], from 0 to `PUSH_OUT`.
+    mixing
+        Compliance of what is struck, as a share of its response.
     """
 
     push: float = 0.0
+    mixing: float = MIXING
 
     def __call__(self, e: float, speed: float) -> float:
         """Restitution at an approach of ``speed`` [m/s]: the impulse is smaller by the compliance.
@@ -36,7 +41,7 @@ class Rebound:
         """
         if e * speed <= THRESHOLD:
             return self.push / speed
-        return (1.0 + min(e * speed, FASTEST) / speed) / (1.0 + MIXING) - 1.0
+        return (1.0 + min(e * speed, FASTEST) / speed) / (1.0 + self.mixing) - 1.0
 
 
 def restitution(e: float, speed: float) -> float:

@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts, Simulation
+from adapters.impulses import along_normal
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
-
-#: Share of a unit normal's other components that single precision leaves along an axis.
-ALONG = 1e-5
 
 
 class Hooks:
@@ -150,7 +148,7 @@ class RapierSimulation(Simulation):
                         continue
                     p, q = places[k]
                     middle = (0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.5 * (p.z + q.z))
-                    rows.append((i, j, middle, normal, _told(point.impulse, normal, rough), point.dist))
+                    rows.append((i, j, middle, normal, along_normal(point.impulse, normal, rough), point.dist))
         rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
         return Contacts.from_rows(rows, 3)
 
@@ -190,15 +188,3 @@ class RapierSimulation(Simulation):
                 for i, j in self.materials
             }
         return told
-
-
-def _told(impulse: float, normal: Array, rough: bool) -> Array:
-    """Impulse on the second body as far as it is known: without friction all of it, with friction along the normal.
-
-    Components across the normal are known to be unknown (NaN); where the normal is not along an axis, all are.
-    """
-    told = impulse * normal
-    if rough:
-        along = np.abs(normal) > 1.0 - ALONG
-        told = np.where(along, told, np.nan)
-    return told

@@ -9,7 +9,7 @@ from adapters.conformance.spoilt import Spoilt
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
-from adapters.probes import PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
+from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
 from adapters.receipts import QUANTITIES, receipts
 
 DT = 1 / 60
@@ -199,6 +199,11 @@ def test_few_sweeps_that_were_asked_for_widen_the_bands_of_friction_alone(toy):
     widened = {quantity for quantity in own if starved[quantity].band > own[quantity].band}
     assert widened == {"friction", "friction_impulse"}
     assert all(slip.holds for slip in starved.values())
+
+
+def test_one_sweep_may_stop_what_lands_a_step_of_motion_early(toy):
+    own, one = (by_quantity(receipts(toy(), "default", IMPACT, DT, n))["size"] for n in (None, 1))
+    assert one.band - own.band == pytest.approx(LANDING_SPEED * DT / HALF_EXTENTS[0])
 
 
 def test_friction_applied_twice_does_not_hide_behind_few_sweeps(toy):

@@ -1,0 +1,13 @@
+"""PhysX 5 through SAPIEN's Python bindings; what stands where is told in `adapters.engine_folder`.
+
+shipped        numbers of the engine
+profiles       settings with their reasons
+translation    materials of pairs as one number per body, poses of half-spaces
+simulation     one world
+engine         the adapter
+laws           what it does by design
+"""
+
+from adapters.physx.engine import PhysxEngine
+
+__all__ = ["PhysxEngine"]

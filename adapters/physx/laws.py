@@ -1,0 +1,114 @@
+"""What PhysX does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.needs import needs
+from adapters.physx.profiles import PROFILES, least_rebound
+from adapters.physx.shipped import BOUNCE_THRESHOLD, CONTACT_OFFSET
+from adapters.scene import Scene
+from adapters.single_motions import kept_law, standstill_law
+from adapters.single_precision import UNIT, Method, Threshold, rounded_law
+from adapters.unswept import passing_law
+
+#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "impulse", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "oblique": ("rebound_ratio",),
+    "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
+}
+#: Blows that `tuned` sees so far ahead that one begins before the one before it is over.
+CROWDED = ("galperin",)
+#: Round-off of a place after a thousand steps, as a share of the way.
+PLACES = 1000.0 * UNIT
+_RELEASES = ("3.0.",)
+
+
+def blow_law(metric: str, profile: str) -> Law:
+    """Blows in free space; approaches of up to a speed do not rebound."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        least = least_rebound(needs(scene), dt) if profile == "tuned" else BOUNCE_THRESHOLD
+        # TGS leaves a share of a blow that it finds in an overlap; contacts are made from two offsets ahead.
+        ahead = math.inf if profile == "pgs" else 2.0 * CONTACT_OFFSET
+        return rounded_law(metric, Method(Threshold(least), ahead=ahead))(scene, dt, measure)
+
+    return law
+
+
+def wall_law(metric: str, profile: str) -> Law:
+    """What no step finds in a thin wall passes it; what one finds rebounds as any other blow."""
+    passing, blow = passing_law(metric, PLACES), blow_law(metric, profile)
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        passed = passing(scene, dt, measure)
+        return blow(scene, dt, measure) if passed is None else passed
+
+    return law
+
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "physx",
+        (profile,),
+        scene,
+        exactly(metric),
+        blow_law(metric, profile),
+        "no approach of up to 2 m/s rebounds as shipped, and numbers are singles, 2^-24 of their size",
+        "PxSceneDesc, bounceThresholdVelocity; motion in adapters/single_precision.py",
+        _RELEASES,
+    )
+    for profile in PROFILES
+    for scene, metrics in BLOWS.items()
+    if profile != "tuned" or scene not in CROWDED
+    for metric in metrics
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "physx",
+        (profile,),
+        "thin_wall",
+        metric,
+        wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
+        "nothing is swept: what is on one side of a thin body where a step ends, and on the other where the next one "
+        "does, passes",
+        "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
+        _RELEASES,
+    )
+    for profile in PROFILES
+    for metric in ("rebound_ratio", "beyond")
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "physx",
+        (profile,),
+        "far_origin",
+        "stopping_distance",
+        standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
+        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "PxTransform, built of floats; motion in adapters/single_motions.py",
+        _RELEASES,
+    )
+    for profile in PROFILES
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "physx",
+        tuple(PROFILES),
+        scene,
+        "momentum_defect",
+        kept_law("momentum_defect"),
+        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "PxVec3, built of floats; band in adapters/single_motions.py",
+        _RELEASES,
+    )
+    for scene in ("cradle", "rack")
+)

@@ -1,0 +1,104 @@
+"""Profiles of PhysX: settings with their reasons.
+
+default   as SAPIEN ships it: TGS, which makes a small step of each sweep
+pgs       the same with projected Gauss-Seidel, PhysX's own default
+tuned     TGS without losses, with friction and rebounds wherever bodies touch
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+from adapters import settings
+from adapters.engine import ProfileRule, Setting
+from adapters.needs import Needs
+from adapters.physx.shipped import (
+    ANGULAR_DAMPING,
+    BOUNCE_THRESHOLD,
+    CONTACT_OFFSET,
+    FASTEST_SPIN,
+    ITERATIONS,
+    PUSH_OUT,
+    TOLERANCE_LENGTH,
+    VELOCITY_ITERATIONS,
+)
+
+#: What the engine can count: iterations are bytes. [PxRigidDynamic.setSolverIterationCounts]
+MOST_ITERATIONS = 255
+KINDS: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "solver": settings.word("tgs", "pgs"),
+        "iterations": settings.whole(1, MOST_ITERATIONS),
+        "velocity_iterations": settings.whole(0, MOST_ITERATIONS),
+        "bounce_threshold": settings.number(1e-30, 1e30),
+        "contact_offset": settings.number(1e-9, 1e9),
+        "tolerance_length": settings.number(1e-6, 1e9),
+        "push_out": settings.number(1e-6, 1e32),
+        "angular_damping": settings.number(0.0, 1e6),
+        "fastest_spin": settings.number(0.0, 1e15),
+        "friction_every_iteration": settings.flag,
+        "persistent_manifolds": settings.flag,
+    }
+)
+_BODY, _SCENE, _SHAPE = "sapien.physx.get_body_config", "sapien.physx.get_scene_config", "sapien.physx.get_shape_config"
+
+
+def _shipped(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
+    said = "as shipped"
+    return [
+        Setting("solver", solver, why, _SCENE),
+        Setting("iterations", ITERATIONS, f"{said}: sweeps that move bodies; small steps of TGS", _BODY),
+        Setting("velocity_iterations", VELOCITY_ITERATIONS, f"{said}: sweeps over velocities alone", _BODY),
+        Setting("bounce_threshold", BOUNCE_THRESHOLD, f"{said}: slower approaches do not rebound [m/s]", _SCENE),
+        Setting("contact_offset", CONTACT_OFFSET, f"{said}: contacts are made so far ahead, of each shape", _SHAPE),
+        Setting("tolerance_length", TOLERANCE_LENGTH, f"{said}: friction needs a gap below 0.04 of it", "PhysxEngine"),
+        Setting("push_out", PUSH_OUT, f"{said}: overlaps are pushed out at any speed", "PhysxRigidDynamicComponent"),
+        Setting(
+            "angular_damping", ANGULAR_DAMPING, f"{said}: share of a spin per second", "PhysxRigidDynamicComponent"
+        ),
+        Setting("fastest_spin", FASTEST_SPIN, f"{said}: no body turns faster [rad/s]", "PhysxRigidDynamicComponent"),
+        Setting("friction_every_iteration", True, said, _SCENE),
+        Setting("persistent_manifolds", True, f"{said}: PCM", _SCENE),
+    ]
+
+
+def least_rebound(needs: Needs, dt: float) -> float:
+    """Speed of approach up to which nothing rebounds in `tuned` [m/s].
+
+    What a step of gravity brings about is no impact: a body at rest would hop.
+    """
+    return max(2.0 * needs.gravity * dt, 1e-4)
+
+
+def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Best stock settings for what the scene needs."""
+    least = least_rebound(needs, dt)
+    ahead = max(CONTACT_OFFSET, needs.top_speed * dt)
+    changed = {
+        "iterations": (50, "more small steps and sweeps, for loads on light bodies", "measured: columns"),
+        "bounce_threshold": (least, "what rests does not hop: twice the speed of a step of gravity", "derived"),
+        "tolerance_length": (ahead / 0.04, "friction for every contact that a step makes", "measured: blows"),
+        "angular_damping": (0.0, "no loss that nobody asked for", "PhysxRigidDynamicComponent"),
+        "fastest_spin": (1e9, "100 rad/s as shipped: small bodies turn faster", "PhysxRigidDynamicComponent"),
+    }
+    return [
+        Setting(each.name, *changed[each.name]) if each.name in changed else each
+        for each in _shipped("tgs", "as shipped: a sweep of TGS is a small step", needs, dt)
+    ]
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType(
+    {
+        "default": partial(_shipped, "tgs", "as SAPIEN ships it: small steps, one sweep each"),
+        "pgs": partial(_shipped, "pgs", "PhysX's own default: sweeps over one step, as in a textbook"),
+        "tuned": tuned_profile,
+    }
+)
+
+
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("physx", KINDS, asked)

@@ -1,0 +1,216 @@
+"""One PhysX world and what is read from it: velocities before positions; contacts are of the step's start."""
+
+from __future__ import annotations
+
+import warnings
+import weakref
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from adapters.drives import place_after, velocity_over
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.impulses import along_normal
+from adapters.physx.translation import means, turn_to, turned
+from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
+
+#: Worlds that live, and the size each was made for: the engine beneath them is one per process.
+_LIVING: weakref.WeakKeyDictionary[PhysxSimulation, float] = weakref.WeakKeyDictionary()
+
+
+@cache
+def imported() -> ModuleType:
+    """Import the engine; that it finds no Vulkan to draw with does not matter here."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import sapien
+    return sapien
+
+
+class PhysxSimulation(Simulation):
+    """One CPU world; bodies in the scene's order, each an entity of its own."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        sapien: Any = imported()
+        self.scene, self.dt, self.settings = scene, dt, settings
+        length = settings["tolerance_length"]
+        if other := next((held for held in _LIVING.values() if held != length), None):
+            raise EngineError(f"tolerance_length: {length:g} m, while a world of this process is made for {other:g} m")
+        self.engine: Any = sapien.physx.PhysxEngine(length, 0.2)
+        _LIVING[self] = length
+        self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
+        self.restitutions, self.frictions = means(scene, "restitution") or [], means(scene, "friction") or []
+        sapien.physx.set_scene_config(
+            gravity=np.array(scene.gravity, np.float32),
+            bounce_threshold=settings["bounce_threshold"],
+            enable_pcm=settings["persistent_manifolds"],
+            enable_tgs=settings["solver"] == "tgs",
+            enable_ccd=False,
+            enable_enhanced_determinism=False,
+            enable_friction_every_iteration=settings["friction_every_iteration"],
+            cpu_workers=0,
+        )
+        self.system: Any = sapien.physx.PhysxCpuSystem()
+        self.system.timestep = dt
+        self.world: Any = sapien.Scene([self.system])
+        self.bodies: list[Any] = []
+        for index, body in enumerate(scene.bodies):
+            self.bodies.append(self._made(sapien, index, body))
+        self.index = {f"body {index}": index for index in range(len(scene.bodies))}
+        loaded = zip(self.bodies, scene.bodies, strict=True)
+        self.loads = [
+            (part, body.force, body.torque)
+            for (_, part), body in loaded
+            if body.motion == "free" and (any(body.force) or any(body.torque))
+        ]
+        self.driven = [k for k, body in enumerate(scene.bodies) if body.motion == "prescribed"]
+        self.steps = 0
+
+    def _made(self, sapien: Any, index: int, asked: Body) -> tuple[Any, Any]:
+        """Entity and body of one of the scene's bodies."""
+        physx, settings = sapien.physx, self.settings
+        entity = sapien.Entity()
+        entity.name = f"body {index}"
+        fixed = asked.motion == "fixed"
+        part = physx.PhysxRigidStaticComponent() if fixed else physx.PhysxRigidDynamicComponent()
+        shape = self._shape(physx, index, asked)
+        shape.contact_offset = settings["contact_offset"]
+        shape.rest_offset = 0.0
+        part.attach(shape)
+        if not fixed:
+            part.kinematic = asked.motion == "prescribed"
+            part.sleep_threshold = 0.0
+            part.solver_position_iterations = settings["iterations"]
+            part.solver_velocity_iterations = settings["velocity_iterations"]
+            part.linear_damping, part.angular_damping = 0.0, settings["angular_damping"]
+            part.max_angular_velocity = settings["fastest_spin"]
+            part.max_depenetration_velocity = settings["push_out"]
+        if asked.motion == "free":
+            part.mass, part.inertia = asked.mass, asked.inertia
+            part.linear_velocity, part.angular_velocity = asked.twist[:3], asked.twist[3:]
+        entity.add_component(part)
+        if isinstance(asked.shape, HalfSpace):
+            normal, offset = asked.shape.normal, asked.shape.offset
+            entity.pose = sapien.Pose([offset * n for n in normal], list(turn_to(normal)))
+        else:
+            entity.pose = sapien.Pose(list(asked.pose[:3]), list(asked.pose[3:]))
+        self.world.add_entity(entity)
+        return entity, part
+
+    def _shape(self, physx: Any, index: int, asked: Body) -> Any:
+        friction = self.frictions[index]
+        material = physx.PhysxMaterial(friction, friction, self.restitutions[index])
+        shape = asked.shape
+        if isinstance(shape, HalfSpace):
+            return physx.PhysxCollisionShapePlane(material)
+        if isinstance(shape, Sphere):
+            return physx.PhysxCollisionShapeSphere(shape.radius, material)
+        if isinstance(shape, Capsule):
+            return physx.PhysxCollisionShapeCapsule(shape.radius, shape.half_length, material)
+        if isinstance(shape, Hull):
+            held = physx.PhysxCollisionShapeConvexMesh(np.array(shape.vertices, np.float32), (1.0, 1.0, 1.0), material)
+            if len(held.vertices) != len(shape.vertices):
+                raise EngineError(f"{asked.name}.shape: physx keeps {len(held.vertices)} of its vertices")
+            return held
+        assert isinstance(shape, Box)
+        return physx.PhysxCollisionShapeBox(shape.half_extents, material)
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`; loads are cleared by every step, and a prescribed body is told where to be."""
+        step = self.system.step
+        for _ in range(steps):
+            for part, force, torque in self.loads:
+                part.add_force_torque(force, torque)
+            self.steps += 1
+            for k in self.driven:
+                self._lead(k)
+            step()
+
+    def _lead(self, k: int) -> None:
+        """Say where a prescribed body is at the end of the step that comes."""
+        body, time = self.scene.bodies[k], self.steps * self.dt
+        place = place_after(body, time)
+        self.bodies[k][1].kinematic_target = imported().Pose(
+            list(place), list(turned(body.pose[3:], body.twist[3:], time))
+        )
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`; a half-space's own pose is the origin."""
+        rows = []
+        for (entity, _), asked in zip(self.bodies, self.scene.bodies, strict=True):
+            held = entity.pose
+            rows.append(asked.pose if isinstance(asked.shape, HalfSpace) else (*held.p, *held.q))
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`; a prescribed body's is told as soon as it has made a step."""
+        rows: list[tuple[float, ...]] = []
+        for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True):
+            if asked.motion == "fixed":
+                rows.append((0.0,) * 6)
+            elif asked.motion == "prescribed" and self.steps == 0:
+                rows.append((*velocity_over(asked, self.dt, 0), *asked.twist[3:]))
+            else:
+                rows.append((*part.linear_velocity, *part.angular_velocity))
+        return np.array(rows, float)
+
+    def contacts(self) -> Contacts:
+        """Points with normal impulses, on the first body, along a normal that points to it; friction is not told."""
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for contact in self.system.get_contacts():
+            first, second = (self.index[part.entity.name] for part in contact.bodies)
+            rough = self.materials.get((min(first, second), max(first, second)), (0.0, 0.0))[1] > 0.0
+            for point in contact.points:
+                normal = point.normal.astype(float)
+                impulse = along_normal(float(point.impulse @ point.normal), normal, rough)
+                rows.append((second, first, point.position, normal, impulse, float(point.separation)))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 3)
+
+    def readback(self) -> dict[str, Any]:
+        """What the world, its bodies and their materials hold; the size it was made for is not told again."""
+        config = self.system.config
+        parts = {
+            asked.name: part
+            for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True)
+            if asked.motion == "free"
+        }
+        held = [part.collision_shapes[0].physical_material for _, part in self.bodies]
+        return {
+            "dt": float(self.system.timestep),
+            "gravity": [float(g) for g in config.gravity],
+            "solver": "tgs" if config.enable_tgs else "pgs",
+            "bounce_threshold": float(config.bounce_threshold),
+            "friction_every_iteration": bool(config.enable_friction_every_iteration),
+            "persistent_manifolds": bool(config.enable_pcm),
+            "contact_offset": [float(part.collision_shapes[0].contact_offset) for _, part in self.bodies],
+            "bodies": {
+                name: {
+                    "mass": float(part.mass),
+                    "inertia": [float(x) for x in part.inertia],
+                    "damping": [float(part.linear_damping), float(part.angular_damping)],
+                    "iterations": int(part.solver_position_iterations),
+                    "velocity_iterations": int(part.solver_velocity_iterations),
+                    "fastest_spin": float(part.max_angular_velocity),
+                    "push_out": float(part.max_depenetration_velocity),
+                    "sleep_threshold": float(part.sleep_threshold),
+                }
+                for name, part in parts.items()
+            },
+            "pairs": {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": 0.5 * float(held[i].restitution + held[j].restitution),
+                    "friction": 0.5 * float(held[i].dynamic_friction + held[j].dynamic_friction),
+                }
+                for i, j in self.materials
+            },
+        }
+
+    def close(self) -> None:
+        """Give the world back: the next one may be made for another size."""
+        self.bodies, self.loads = [], []
+        self.world = self.system = self.engine = None
+        _LIVING.pop(self, None)
