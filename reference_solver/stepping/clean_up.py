@@ -10,9 +10,10 @@ from reference_solver.stepping.lasting import BODIES, CONTACTS, SLIP, STAGES, TA
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.operations import Bodies, displace, displacement_rate, evaluate, is_free
 
-#: Times that friction is taken back into its cone: each leaves of an excess as much as normal and tangential impulses
-#: share. What is less than this share of friction is round-off of sums.
-CONES, WITHIN = 8, 1e-14
+#: Times that friction is taken back into its cone: each leaves of an excess what normal impulses of this contact and of
+#: others share with it, which is less than half unless they are steep. What is less than this share of friction is
+#: round-off of sums.
+CONES, WITHIN = 40, 1e-14
 
 
 @inner_kernel

@@ -20,8 +20,8 @@ OPEN, STICK, SLIP = 0, 1, 2
 MOST_ROWS = 64
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
-#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a line or a face, and how far
-#: the normal still looks out of an edge or a corner. What comes over an edge starts at the one, and may pass the other.
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a line or a face, how far
+#: the normal looks out of an edge or a corner. What comes over an edge starts at the one, and may pass the other.
 LOAD, GRIP, ONWARD, FEATURE, OUTLOOK = 0, 1, 2, 3, 4
 MONITORS = 5
 #: Places in `Lasting.monitor`: start of the phase; near and far end of a search; the step made last; its stages.
