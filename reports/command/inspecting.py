@@ -44,7 +44,9 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
         profile = profile or registry.profile_of(engine, "solution")
         if profile is None:
             raise EngineError(f"profile: {engine} has none that promises a solution; name one with --profile")
-        found = detection(registry.load(engine), profile, 2)
+        best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if name != engine]
+        others = [(registry.load(name), tuned) for name, tuned in best if tuned and registry.find(name).engine]
+        found = detection(registry.load(engine), profile, 2, others=others)
         data = list(lines(found.seen))
     elif what == "runs":
         store = Store(out, create=False)

@@ -14,11 +14,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from adapters.engine import Engine
+from adapters.engine import Engine, EngineError
 from adapters.needs import needs
 from adapters.planted_faults import SIZED, Planted
 from adapters.receipts import receipts
-from adapters.stepping import run
+from adapters.scene import Scene
+from adapters.stepping import posed_for, run
 from adapters.trajectory import Measured
 from validation.canonical import Params
 from validation.catalogue import CATALOGUE
@@ -87,13 +88,18 @@ class Watched:
 Watchers = dict[str, Watched]
 
 
-def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT) -> Detected:
+def detection(
+    engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT, others: Iterable[tuple[Engine, str]] = ()
+) -> Detected:
     """Plant every fault in ``engine``, and say what sees it from which size on.
 
     Parameters
     ----------
     engine, profile
         Healthy: whatever it fails without a fault sees nothing, and is left out.
+    others
+        Engines with their profiles: the first that can pose it takes a scene that ``engine`` cannot. What none of them
+        can is left out.
 
     Returns
     -------
@@ -101,15 +107,21 @@ def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT
     """
     seen: dict[tuple[str, str, str], float | None] = {}
     missed: dict[tuple[str, str, str], tuple[float, float]] = {}
+    candidates = [(engine, profile), *others]
     there = {name: canonical for name, canonical in CATALOGUE.items() if dimension in canonical.dimensions}
     cells = [(name, params) for name, canonical in there.items() for params in canonical.planted]
     for scene, params in cells:
-        healthy = _watchers(engine, profile, scene, params, dimension, dt)
+        made = CATALOGUE[scene].scene(dimension, params)
+        able = [pair for pair in candidates if _can_pose(pair[0], made)]
+        if not able:
+            continue
+        taken, own_profile = able[0]
+        healthy = _watchers(taken, own_profile, scene, params, dimension, dt)
         primary = _primary(scene, params, dimension, dt, healthy)
         for fault in SIZED:
             smallest: dict[str, float] = {}
             for size in sorted(SIZES, reverse=True):
-                faulty = _watchers(Planted(engine, fault, size), profile, scene, params, dimension, dt)
+                faulty = _watchers(Planted(taken, fault, size), own_profile, scene, params, dimension, dt)
                 smallest |= {name: size for name, own in healthy.items() if own.holds and not faulty[name].holds}
                 if size == ONE_PER_CENT and fault in ASKED:
                     for name, found in _missed(primary, healthy, faulty):
@@ -122,6 +134,15 @@ def detection(engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT
                     sizes = [s for s in (seen.get(key), smallest.get(name)) if s is not None]
                     seen[key] = min(sizes, default=None)
     return Detected([Seen(*key, size) for key, size in seen.items()], list(_blind(seen, missed)))
+
+
+def _can_pose(engine: Engine, scene: Scene) -> bool:
+    """Whether the engine has what the scene asks."""
+    try:
+        posed_for(engine, scene)
+    except EngineError:
+        return False
+    return True
 
 
 def _missed(primary: Iterable[str], healthy: Watchers, faulty: Watchers) -> Iterator[tuple[str, tuple[float, float]]]:
