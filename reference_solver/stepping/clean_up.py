@@ -13,7 +13,7 @@ from reference_solver.stepping.operations import Bodies, displace, displacement_
 #: Times that friction is taken back into its cone: each leaves of an excess what normal impulses of this contact and of
 #: others share with it, which is less than half unless they are steep. What is less than this share of friction is
 #: round-off of sums.
-CONES, WITHIN = 40, 1e-14
+CONES, WITHIN = 24, 1e-13
 
 
 @inner_kernel

@@ -13,6 +13,9 @@ from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 TURNED = 0.5
 #: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
 BEARABLE = 0.4
+#: Share of what the more yielding body does that the other one does, below which what holds it still is asked for: that
+#: is a solve of all rows. Above it c is ten times too large at most, and how fast a slow slip settles hangs on it only.
+FAR_LIGHTER = 0.1
 #: An acceleration turns a slip no more than round-off does if this share of it is across.
 STRAIGHT = 1e-6
 
@@ -54,7 +57,11 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     across, moment = math.sqrt(max(size - onward**2, 0.0)), lasting.length[0]
     if across * moment <= STRAIGHT * max(math.sqrt(size) * moment, speed) or speed >= BEARABLE * moment * force:
         return False
-    without_friction(lasting, k)  # what the rows that are held take of it is no part of c: a light body may be stuck
+    if has_light_body(lasting, k):
+        without_friction(lasting, k)
+    else:
+        for t in range(lasting.size[TANGENTS]):
+            lasting.wanted[t] = slip_gain(lasting, k, t) + removed(lasting, k, k, 1 + t)
     push, force, along = 0.0, 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
         push += lasting.wanted[t] ** 2
@@ -98,6 +105,24 @@ def removed(lasting: Lasting, k: int, other: int, row: int) -> float:
                     change = lasting.response[k, own, 1 + t, d] * lasting.force[k, 1 + t]
                     total -= lasting.jacobian[other, side, row, d] * change
     return total
+
+
+@inner_kernel
+def has_light_body(lasting: Lasting, k: int) -> bool:
+    """Whether one body of contact k gives way to its friction far more than the other: if it is stuck it does not."""
+    least, most = math.inf, 0.0
+    for side in range(2):
+        total = 0.0
+        for row in range(1, 1 + lasting.size[TANGENTS]):
+            share = 0.0
+            for d in range(lasting.size[VELOCITIES]):
+                for t in range(lasting.size[TANGENTS]):
+                    change = lasting.response[k, side, 1 + t, d] * lasting.force[k, 1 + t]
+                    share += lasting.jacobian[k, side, row, d] * change
+            total += share**2
+        if total > 0.0:  # a body that moves
+            least, most = min(least, total), max(most, total)
+    return least < FAR_LIGHTER**2 * most
 
 
 @inner_kernel
