@@ -123,6 +123,7 @@ OTHER_WORDS = {
     ("reports/palette.py", "one"): "a role",
     ("reports/palette.py", "tuned"): "a role",
     ("reports/page/choosing.py", "tuned"): "a role",
+    ("reports/command/inspecting.py", "tuned"): "a role",
     ("reports/command/tuning.py", "tuned"): "a role",
     ("reports/tables.py", "default"): "the default of a parameter",
 }

@@ -44,9 +44,10 @@ from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, is_patient
+from reference_solver.stepping.clock import HELD, LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -61,6 +62,7 @@ from reference_solver.stepping.impacts import (
 )
 from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
+    FROZEN,
     LATE,
     NEARLY,
     NOISE,
@@ -264,7 +266,8 @@ def row_turn(bodies: Bodies, rows: Rows, sub: SubStep, c: int, share: float) -> 
 def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``length`` of it.
+    ``bodies.twist`` are the velocities after ``length`` of it. Where rows turn, contacts are held no longer than their
+    series lasts (`SERIES`).
     """
     left = sub.clock[LEFT]
     new = False
@@ -289,6 +292,8 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
                 continue
             rows.integer[c, ENDING] = SERIES_ENDS
+            if FROZEN < rate * lasts <= BRIEFLY:
+                sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             new = True
         elif returns * BOUNCES < left:
             rows.integer[c, ENDING] = RELEASED

@@ -16,9 +16,10 @@ from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
-from reference_solver.stepping.clock import LEFT, is_patient
+from reference_solver.stepping.clock import LEFT, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
+    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -32,7 +33,7 @@ from reference_solver.stepping.impacts import (
     drifts_aside,
     turns_aside,
 )
-from reference_solver.stepping.noise import NOISE, SPEED_SHARE, UNSOLVED
+from reference_solver.stepping.noise import FROZEN, NOISE, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
@@ -196,7 +197,8 @@ def row_turn(bodies: Bodies, manifolds: Manifolds, m: int, slip: float, share: f
 def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``time`` of it.
+    ``bodies.twist`` are the velocities after ``time`` of it. Where rows turn, contacts are held no longer than their
+    series lasts (`SERIES`).
     """
     left = sub_step.clock[LEFT]
     new = False
@@ -223,6 +225,8 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 if aside > SERIES_DRIFT * extent and is_patient(sub_step.clock):
                     continue
                 manifolds.ending[m, p] = SERIES_ENDS
+                if FROZEN < rate * lasts <= BRIEFLY:
+                    sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 new = True
             elif 2.0 * leaves * BOUNCES < pull * left:
                 manifolds.ending[m, p] = RELEASED

@@ -6,10 +6,14 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.clean_up import clean_up, give
 from reference_solver.stepping.equalities import (
     CONTRADICTORY,
+    assemble,
     force_contacts,
+    list_rows,
+    push,
+    row_value,
+    solve_rows,
 )
 from reference_solver.stepping.lasting import (
     BETWEEN,
@@ -24,7 +28,6 @@ from reference_solver.stepping.lasting import (
     NEAR,
     ONWARD,
     OPEN,
-    OUTLOOK,
     SLIP,
     STAGES,
     START,
@@ -33,8 +36,8 @@ from reference_solver.stepping.lasting import (
     VELOCITIES,
     Lasting,
 )
-from reference_solver.stepping.modes import decide, friction_size, inverse_mass, normal_gain, set_slip
-from reference_solver.stepping.noise import FORCE_NOISE, LOCATED
+from reference_solver.stepping.modes import decide, friction_size, inverse_mass, set_slip
+from reference_solver.stepping.noise import FORCE_NOISE, NOISE
 from reference_solver.stepping.operations import (
     Bodies,
     displace,
@@ -43,8 +46,8 @@ from reference_solver.stepping.operations import (
     evaluate,
     feature_limit,
     free_accelerations,
+    is_free,
 )
-from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
 
 # Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
 #: Times of the stages, as shares of the step.
@@ -73,8 +76,16 @@ SAFETY = 0.8
 LENGTHS = 24
 #: Steps in search of the end of a mode.
 SEARCHES = 40
+#: A monitor this small, as a share of what it is measured against, is at its end.
+LOCATED = 1e-13
 #: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
 SURELY = 1e-6
+#: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
+TURNED = 0.5
+#: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
+BEARABLE = 0.4
+#: An acceleration turns a slip no more than round-off does if this share of it is across.
+STRAIGHT = 1e-6
 #: Relative accuracy of that instant.
 SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
@@ -104,6 +115,70 @@ def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
         if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
             steadied = steady_slip(lasting, k) or steadied
     return not steadied or force_contacts(lasting) != CONTRADICTORY
+
+
+@inner_kernel
+def follow_slip(lasting: Lasting, k: int) -> None:
+    """Direction of a slip that may turn; the last known of one that has all but ended, or turns round.
+
+    A slip that comes to its end does not pass zero, but under friction along its last direction it does: what is along
+    that changes sign at the end, as in the plane.
+    """
+    speed, onward = 0.0, 0.0
+    for t in range(lasting.size[TANGENTS]):
+        speed += lasting.speed[k, 1 + t] ** 2
+        onward += lasting.speed[k, 1 + t] * lasting.direction[k, t]
+    speed = math.sqrt(speed)
+    if speed > NOISE * lasting.speeds[k] and onward > TURNED * speed:
+        for t in range(lasting.size[TANGENTS]):
+            lasting.direction[k, t] = lasting.speed[k, 1 + t] / speed
+
+
+@inner_kernel
+def steady_slip(lasting: Lasting, k: int) -> bool:
+    """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
+
+    With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
+    f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
+    which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
+    slip does not turn, and off by no more than it turns in that moment. What accelerates along its direction keeps it.
+    """
+    speed, push, force, along, size, onward = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for t in range(lasting.size[TANGENTS]):
+        friction = 0.0
+        for other in range(lasting.size[TANGENTS]):
+            for side in range(2):
+                for d in range(lasting.size[VELOCITIES]):
+                    share = lasting.jacobian[k, side, 1 + t, d] * lasting.response[k, side, 1 + other, d]
+                    friction -= share * lasting.force[k, 1 + other]
+        gain = row_value(lasting, k, 1 + t, lasting.acceleration) + lasting.gamma[k, 1 + t]
+        lasting.wanted[t] = gain + friction
+        size += gain**2
+        onward += gain * lasting.direction[k, t]
+        speed += lasting.speed[k, 1 + t] ** 2
+        push += lasting.wanted[t] ** 2
+        force += friction**2
+        along += lasting.wanted[t] * lasting.speed[k, 1 + t]
+    speed, push, force = math.sqrt(speed), math.sqrt(push), math.sqrt(force)
+    across, moment = math.sqrt(max(size - onward**2, 0.0)), lasting.length[0]
+    if across * moment <= STRAIGHT * max(math.sqrt(size) * moment, speed):
+        return False
+    if force == 0.0 or speed >= BEARABLE * lasting.length[0] * force or push < TURNED * force:
+        return False
+    if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
+        return False
+    size = onward = 0.0
+    for t in range(lasting.size[TANGENTS]):
+        moment = BEARABLE * lasting.length[0] - speed / force
+        lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
+        size += lasting.wanted[t] ** 2
+        onward += lasting.wanted[t] * lasting.direction[k, t]
+    size = math.sqrt(size)
+    if onward < TURNED * size:  # it has come to its end
+        return False
+    for t in range(lasting.size[TANGENTS]):
+        lasting.direction[k, t] = lasting.wanted[t] / size
+    return True
 
 
 @inner_kernel
@@ -157,9 +232,6 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
-    for k in range(lasting.size[CONTACTS]):
-        for d in range(lasting.normal.shape[1]):
-            lasting.normal[k, d] = lasting.frame[k, 0, d]
     keep_slopes(bodies, lasting, 0)
     bend_paths(bodies, lasting, 0)
     watch(bodies, lasting, START)
@@ -234,6 +306,28 @@ def weigh_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
 
 
 @inner_kernel
+def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> None:
+    """Enter an impulse along a row of contact k: in world axes, its work, and that of surfaces that are moved."""
+    if size == 0.0:
+        return
+    for d in range(lasting.impulse.shape[1]):
+        lasting.impulse[k, d] += size * lasting.frame[k, row, d]
+    axes, b = lasting.impulse.shape[1], lasting.body[k, 1]
+    for d in range(lasting.moment.shape[1]):
+        # The row's lever about the centre of B, and the centre's about the origin.
+        first, second = ((d + 1) % 3, (d + 2) % 3) if axes == 3 else (0, 1)
+        lever = bodies.pose[b, first] * lasting.frame[k, row, second]
+        lever -= bodies.pose[b, second] * lasting.frame[k, row, first]
+        lasting.moment[k, d] += size * (lever + lasting.jacobian[k, 1, row, axes + d])
+    lasting.work[k, 0] += size * lasting.speed[k, row]
+    for side in range(2):
+        i = lasting.body[k, side]
+        if not is_free(bodies, i):
+            for d in range(lasting.size[VELOCITIES]):
+                lasting.work[k, 1] -= size * lasting.jacobian[k, side, row, d] * bodies.twist[i, d]
+
+
+@inner_kernel
 def relative_error(lasting: Lasting, length: float) -> float:
     """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
 
@@ -280,6 +374,61 @@ def missed_and_moved(lasting: Lasting, length: float, first: int, last: int) -> 
 
 
 @inner_kernel
+def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
+    """Close the gaps of pressed contacts, and take out what velocities miss of their rows; both by M^-1 G^T."""
+    evaluate(bodies, lasting)
+    for _ in range(2):
+        if not project(bodies, lasting, True):
+            return False
+        evaluate(bodies, lasting)
+    return project(bodies, lasting, False)
+
+
+@inner_kernel
+def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
+    """Project poses on closed gaps, or velocities on the rows that are held (an orthogonal projection).
+
+    Without the friction of slips: near a jam what that brings along has no bound.
+    """
+    kept = list_rows(lasting)
+    count = 0
+    for i in range(kept):
+        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
+        if poses and row > 0:
+            continue
+        lasting.unknown[count, 0], lasting.unknown[count, 1] = k, row
+        lasting.right[count] = -lasting.gap[k] if poses else -lasting.speed[k, row]
+        count += 1
+    if count == 0:
+        return True
+    assemble(lasting, count, False)
+    solve_rows(lasting, count, 0.0)
+    for i in range(lasting.size[BODIES]):
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.acceleration[i, d] = 0.0
+    for i in range(count):
+        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
+        push(lasting, lasting.acceleration, k, row, lasting.answer[i])
+        if not poses:
+            give(bodies, lasting, k, row, lasting.answer[i])
+    for i in range(lasting.size[BODIES]):
+        if not is_free(bodies, i):
+            continue
+        for d in range(lasting.size[VELOCITIES]):
+            if poses:
+                lasting.spin[d], bodies.twist[i, d] = bodies.twist[i, d], lasting.acceleration[i, d]
+            else:
+                bodies.twist[i, d] += lasting.acceleration[i, d]
+        if poses:
+            displacement_rate(bodies, lasting, i, STAGES - 1)
+            for d in range(lasting.size[VELOCITIES]):
+                lasting.displacement[i, d] += lasting.rate[STAGES - 1, i, d]
+                bodies.twist[i, d] = lasting.spin[d]
+            displace(bodies, lasting, i)
+    return True
+
+
+@inner_kernel
 def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
     """Monitors of the evaluated state: none may fall below zero while modes are what they are."""
     for k in range(lasting.size[CONTACTS]):
@@ -297,26 +446,23 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
             for t in range(lasting.size[TANGENTS]):
                 along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
             monitor[ONWARD] = along / lasting.speeds[k]
-        monitor[FEATURE] = feature_limit(bodies, lasting, k, False) / lasting.extent[k]
-        monitor[OUTLOOK] = feature_limit(bodies, lasting, k, True) / lasting.extent[k]
+        monitor[FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
 
 
 @inner_kernel
 def keep_limits(bodies: Bodies, lasting: Lasting) -> None:
     """Keep how far all contacts are from where their features end, at the start of a path."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(FEATURE, OUTLOOK + 1):
-            lasting.monitor[START, k, m] = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
+        lasting.monitor[START, k, FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
 
 
 @inner_kernel
 def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
     """Whether the features of any contact end between there and here: it goes on with others, or parts."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(FEATURE, OUTLOOK + 1):
-            limit = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
-            if lasting.monitor[START, k, m] >= -FORCE_NOISE and limit < -FORCE_NOISE:
-                return True
+        limit = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        if lasting.monitor[START, k, FEATURE] >= -FORCE_NOISE and limit < -FORCE_NOISE:
+            return True
     return False
 
 
@@ -376,7 +522,7 @@ def end_first(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
     """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
-    if what == LOAD or what >= FEATURE:
+    if what == LOAD or what == FEATURE:
         lasting.mode[which] = OPEN
     elif what == ONWARD:
         lasting.mode[which], lasting.slides[which] = STICK, 0
@@ -449,26 +595,31 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
 
 
 @inner_kernel
+def stops_across(lasting: Lasting) -> bool:
+    """Whether a slip that comes to its end along its last direction has turned, and goes on across it.
+
+    How a slip turns while it ends is a power of the time left: a step over the end itself is of no order, steps that
+    halve that time are. What is left in the end is round-off, and sticks.
+    """
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] != SLIP or lasting.friction[k] == 0.0 or lasting.size[TANGENTS] == 1:
+            continue
+        if lasting.monitor[START, k, ONWARD] > FORCE_NOISE and lasting.monitor[LAST, k, ONWARD] <= LOCATED:
+            speed, along = 0.0, 0.0
+            for t in range(lasting.size[TANGENTS]):
+                speed += lasting.speed[k, 1 + t] ** 2
+                along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
+            if math.sqrt(max(speed - along**2, 0.0)) > NOISE * lasting.speeds[k]:
+                return True
+    return False
+
+
+@inner_kernel
 def soften(lasting: Lasting, place: int) -> None:
     """Halve what is kept of one end of a bracket."""
     for k in range(lasting.size[CONTACTS]):
         for m in range(MONITORS):
             lasting.monitor[place, k, m] *= 0.5
-
-
-@inner_kernel
-def first_return(lasting: Lasting, left: float) -> float:
-    """Until when contacts that part by less than what is seen of a gap have come back, ``left`` at most [s].
-
-    Held from the start they would be pulled. They fly, and land with the speed that they left with: an impact, whose
-    law knows cone and sign.
-    """
-    first = left
-    for k in range(lasting.size[CONTACTS]):
-        gain = normal_gain(lasting, k)
-        if lasting.parts[k] == 1 and gain < 0.0:
-            first = min(first, -2.0 * lasting.speed[k, 0] / gain)
-    return first
 
 
 @inner_kernel
@@ -483,9 +634,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     if not decide(lasting) or not start_slopes(bodies, lasting):
         go_back(bodies, lasting)
         return 0.0, FAILED
-    length, outcome = first_return(lasting, left), WHOLE
-    if length < left:
-        left, outcome = length, SHORTENED
+    length, outcome = left, WHOLE
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
         error = step_phase(bodies, lasting, length)
         if error < 0.0:

@@ -40,7 +40,10 @@ def settings_of(engine, scene):
 def scenes_of(engine):
     for canonical in CATALOGUE.values():
         for dimension in canonical.dimensions:
-            scene = posed_for(engine, canonical.scene(dimension))
+            try:
+                scene = posed_for(engine, canonical.scene(dimension))
+            except EngineError:  # asks for what it has no ability for
+                continue
             if not engine.refuses(scene, "default"):
                 yield scene
 
