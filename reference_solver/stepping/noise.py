@@ -47,3 +47,5 @@ TOUCHING = 1e-9
 #: Velocities that differ from those the impulses give by more than this share of all that these can do are mended: some
 #: fifty units in the last place, which is what summing the impulses of a body costs itself.
 MENDED = 1e-14
+#: What is watched while modes are held is at its end where it is this small a share of what it is measured against.
+LOCATED = 1e-13

@@ -12,7 +12,6 @@ from reference_solver.stepping.equalities import (
     force_contacts,
     list_rows,
     push,
-    row_value,
     solve_rows,
 )
 from reference_solver.stepping.lasting import (
@@ -37,7 +36,7 @@ from reference_solver.stepping.lasting import (
     Lasting,
 )
 from reference_solver.stepping.modes import decide, friction_size, inverse_mass, set_slip
-from reference_solver.stepping.noise import FORCE_NOISE, NOISE
+from reference_solver.stepping.noise import FORCE_NOISE, LOCATED
 from reference_solver.stepping.operations import (
     Bodies,
     displace,
@@ -48,6 +47,7 @@ from reference_solver.stepping.operations import (
     free_accelerations,
     is_free,
 )
+from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
 
 # Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
 #: Times of the stages, as shares of the step.
@@ -76,16 +76,8 @@ SAFETY = 0.8
 LENGTHS = 24
 #: Steps in search of the end of a mode.
 SEARCHES = 40
-#: A monitor this small, as a share of what it is measured against, is at its end.
-LOCATED = 1e-13
 #: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
 SURELY = 1e-6
-#: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
-TURNED = 0.5
-#: Rate at which slips may settle, times the step, inverse: Dormand and Prince's method is stable up to 3.3.
-BEARABLE = 0.4
-#: An acceleration turns a slip no more than round-off does if this share of it is across.
-STRAIGHT = 1e-6
 #: Relative accuracy of that instant.
 SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
@@ -115,70 +107,6 @@ def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
         if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
             steadied = steady_slip(lasting, k) or steadied
     return not steadied or force_contacts(lasting) != CONTRADICTORY
-
-
-@inner_kernel
-def follow_slip(lasting: Lasting, k: int) -> None:
-    """Direction of a slip that may turn; the last known of one that has all but ended, or turns round.
-
-    A slip that comes to its end does not pass zero, but under friction along its last direction it does: what is along
-    that changes sign at the end, as in the plane.
-    """
-    speed, onward = 0.0, 0.0
-    for t in range(lasting.size[TANGENTS]):
-        speed += lasting.speed[k, 1 + t] ** 2
-        onward += lasting.speed[k, 1 + t] * lasting.direction[k, t]
-    speed = math.sqrt(speed)
-    if speed > NOISE * lasting.speeds[k] and onward > TURNED * speed:
-        for t in range(lasting.size[TANGENTS]):
-            lasting.direction[k, t] = lasting.speed[k, 1 + t] / speed
-
-
-@inner_kernel
-def steady_slip(lasting: Lasting, k: int) -> bool:
-    """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
-
-    With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
-    f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
-    which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
-    slip does not turn, and off by no more than it turns in that moment. What accelerates along its direction keeps it.
-    """
-    speed, push, force, along, size, onward = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for t in range(lasting.size[TANGENTS]):
-        friction = 0.0
-        for other in range(lasting.size[TANGENTS]):
-            for side in range(2):
-                for d in range(lasting.size[VELOCITIES]):
-                    share = lasting.jacobian[k, side, 1 + t, d] * lasting.response[k, side, 1 + other, d]
-                    friction -= share * lasting.force[k, 1 + other]
-        gain = row_value(lasting, k, 1 + t, lasting.acceleration) + lasting.gamma[k, 1 + t]
-        lasting.wanted[t] = gain + friction
-        size += gain**2
-        onward += gain * lasting.direction[k, t]
-        speed += lasting.speed[k, 1 + t] ** 2
-        push += lasting.wanted[t] ** 2
-        force += friction**2
-        along += lasting.wanted[t] * lasting.speed[k, 1 + t]
-    speed, push, force = math.sqrt(speed), math.sqrt(push), math.sqrt(force)
-    across, moment = math.sqrt(max(size - onward**2, 0.0)), lasting.length[0]
-    if across * moment <= STRAIGHT * max(math.sqrt(size) * moment, speed):
-        return False
-    if force == 0.0 or speed >= BEARABLE * lasting.length[0] * force or push < TURNED * force:
-        return False
-    if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
-        return False
-    size = onward = 0.0
-    for t in range(lasting.size[TANGENTS]):
-        moment = BEARABLE * lasting.length[0] - speed / force
-        lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
-        size += lasting.wanted[t] ** 2
-        onward += lasting.wanted[t] * lasting.direction[k, t]
-    size = math.sqrt(size)
-    if onward < TURNED * size:  # it has come to its end
-        return False
-    for t in range(lasting.size[TANGENTS]):
-        lasting.direction[k, t] = lasting.wanted[t] / size
-    return True
 
 
 @inner_kernel
@@ -592,26 +520,6 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
     if step_phase(bodies, lasting, far) < 0.0:
         return -1.0
     return far
-
-
-@inner_kernel
-def stops_across(lasting: Lasting) -> bool:
-    """Whether a slip that comes to its end along its last direction has turned, and goes on across it.
-
-    How a slip turns while it ends is a power of the time left: a step over the end itself is of no order, steps that
-    halve that time are. What is left in the end is round-off, and sticks.
-    """
-    for k in range(lasting.size[CONTACTS]):
-        if lasting.mode[k] != SLIP or lasting.friction[k] == 0.0 or lasting.size[TANGENTS] == 1:
-            continue
-        if lasting.monitor[START, k, ONWARD] > FORCE_NOISE and lasting.monitor[LAST, k, ONWARD] <= LOCATED:
-            speed, along = 0.0, 0.0
-            for t in range(lasting.size[TANGENTS]):
-                speed += lasting.speed[k, 1 + t] ** 2
-                along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
-            if math.sqrt(max(speed - along**2, 0.0)) > NOISE * lasting.speeds[k]:
-                return True
-    return False
 
 
 @inner_kernel

@@ -99,7 +99,6 @@ def test_a_box_slides_on_over_the_corner_of_a_table():
     assert [each.refused for each in found] == [()] * 3
 
 
-@pytest.mark.xfail(strict=True, reason="friction leans out of a slip where the body below is light and stuck")
 def test_a_box_that_spins_on_a_light_one_slows_down_as_on_a_floor():
     boxes = [(0.47, 0.46, 0.08), (0.09, 0.19, 0.11)]
     numbers = np.array([[0.01, 44.0], [0.6, 0.2], [5.0, -6.7], [0.95, -0.27]])
