@@ -33,18 +33,19 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     """List scenes, engines, checks, or the runs in OUT.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
-    receipt; takes a minute.
+    receipt; takes two minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an engine that
+    is named gets only its own.
     """
     data: list[Any]
     found = Detected([], [])
     if sensitivity:
         if what != "checks":
             raise SceneError("sensitivity: checks have one, not " + what)
-        engine = engine or registry.solver()
+        named, engine = engine is not None, engine or registry.solver()
         profile = profile or registry.profile_of(engine, "solution")
         if profile is None:
             raise EngineError(f"profile: {engine} has none that promises a solution; name one with --profile")
-        best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if name != engine]
+        best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if not named and name != engine]
         others = [(registry.load(name), tuned) for name, tuned in best if tuned and registry.find(name).engine]
         found = detection(registry.load(engine), profile, 2, others=others)
         data = list(lines(found.seen))

@@ -88,6 +88,7 @@ class Rolling:
         passed = 0
         while True:
             rate, ends = partial(self._rate, beyond=beyond), partial(self._ends, beyond=beyond)
+            # mypy infers no type of a lambda with a default, which binds this turn's ends
             state, time = integrated(rate, state, time, lambda s, ends=ends: min(ends(s)))  # type: ignore[misc]
             if time == 0.0:
                 return state, 0.0, passed
