@@ -44,10 +44,9 @@ from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, SERIES, is_patient
+from reference_solver.stepping.clock import HELD, LEFT, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
-    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -62,10 +61,10 @@ from reference_solver.stepping.impacts import (
 )
 from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
-    FROZEN,
     LATE,
     NEARLY,
     NOISE,
+    PASSED_ON,
     ROUND_OFF,
     SPEED_SHARE,
     UNSOLVED,
@@ -231,11 +230,15 @@ def doubt(bodies: Bodies, rows: Rows, tally: Array) -> None:
     Measured by velocities alone, those after the solve as well, of what was at rest: the residual is measured against
     the impulse, which grows without bound.
     """
+    fastest = 0.0
+    for c in range(rows.counts[CONTACTS]):
+        fastest = max(fastest, rows.real[c, SPEED])
     for c in range(rows.counts[CONTACTS]):
         missing = rows.real[c, TARGET] - normal_velocity(bodies.twist, rows, c)
         speed = speed_at(bodies, rows.integer[c, A], rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
         speed += speed_at(bodies, rows.integer[c, B], rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
-        if tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * max(rows.real[c, SPEED], SPEED_SHARE * speed):
+        least = max(UNSOLVED * max(rows.real[c, SPEED], SPEED_SHARE * speed), PASSED_ON * fastest)
+        if tally[CONTRADICTED_A] == 0.0 and missing > least:
             tally[CONTRADICTED_A] = 1.0 + bodies.kind[rows.integer[c, A], NUMBER]
             tally[CONTRADICTED_B] = 1.0 + bodies.kind[rows.integer[c, B], NUMBER]
 
@@ -266,8 +269,7 @@ def row_turn(bodies: Bodies, rows: Rows, sub: SubStep, c: int, share: float) -> 
 def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``length`` of it. Where rows turn, contacts are held no longer than their
-    series lasts (`SERIES`).
+    ``bodies.twist`` are the velocities after ``length`` of it.
     """
     left = sub.clock[LEFT]
     new = False
@@ -292,8 +294,6 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
                 continue
             rows.integer[c, ENDING] = SERIES_ENDS
-            if FROZEN < rate * lasts <= BRIEFLY:
-                sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             new = True
         elif returns * BOUNCES < left:
             rows.integer[c, ENDING] = RELEASED

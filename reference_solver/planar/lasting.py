@@ -312,8 +312,10 @@ def displacement_curvature(bodies: Bodies, lasting: Lasting, i: int, end: int) -
 
 
 @inner_kernel
-def feature_limit(bodies: Bodies, lasting: Lasting, k: int) -> float:
+def feature_limit(bodies: Bodies, lasting: Lasting, k: int, normals: bool) -> float:
     """Distance of the core point from the ends of its edge; of a vertex, of its normal from those of its edges [m]."""
+    if normals != (lasting.kind[k, FORM] == POINTS):
+        return math.inf
     a, b = lasting.body[k, 0], lasting.body[k, 1]
     if lasting.kind[k, FORM] != POINTS:
         along, _ = along_edge(bodies, lasting, k)

@@ -53,7 +53,7 @@ from reference_solver.planar.state import (
 )
 from reference_solver.planar.step import move
 from reference_solver.stepping import operations
-from reference_solver.stepping.clock import HELD, JAMMED, MOST_SOFT, ROCKING, SERIES, UNSETTLED
+from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
 from reference_solver.stepping.islands import join_candidates
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.noise import SHORT
@@ -144,12 +144,6 @@ def end_rocking(island: Island, length: float) -> tuple[float, float]:
 
 
 @inner_kernel
-def hop_time(island: Island) -> float:
-    """Uses up the first contact noted."""
-    return float(rocking.hop_time(island.bodies, island.rows, island.sub))
-
-
-@inner_kernel
 def end_solve(island: Island) -> None:
     """``bodies.twist`` are the velocities of the end."""
 
@@ -159,7 +153,7 @@ def enter_path(island: Island, length: float) -> float:
     """The frozen path, or that of a phase where rows turn along it."""
     bodies, rows, sub = island.bodies, island.rows, island.sub
     flight.begin_flight(bodies, rows, sub, length)
-    if sub.clock[HELD] > 0.0 or sub.clock[SERIES] > 0.0 or not curve.turns(bodies, rows, sub, length):
+    if sub.clock[HELD] > 0.0 or sub.clock[BRIEF] > 0.0 or not curve.turns(bodies, rows, sub, length):
         return 0.0
     if sub.clock[ROCKING] > 0.0 or sub.clock[JAMMED] > 0.0:
         return NO_PHASE

@@ -24,13 +24,10 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.impact import doubt, flies, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
-from reference_solver.planar.lasting import evaluate, hold
 from reference_solver.planar.midpoint import reach_end, turn_rows
 from reference_solver.planar.rows import measure_speed, warm_start
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
-from reference_solver.stepping.lasting import CONTACTS as LASTING
-from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
@@ -38,18 +35,6 @@ from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
 #: it carries no impulse.
 FAR = 1e3
-
-
-@inner_kernel
-def row_gain(bodies: Bodies, rows: Rows, lasting: Lasting, c: int) -> float:
-    """Rate of the normal velocity of row c that turning alone brings about, without forces [m/s^2] (gamma, E36).
-
-    Uses up the first contact noted.
-    """
-    hold(bodies, rows, lasting, c, 0)
-    lasting.size[LASTING] = 1
-    evaluate(bodies, lasting)
-    return float(lasting.gamma[0, 0])
 
 
 @inner_kernel

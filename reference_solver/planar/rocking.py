@@ -6,42 +6,12 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.columns import ENDING, EXTENT, GAP, IMPACT, RESTITUTION, SPEED, A, B
-from reference_solver.planar.impact import flies, gap_noise, row_turn
-from reference_solver.planar.kinematics import copy_vectors, normal_velocity
-from reference_solver.planar.lasting import free_accelerations
-from reference_solver.planar.press import row_gain
-from reference_solver.planar.state import CONTACTS, MANIFOLDS, Bodies, Rows, SubStep
+from reference_solver.planar.impact import gap_noise
+from reference_solver.planar.kinematics import normal_velocity
+from reference_solver.planar.state import MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import LEFT, is_patient
-from reference_solver.stepping.equalities import row_value
-from reference_solver.stepping.impacts import BOUNCES, HOPS, OPEN_ENDED, SERIES_DRIFT, SERIES_ENDS
-from reference_solver.stepping.noise import FROZEN, NOISE
-
-
-@inner_kernel
-def hop_time(bodies: Bodies, rows: Rows, sub: SubStep) -> float:
-    """How long until contacts that part by mere noise, and turn, have come back [s]; 0 if there are none.
-
-    Loads, less what going round each other takes, bring them back: a disc that has just left the top of another parts
-    from it by less than round-off for a while, and never returns. Uses up the first contact noted.
-    """
-    longest = 0.0
-    copy_vectors(bodies.twist, sub.after)
-    for c in range(rows.counts[CONTACTS]):
-        u = normal_velocity(sub.start, rows, c)
-        if rows.integer[c, ENDING] != OPEN_ENDED or not u > NOISE * rows.real[c, SPEED]:
-            continue
-        if flies(bodies, rows, c, u, sub.clock[LEFT]) or rows.real[c, GAP] > gap_noise(bodies, rows, c):
-            continue
-        if row_turn(bodies, rows, sub, c, 1.0) * sub.clock[LEFT] <= FROZEN:
-            continue
-        copy_vectors(sub.start, bodies.twist)
-        gain = row_gain(bodies, rows, sub.lasting, c)
-        free_accelerations(bodies, sub.lasting)
-        copy_vectors(sub.after, bodies.twist)
-        load = -row_value(sub.lasting, 0, 0, sub.lasting.free)
-        if load > max(gain, 0.0) and HOPS * u <= load * sub.clock[LEFT]:
-            longest = max(longest, HOPS * u / load)
-    return longest
+from reference_solver.stepping.impacts import BOUNCES, SERIES_DRIFT, SERIES_ENDS
+from reference_solver.stepping.noise import NOISE
 
 
 @inner_kernel

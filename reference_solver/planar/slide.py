@@ -15,7 +15,7 @@ from reference_solver.planar.kinematics import tangent_velocity
 from reference_solver.planar.press import press
 from reference_solver.planar.state import CONTACTS, Bodies, Rows, SubStep
 from reference_solver.stepping.accounting import go_back
-from reference_solver.stepping.clock import BRIEF, HELD, SERIES
+from reference_solver.stepping.clock import BRIEF, HELD
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES
@@ -69,7 +69,7 @@ def press_until_stick(
             break
         if k == 0:
             begin_flight(bodies, rows, sub, length)
-            if sub.clock[SERIES] == 0.0 and turns(bodies, rows, sub, length):
+            if turns(bodies, rows, sub, length):
                 break
         if end < length and length - slipped <= CLOSE * length:
             break

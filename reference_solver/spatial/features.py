@@ -346,11 +346,11 @@ def set_rows(bodies: Bodies, lasting: Lasting, k: int, arm_a: Vector, arm_b: Vec
 
 
 @kernel
-def distance_to_limit(bodies: Bodies, lasting: Lasting, k: int) -> float:
+def distance_to_limit(bodies: Bodies, lasting: Lasting, k: int, normals: bool) -> float:
     """How far contact k is from where its features end, < 0 beyond, infinite if they have no end [m].
 
-    A line ends where it is as long as its body, a face at its edges. An edge or a corner of a box, and the end of a
-    capsule, meets what is round, or another edge, only while the normal looks out of it.
+    A line ends where it is as long as its body, a face at its edges; with ``normals``: an edge or a corner of a box,
+    and the end of a capsule, meets what is round, or another edge, only while the normal looks out of it.
     """
     limit = math.inf
     for side in range(2):
@@ -366,11 +366,13 @@ def distance_to_limit(bodies: Bodies, lasting: Lasting, k: int) -> float:
             along = part(lasting, k, DIRECTION, side)[d]
             at = part(lasting, k, PLACE, side)[d]
             half = bodies.geometry[i, d]
-            if core == PLANE and along == 0.0:
+            if core == PLANE and along == 0.0 and not normals:
                 limit = min(limit, half - abs(local[d]))
             elif core == LINE and along != 0.0:
+                if normals:
+                    continue
                 limit = min(limit, half - abs(lasting.place[k, ALONG + side]))
-            elif core != PLANE and other != PLANE:
+            elif core != PLANE and other != PLANE and normals:
                 reach = half if bodies.kind[i] == BOX else bodies.geometry[i, 1]
                 limit = min(limit, reach * outward[d] * (1.0 if at > 0.0 else -1.0))
     return limit

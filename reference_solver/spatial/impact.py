@@ -16,10 +16,9 @@ from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
-from reference_solver.stepping.clock import LEFT, SERIES, is_patient
+from reference_solver.stepping.clock import LEFT, is_patient
 from reference_solver.stepping.impacts import (
     BOUNCES,
-    BRIEFLY,
     CREEP,
     LANDED,
     NO_IMPACT,
@@ -33,7 +32,7 @@ from reference_solver.stepping.impacts import (
     drifts_aside,
     turns_aside,
 )
-from reference_solver.stepping.noise import FROZEN, NOISE, SPEED_SHARE, UNSOLVED
+from reference_solver.stepping.noise import NOISE, PASSED_ON, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
@@ -157,12 +156,17 @@ def doubt(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) 
     Measured by velocities alone, those after the solve as well, of what was at rest: the residual is measured against
     the impulse, which grows without bound.
     """
+    fastest = 0.0
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            fastest = max(fastest, manifolds.speed[m, p])
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             missing = manifolds.target[m, p] - velocity_at(v, w, manifolds, m, p)[2]
             speed = max(manifolds.speed[m, p], SPEED_SHARE * speed_of_parts(bodies, manifolds, m, p))
-            if manifolds.open[m, p] == 0 and tally[CONTRADICTED_A] == 0.0 and missing > UNSOLVED * speed:
+            least = max(UNSOLVED * speed, PASSED_ON * fastest)
+            if manifolds.open[m, p] == 0 and tally[CONTRADICTED_A] == 0.0 and missing > least:
                 tally[CONTRADICTED_A] = 1.0 + bodies.number[manifolds.body_a[m]]
                 tally[CONTRADICTED_B] = 1.0 + bodies.number[manifolds.body_b[m]]
 
@@ -197,8 +201,7 @@ def row_turn(bodies: Bodies, manifolds: Manifolds, m: int, slip: float, share: f
 def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> bool:
     """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
 
-    ``bodies.twist`` are the velocities after ``time`` of it. Where rows turn, contacts are held no longer than their
-    series lasts (`SERIES`).
+    ``bodies.twist`` are the velocities after ``time`` of it.
     """
     left = sub_step.clock[LEFT]
     new = False
@@ -225,8 +228,6 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 if aside > SERIES_DRIFT * extent and is_patient(sub_step.clock):
                     continue
                 manifolds.ending[m, p] = SERIES_ENDS
-                if FROZEN < rate * lasts <= BRIEFLY:
-                    sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 new = True
             elif 2.0 * leaves * BOUNCES < pull * left:
                 manifolds.ending[m, p] = RELEASED

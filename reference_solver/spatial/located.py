@@ -149,12 +149,6 @@ def end_rocking(island: Island, length: float) -> tuple[float, float]:
 
 
 @inner_kernel
-def hop_time(island: Island) -> float:
-    """Uses up the first contact noted."""
-    return float(slide.hop_time(island.bodies, manifolds_of(island), island.sub, island.options))
-
-
-@inner_kernel
 def end_solve(island: Island) -> None:
     """Velocities of the end, and the tally before the work of the force phase."""
     impact.copy_twists(island.bodies.twist, island.bodies.last)

@@ -102,9 +102,9 @@ def displacement_curvature(bodies: Spatial, lasting: Lasting, i: int, end: int) 
 
 
 @inner_kernel
-def feature_limit(bodies: Spatial, lasting: Lasting, k: int) -> float:
+def feature_limit(bodies: Spatial, lasting: Lasting, k: int, normals: bool) -> float:
     """Least distance of contact k from where its features end [m]."""
-    return distance_to_limit(bodies.record, lasting, k)
+    return distance_to_limit(bodies.record, lasting, k, normals)
 
 
 operations.provide(operations.is_free, Spatial, is_free)

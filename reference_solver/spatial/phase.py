@@ -20,7 +20,7 @@ from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifold
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub, times_transposed
 from reference_solver.stepping import accounting
-from reference_solver.stepping.clock import HELD, JAMMED, OUTCOME, SERIES
+from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, OUTCOME
 from reference_solver.stepping.equalities import row_value
 from reference_solver.stepping.lasting import BODIES, CONTACTS, STAGES, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
@@ -188,7 +188,7 @@ def enter_phase(
     """
     for i in range(len(bodies)):
         bodies.curved[i] = 0
-    if sub_step.clock[HELD] > 0.0 or sub_step.clock[SERIES] > 0.0 or is_exact(bodies, manifolds, sub_step, frozen):
+    if sub_step.clock[HELD] > 0.0 or sub_step.clock[BRIEF] > 0.0 or is_exact(bodies, manifolds, sub_step, frozen):
         return 0.0
     lasting, space = sub_step.lasting, Spatial(bodies, bodies.pose, bodies.twist)
     if sub_step.noted[0] != NOTED or sub_step.clock[JAMMED] > 0.0:

@@ -8,22 +8,17 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.features import follow, name_features
-from reference_solver.spatial.impact import clear_point, copy_twists, doubt, row_turn, set_reference_speed
+from reference_solver.spatial.impact import clear_point, copy_twists, doubt, set_reference_speed
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
-from reference_solver.spatial.operations import Spatial, free_accelerations
 from reference_solver.spatial.phase import is_exact
 from reference_solver.spatial.prepare import warm_start
-from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
+from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
-from reference_solver.stepping.clock import BRIEF, LEFT, SERIES
-from reference_solver.stepping.equalities import row_value
-from reference_solver.stepping.impacts import HOPS, OPEN_ENDED
-from reference_solver.stepping.lasting import BODIES, CONTACTS, Lasting
-from reference_solver.stepping.noise import FROZEN, NOISE
+from reference_solver.stepping.clock import BRIEF
+from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
 from reference_solver.tally import RESIDUAL, UNCONVERGED
@@ -134,48 +129,6 @@ def stuck(manifolds: Manifolds, m: int, p: int) -> bool:
 
 
 @inner_kernel
-def row_gain(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, m: int, p: int) -> float:
-    """Rate of the normal velocity of a point that turning alone brings about, without forces [m/s^2] (gamma, E36).
-
-    0 of one whose features cannot be followed. Uses up the first contact noted.
-    """
-    if not name_features(bodies, manifolds, lasting, POINTS * m + p, 0):
-        return 0.0
-    follow(bodies, lasting, 0)
-    return float(lasting.gamma[0, 0])
-
-
-@inner_kernel
-def hop_time(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options) -> float:
-    """How long until points that part by mere noise, and turn, have come back [s]; 0 if there are none.
-
-    As in the plane. Uses up the first contact noted.
-    """
-    lasting, space, longest = sub_step.lasting, Spatial(bodies, bodies.pose, bodies.twist), 0.0
-    for m in range(len(manifolds)):
-        v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
-        for p in range(manifolds.points[m]):
-            u = velocity_at(v, w, manifolds, m, p)
-            hops = u[2] > NOISE * manifolds.speed[m, p] and manifolds.open[m, p] == 0
-            hops = hops and manifolds.ending[m, p] == OPEN_ENDED
-            if not hops or manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
-                continue
-            turn = row_turn(bodies, manifolds, m, math.hypot(u[0], u[1]), 1.0)
-            if turn * sub_step.clock[LEFT] <= FROZEN:
-                continue
-            lasting.size[CONTACTS], lasting.size[BODIES] = 1, len(bodies)
-            copy_twists(bodies.twist, bodies.last)
-            copy_twists(bodies.first, bodies.twist)
-            gain = row_gain(bodies, manifolds, lasting, m, p)
-            free_accelerations(space, lasting)
-            copy_twists(bodies.last, bodies.twist)
-            load = -row_value(lasting, 0, 0, lasting.free)
-            if load > max(gain, 0.0) and HOPS * u[2] <= load * sub_step.clock[LEFT]:
-                longest = max(longest, HOPS * u[2] / load)
-    return longest
-
-
-@inner_kernel
 def slip_end(bodies: Bodies, manifolds: Manifolds, options: Options, length: float) -> float:
     """First time at which a slide of the solved sub-step comes to its end, inf if none does (E34)."""
     first = math.inf
@@ -219,7 +172,7 @@ def press_until_stick(
         accelerate(bodies, left)
         copy_twists(bodies.twist, bodies.start)
         return left
-    if not (struck and options.restitution) and sub_step.clock[SERIES] == 0.0:
+    if not (struck and options.restitution) and sub_step.clock[BRIEF] == 0.0:
         begin_press(bodies, manifolds, options, left, left, struck)
         copy_twists(bodies.first, bodies.last)
         if not is_exact(bodies, manifolds, sub_step, left):
@@ -234,7 +187,7 @@ def press_until_stick(
             break
         if k == 0:
             copy_twists(bodies.twist, bodies.last)
-            if sub_step.clock[SERIES] == 0.0 and not is_exact(bodies, manifolds, sub_step, length):
+            if sub_step.clock[BRIEF] == 0.0 and not is_exact(bodies, manifolds, sub_step, length):
                 break
         if end < length and length - slipped <= CLOSE * length:
             break

@@ -21,7 +21,6 @@ from reference_solver.stepping.clock import (
     ESCAPED,
     HASTE,
     HELD,
-    HOPPED,
     INSTANT,
     LEFT,
     LONGER_BRIEF,
@@ -29,7 +28,6 @@ from reference_solver.stepping.clock import (
     REBOUND,
     ROCKING,
     ROCKS,
-    SERIES,
     UNSETTLED,
     UNTIL_REST,
     count_event,
@@ -37,7 +35,6 @@ from reference_solver.stepping.clock import (
     end_settling,
     give_up_phase,
     open_step,
-    open_sub_step,
     opens_step,
     weigh_event,
 )
@@ -59,7 +56,6 @@ from reference_solver.stepping.operations import (
     find_touching,
     follow_path,
     gained_speed,
-    hop_time,
     is_free,
     leaves_bounds,
     levers_of_start,
@@ -151,7 +147,7 @@ def make_sub_step(island: Island) -> bool:
         end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
         crawl = CRAWL * price_of_creeping(island)
-        count_event(clock, tally, (crawl if shortened or clock[HOPPED] > 0.0 else HASTE) if haste else 1.0)
+        count_event(clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
@@ -164,7 +160,6 @@ def solve_sub_step(island: Island) -> float:
     """
     clock, tally = island.sub.clock, island.tally
     clock[ROCKING] = 0.0
-    open_sub_step(clock, island.options.dt)
     keep(tally, island.sub.opened)
     begin_solve(island)
     length, found = clock[LEFT], NO_IMPACT
@@ -175,7 +170,7 @@ def solve_sub_step(island: Island) -> float:
                 levers_of_start(island)
         found = collide_now(island)
         keep(tally, island.sub.struck)
-        most = min(clock[LEFT], clock[SERIES]) if clock[SERIES] > 0.0 else clock[LEFT]
+        most = min(clock[LEFT], clock[BRIEF] * island.options.dt) if clock[BRIEF] > 0.0 else clock[LEFT]
         length = press_until_stick(island, most, found >= LANDED)
         if not (found >= LANDED and island.options.restitution and end_series(island, length)):
             break
@@ -189,18 +184,12 @@ def solve_sub_step(island: Island) -> float:
 
 @spliced_kernel
 def come_to_rest(island: Island, length: float, struck: bool) -> float:
-    """Hold contacts of bodies that rock to rest (E22), until they do, or hop by mere noise; length of the sub-step."""
+    """Hold contacts of bodies that rock to rest (E22), until they do; length of the sub-step."""
     clock, left = island.sub.clock, island.sub.clock[LEFT]
     longest, shortest = end_rocking(island, length)
     if shortest < left:
         weigh_event(clock, REBOUND)
     if longest == 0.0:
-        hops = hop_time(island) if clock[SERIES] == 0.0 else 0.0
-        if hops > 0.0:
-            clock[HOPPED] = 1.0
-            go_back(island.tally, island.sub.struck)
-            clock[SERIES] = hops
-            length = press_for(island, hops, struck)
         return length
     go_back(island.tally, island.sub.struck)
     clock[HELD] = clock[ROCKS]  # if rows turn the impulse-level scheme does it

@@ -15,17 +15,12 @@ BOUNCES = 32
 #: A series of rebounds is held from where friction, which acts at its impacts only, moves bodies by no more than this
 #: share of the smaller half width other than it would in a contact; as long as half of a step's patience is left.
 SERIES_DRIFT = 1e-11
-#: Steps for which what a series that ends is off in its velocities counts as way.
-DRIFT_STEPS = 100.0
-#: Angle [rad] by which rows may turn while they stand still until a series ends; where they turn farther, for want of
-#: patience, the contacts of the series are those of a phase.
-BRIEFLY = 1e-3
+#: Steps for which what a series that ends is off in its velocities counts as way: so many that it does until bodies
+#: have turned, but for the shortest steps. Counted over a few, a finer run would end its series sooner, and be worse.
+DRIFT_STEPS = 1e4
 #: An impact is soft that closes no more than this share of the smaller half width in a step. Without loads all others
 #: are hard, and of bodies caught between others they have no end, each slower than the one before.
 CREEP = 1e-6
-#: How many times the time in which loads stop a hop it is held. Rows that stand still leave the speed by which they
-#: should have turned, a share of that of the hop; the longer they do the larger.
-HOPS = 1.1
 #: Passes that mark ending series of rebounds; each marks at least one row more.
 SERIES_PASSES = 4
 

@@ -18,11 +18,14 @@ SIZES = 4
 OPEN, STICK, SLIP = 0, 1, 2
 #: Rows of the dense matrix of a phase; islands with more rows are stepped by the impulse-level scheme.
 MOST_ROWS = 64
+#: Values of `Lasting.parts`: parts at the start of the phase, by noise; its features have ended.
+HOPS, GONE = 1, 2
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
-#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a feature.
-LOAD, GRIP, ONWARD, FEATURE = 0, 1, 2, 3
-MONITORS = 4
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a line or a face, how far
+#: the normal looks out of an edge or a corner. What comes over an edge starts at the one, and may pass the other.
+LOAD, GRIP, ONWARD, FEATURE, OUTLOOK = 0, 1, 2, 3, 4
+MONITORS = 5
 #: Places in `Lasting.monitor`: start of the phase; near and far end of a search; the step made last; its stages.
 START, NEAR, FAR, LAST, BETWEEN = 0, 1, 2, 3, 4
 PLACES_WATCHED = 5
@@ -42,6 +45,7 @@ class Lasting(NamedTuple):
     kind: Indices  # (k, KINDS): which features, the dimension's own
     place: Array  # (k, PLACES): features in body axes, the dimension's own
     friction: Array  # (k,): mu
+    parts: Indices  # (k,): HOPS or GONE, else 0
     slides: Indices  # (k,): 1 where it slips at the start of the phase, 0 where it may begin to
     speeds: Array  # (k,): reference speed [m/s], `noise.NOISE` of which is round-off
     extent: Array  # (k,): smaller half width of its bodies [m]
@@ -49,6 +53,7 @@ class Lasting(NamedTuple):
     usual: Array  # (k, 1 + T): forces at the start of the phase, from which redundant ones are told [N]
     gap: Array  # (k,) [m]
     frame: Array  # (k, 1 + T, D): normal, tangents, world axes
+    normal: Array  # (k, D): at the start of the phase
     jacobian: Array  # (k, 2, 1 + T, V): u = J_A v_A + J_B v_B
     response: Array  # (k, 2, 1 + T, V): rows of J M^-1
     speed: Array  # (k, 1 + T): u = J v [m/s]
@@ -98,6 +103,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         kind=np.zeros((k, KINDS), np.int64),
         place=np.zeros((k, PLACES)),
         friction=np.zeros(k),
+        parts=np.zeros(k, np.int64),
         slides=np.zeros(k, np.int64),
         speeds=np.zeros(k),
         extent=np.zeros(k),
@@ -105,6 +111,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         usual=np.zeros((k, 1 + t)),
         gap=np.zeros(k),
         frame=np.zeros((k, 1 + t, dimension)),
+        normal=np.zeros((k, dimension)),
         jacobian=np.zeros((k, 2, 1 + t, v)),
         response=np.zeros((k, 2, 1 + t, v)),
         speed=np.zeros((k, 1 + t)),

@@ -14,6 +14,7 @@ from reference_solver.stepping.equalities import (
 )
 from reference_solver.stepping.lasting import (
     CONTACTS,
+    HOPS,
     OPEN,
     SLIP,
     STICK,
@@ -46,6 +47,12 @@ def measure(lasting: Lasting) -> None:
                     part += abs(lasting.jacobian[k, side, row, d] * lasting.free[lasting.body[k, side], d])
                 size = max(size, part)
         lasting.scale[k] = size
+
+
+@inner_kernel
+def normal_gain(lasting: Lasting, k: int) -> float:
+    """Rate of the normal velocity of contact k [m/s^2]."""
+    return row_value(lasting, k, 0, lasting.acceleration) + lasting.gamma[k, 0]
 
 
 @inner_kernel
@@ -89,14 +96,17 @@ def begin_modes(lasting: Lasting) -> bool:
             lasting.direction[k, t] = 0.0
         speed = math.sqrt(speed)
         lasting.slides[k] = 1 if speed > NOISE * lasting.speeds[k] else 0
+        lasting.parts[k] = HOPS if lasting.speed[k, 0] > NOISE * lasting.speeds[k] else 0
         lasting.mode[k] = STICK
         if lasting.friction[k] == 0.0 or lasting.slides[k] == 1:
             lasting.mode[k] = SLIP
         if lasting.slides[k] == 1:
             for t in range(lasting.size[TANGENTS]):
                 lasting.direction[k, t] = lasting.speed[k, 1 + t] / speed
-            if slip_coupling(lasting, k) <= 0.0:
+            if lasting.parts[k] == 0 and slip_coupling(lasting, k) <= 0.0:
                 return False
+        if lasting.parts[k] == HOPS:
+            lasting.mode[k] = OPEN
         for row in range(1 + lasting.size[TANGENTS]):
             lasting.usual[k, row] = lasting.force[k, row] = 0.0
     return True
@@ -119,7 +129,7 @@ def revise(lasting: Lasting) -> int:
         slack = FORCE_NOISE * lasting.scale[k]
         noise = slack / inverse_mass(lasting, k, 0)
         if lasting.mode[k] == OPEN:
-            if row_value(lasting, k, 0, lasting.acceleration) + lasting.gamma[k, 0] < -slack:
+            if lasting.parts[k] == 0 and normal_gain(lasting, k) < -slack:
                 changed += 1
                 lasting.mode[k] = SLIP if lasting.slides[k] == 1 or lasting.friction[k] == 0.0 else STICK
         elif lasting.force[k, 0] < -noise:
@@ -160,7 +170,8 @@ def sweep_forces(lasting: Lasting, sweeps: int) -> None:
     accelerate(lasting)
     for _ in range(sweeps):
         for k in range(lasting.size[CONTACTS]):
-            sweep_contact(lasting, k)
+            if lasting.parts[k] == 0:
+                sweep_contact(lasting, k)
     for k in range(lasting.size[CONTACTS]):
         for row in range(1 + lasting.size[TANGENTS]):
             lasting.usual[k, row] = lasting.force[k, row]
@@ -177,7 +188,7 @@ def sweep_forces(lasting: Lasting, sweeps: int) -> None:
 @inner_kernel
 def sweep_contact(lasting: Lasting, k: int) -> None:
     """Forces of contact k that suit the accelerations of its bodies."""
-    gain = row_value(lasting, k, 0, lasting.acceleration) + lasting.gamma[k, 0]
+    gain = normal_gain(lasting, k)
     mass = slip_coupling(lasting, k) if lasting.slides[k] == 1 else inverse_mass(lasting, k, 0)
     before = lasting.force[k, 0]
     lasting.force[k, 0] = max(before - gain / mass, 0.0)

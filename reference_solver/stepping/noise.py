@@ -8,6 +8,9 @@ EVENT_BUDGET = 100_000
 #: A contact that still approaches with this share of its reference speed after its solve is not solved, whatever its
 #: impulse: solves end at 1e-13, and stalled ones of mass ratio 1e6 near 1e-6.
 UNSOLVED = 1e-3
+#: And with more than this share of the largest reference speed of all contacts of its island: loads elsewhere pass
+#: impulses through it, of which solves leave their round-off.
+PASSED_ON = 1e-9
 
 #: Gaps and overlaps below this fraction of the smaller half width are round-off, not geometry.
 ROUND_OFF = 1e-12

@@ -94,8 +94,11 @@ def displacement_curvature(bodies: Any, lasting: Any, i: int, end: int) -> None:
 
 
 @operation
-def feature_limit(bodies: Any, lasting: Any, k: int) -> float:
-    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m]."""
+def feature_limit(bodies: Any, lasting: Any, k: int, normals: bool) -> float:
+    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m].
+
+    ``normals``: from where the normal looks out of an edge or a corner no more; else from the ends of lines and faces.
+    """
     raise NotImplementedError
 
 
@@ -159,12 +162,6 @@ def end_series(island: Any, length: float) -> bool:
 @operation
 def end_rocking(island: Any, length: float) -> tuple[float, float]:
     """Mark contacts between which bodies rock to rest (E22): time until the last has, shortest until one returns."""
-    raise NotImplementedError
-
-
-@operation
-def hop_time(island: Any) -> float:
-    """How long until contacts that part by mere noise, and turn, have come back [s]; 0 if there are none."""
     raise NotImplementedError
 
 
@@ -318,7 +315,6 @@ OF_ISLANDS = (
     press_for,
     end_series,
     end_rocking,
-    hop_time,
     end_solve,
     enter_path,
     return_to_start,

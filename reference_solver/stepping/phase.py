@@ -6,13 +6,10 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.stepping.clean_up import clean_up, give
 from reference_solver.stepping.equalities import (
     CONTRADICTORY,
-    assemble,
     force_contacts,
-    list_rows,
-    push,
-    solve_rows,
 )
 from reference_solver.stepping.lasting import (
     BETWEEN,
@@ -20,13 +17,16 @@ from reference_solver.stepping.lasting import (
     CONTACTS,
     FAR,
     FEATURE,
+    GONE,
     GRIP,
+    HOPS,
     LAST,
     LOAD,
     MONITORS,
     NEAR,
     ONWARD,
     OPEN,
+    OUTLOOK,
     SLIP,
     STAGES,
     START,
@@ -35,7 +35,7 @@ from reference_solver.stepping.lasting import (
     VELOCITIES,
     Lasting,
 )
-from reference_solver.stepping.modes import decide, friction_size, inverse_mass, set_slip
+from reference_solver.stepping.modes import decide, friction_size, inverse_mass, normal_gain, set_slip
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED
 from reference_solver.stepping.operations import (
     Bodies,
@@ -45,7 +45,6 @@ from reference_solver.stepping.operations import (
     evaluate,
     feature_limit,
     free_accelerations,
-    is_free,
 )
 from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
 
@@ -160,6 +159,9 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
+    for k in range(lasting.size[CONTACTS]):
+        for d in range(lasting.normal.shape[1]):
+            lasting.normal[k, d] = lasting.frame[k, 0, d]
     keep_slopes(bodies, lasting, 0)
     bend_paths(bodies, lasting, 0)
     watch(bodies, lasting, START)
@@ -234,28 +236,6 @@ def weigh_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
 
 
 @inner_kernel
-def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> None:
-    """Enter an impulse along a row of contact k: in world axes, its work, and that of surfaces that are moved."""
-    if size == 0.0:
-        return
-    for d in range(lasting.impulse.shape[1]):
-        lasting.impulse[k, d] += size * lasting.frame[k, row, d]
-    axes, b = lasting.impulse.shape[1], lasting.body[k, 1]
-    for d in range(lasting.moment.shape[1]):
-        # The row's lever about the centre of B, and the centre's about the origin.
-        first, second = ((d + 1) % 3, (d + 2) % 3) if axes == 3 else (0, 1)
-        lever = bodies.pose[b, first] * lasting.frame[k, row, second]
-        lever -= bodies.pose[b, second] * lasting.frame[k, row, first]
-        lasting.moment[k, d] += size * (lever + lasting.jacobian[k, 1, row, axes + d])
-    lasting.work[k, 0] += size * lasting.speed[k, row]
-    for side in range(2):
-        i = lasting.body[k, side]
-        if not is_free(bodies, i):
-            for d in range(lasting.size[VELOCITIES]):
-                lasting.work[k, 1] -= size * lasting.jacobian[k, side, row, d] * bodies.twist[i, d]
-
-
-@inner_kernel
 def relative_error(lasting: Lasting, length: float) -> float:
     """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
 
@@ -302,61 +282,6 @@ def missed_and_moved(lasting: Lasting, length: float, first: int, last: int) -> 
 
 
 @inner_kernel
-def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
-    """Close the gaps of pressed contacts, and take out what velocities miss of their rows; both by M^-1 G^T."""
-    evaluate(bodies, lasting)
-    for _ in range(2):
-        if not project(bodies, lasting, True):
-            return False
-        evaluate(bodies, lasting)
-    return project(bodies, lasting, False)
-
-
-@inner_kernel
-def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
-    """Project poses on closed gaps, or velocities on the rows that are held (an orthogonal projection).
-
-    Without the friction of slips: near a jam what that brings along has no bound.
-    """
-    kept = list_rows(lasting)
-    count = 0
-    for i in range(kept):
-        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-        if poses and row > 0:
-            continue
-        lasting.unknown[count, 0], lasting.unknown[count, 1] = k, row
-        lasting.right[count] = -lasting.gap[k] if poses else -lasting.speed[k, row]
-        count += 1
-    if count == 0:
-        return True
-    assemble(lasting, count, False)
-    solve_rows(lasting, count, 0.0)
-    for i in range(lasting.size[BODIES]):
-        for d in range(lasting.size[VELOCITIES]):
-            lasting.acceleration[i, d] = 0.0
-    for i in range(count):
-        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-        push(lasting, lasting.acceleration, k, row, lasting.answer[i])
-        if not poses:
-            give(bodies, lasting, k, row, lasting.answer[i])
-    for i in range(lasting.size[BODIES]):
-        if not is_free(bodies, i):
-            continue
-        for d in range(lasting.size[VELOCITIES]):
-            if poses:
-                lasting.spin[d], bodies.twist[i, d] = bodies.twist[i, d], lasting.acceleration[i, d]
-            else:
-                bodies.twist[i, d] += lasting.acceleration[i, d]
-        if poses:
-            displacement_rate(bodies, lasting, i, STAGES - 1)
-            for d in range(lasting.size[VELOCITIES]):
-                lasting.displacement[i, d] += lasting.rate[STAGES - 1, i, d]
-                bodies.twist[i, d] = lasting.spin[d]
-            displace(bodies, lasting, i)
-    return True
-
-
-@inner_kernel
 def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
     """Monitors of the evaluated state: none may fall below zero while modes are what they are."""
     for k in range(lasting.size[CONTACTS]):
@@ -374,23 +299,26 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
             for t in range(lasting.size[TANGENTS]):
                 along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
             monitor[ONWARD] = along / lasting.speeds[k]
-        monitor[FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        monitor[FEATURE] = feature_limit(bodies, lasting, k, False) / lasting.extent[k]
+        monitor[OUTLOOK] = feature_limit(bodies, lasting, k, True) / lasting.extent[k]
 
 
 @inner_kernel
 def keep_limits(bodies: Bodies, lasting: Lasting) -> None:
     """Keep how far all contacts are from where their features end, at the start of a path."""
     for k in range(lasting.size[CONTACTS]):
-        lasting.monitor[START, k, FEATURE] = feature_limit(bodies, lasting, k) / lasting.extent[k]
+        for m in range(FEATURE, OUTLOOK + 1):
+            lasting.monitor[START, k, m] = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
 
 
 @inner_kernel
 def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
     """Whether the features of any contact end between there and here: it goes on with others, or parts."""
     for k in range(lasting.size[CONTACTS]):
-        limit = feature_limit(bodies, lasting, k) / lasting.extent[k]
-        if lasting.monitor[START, k, FEATURE] >= -FORCE_NOISE and limit < -FORCE_NOISE:
-            return True
+        for m in range(FEATURE, OUTLOOK + 1):
+            limit = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
+            if lasting.monitor[START, k, m] >= -FORCE_NOISE and limit < -FORCE_NOISE:
+                return True
     return False
 
 
@@ -450,8 +378,10 @@ def end_first(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
     """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
-    if what == LOAD or what == FEATURE:
+    if what == LOAD or what >= FEATURE:
         lasting.mode[which] = OPEN
+        if what >= FEATURE:
+            lasting.parts[which] = GONE
     elif what == ONWARD:
         lasting.mode[which], lasting.slides[which] = STICK, 0
     else:
@@ -531,6 +461,39 @@ def soften(lasting: Lasting, place: int) -> None:
 
 
 @inner_kernel
+def first_return(lasting: Lasting, left: float) -> float:
+    """Until when contacts that part by less than what is seen of a gap have come back, ``left`` at most [s].
+
+    Held from the start they would be pulled. They fly, and land with the speed that they left with: an impact, whose
+    law knows cone and sign.
+    """
+    first = left
+    for k in range(lasting.size[CONTACTS]):
+        gain = normal_gain(lasting, k)
+        if lasting.parts[k] == HOPS and gain < 0.0:
+            first = min(first, -2.0 * lasting.speed[k, 0] / gain)
+    return first
+
+
+@inner_kernel
+def start_again(bodies: Bodies, lasting: Lasting) -> bool:
+    """Begin with modes that have changed, and close what was open under those before; False where rows fail."""
+    for _ in range(lasting.size[CONTACTS]):
+        if not start_slopes(bodies, lasting):
+            return False
+        which, worst = -1, -FORCE_NOISE
+        for k in range(lasting.size[CONTACTS]):
+            if lasting.mode[k] == OPEN and lasting.parts[k] == 0:
+                closes = normal_gain(lasting, k) / lasting.scale[k] if lasting.scale[k] > 0.0 else 0.0
+                if closes < worst:
+                    which, worst = k, closes
+        if which < 0:
+            return True
+        lasting.mode[which] = SLIP if lasting.slides[which] == 1 or lasting.friction[which] == 0.0 else STICK
+    return start_slopes(bodies, lasting)
+
+
+@inner_kernel
 def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, int]:
     """Go from the present state to the end of a phase of lasting contact, within ``left``; its length and what it was.
 
@@ -539,11 +502,19 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     begin_phase(bodies, lasting)
     evaluate(bodies, lasting)
     free_accelerations(bodies, lasting)
-    if not decide(lasting) or not start_slopes(bodies, lasting):
+    changed = decide(lasting)
+    if not changed:
         go_back(bodies, lasting)
         return 0.0, FAILED
     length, outcome = left, WHOLE
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
+        if changed:
+            if not start_again(bodies, lasting):
+                break
+            back = first_return(lasting, length)
+            if back < length:
+                length, left, outcome = back, back, SHORTENED
+            changed = False
         error = step_phase(bodies, lasting, length)
         if error < 0.0:
             length, outcome = 0.25 * length, SHORTENED
@@ -553,8 +524,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
         elif stops_at_once(lasting):
             break
         elif switch_at_once(bodies, lasting):
-            if not start_slopes(bodies, lasting):
-                break
+            changed = True
             continue
         elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
             length, outcome = lasting.early[0] * length, SHORTENED
@@ -569,8 +539,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             if end < 0.0:
                 break
             end_first(bodies, lasting)
-            if not start_slopes(bodies, lasting):
-                break
+            changed = True
         else:
             return length, outcome
         if length < SHORTEST * left:

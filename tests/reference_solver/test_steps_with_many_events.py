@@ -163,6 +163,25 @@ def test_a_disc_under_a_descending_ceiling_ends_the_run_and_names_the_pair():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("count", range(2, 8))
+def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count):
+    """Without gravity only the last has a load: round-off of what passes through the others contradicts nothing."""
+    shape, inertia = (Disc(0.5), 0.125) if dimension == 2 else (Sphere(0.5), (0.1,) * 3)
+    up = (0.0,) * (dimension - 1)
+    bodies = [half_space((*up, 1.0))]
+    for k in range(count):
+        place = (*up, 0.5 + k, *((0.0,) if dimension == 2 else PLACE[3:]))
+        bodies.append(Body(shape, 1.0, inertia, place, force=(*up, -10.0 if k == count - 1 else 0.0)))
+    simulation = Simulation(Model(dimension, bodies, (0.0,) * dimension, 0.0, 0.0), Settings.reference(DT))
+    start = simulation.pose.copy()
+    simulation.advance(30)
+    assert simulation.certificate["reasons"] == ()
+    assert np.abs(simulation.pose - start).max() < 1e-12
+    contacts = simulation.contacts
+    assert (contacts.impulse * contacts.normal).sum(axis=1) == pytest.approx([10.0 * DT] * count, rel=1e-9)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
 def test_a_corner_that_pivots_has_no_events(dimension):
     """A leaning box that turns about a sticking corner: levers turn in each step, and that ends no slide."""
     angle, half = 0.25, (0.5, 0.25)

@@ -126,11 +126,13 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
         ]
 
 
-def leaves_out_rebounds(model: Model, record: Record, dt: float) -> bool:
-    """Whether a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile."""
+def ends_of_series(model: Model, record: Record, dt: float) -> np.ndarray:
+    """Return when (k,) a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile [s]."""
     if record.pieces is None:
         raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
-    return bool(contact.ends_of_series(Run(model, record.pieces, dt)).any())
+    run = Run(model, record.pieces, dt)
+    found: np.ndarray = record.pieces.begin[np.unique(run.contact_owner[contact.ends_of_series(run)])]
+    return found
 
 
 def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:

@@ -13,6 +13,8 @@ from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 from reference_solver.shapes import Disc, Sphere
 
+#: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
+SLIP_NOISE = 1e-11
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
 
@@ -77,7 +79,7 @@ def _laws(run: Run) -> Iterator[float]:
 
     yield _worst(np.where(correction, 0.0, -pressed - over.lean * held_back), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
-    excess = held_back - mu * pressed.clip(min=0.0) - leaning
+    excess = held_back - mu * pressed.clip(min=0.0) - leaning - np.where(frozen, 0.0, SLIP_NOISE * mass * speed)
     yield _worst(np.where(correction, 0.0, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is

@@ -11,7 +11,7 @@ import pytest
 import reference_solver.certification.audit as package
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certification import self_test
-from reference_solver.certification.audit import CHECKS, audit
+from reference_solver.certification.audit import CHECKS, audit, ends_of_series
 from reference_solver.certification.audit.motion import integrated_turn
 from reference_solver.certification.fuzz.scenes import STRIDE, scene
 from reference_solver.certification.truth import certify, distance
@@ -238,7 +238,7 @@ class TestTruth:
 
     def test_steps_that_end_alike_do_not_vouch_for_each_other(self, monkeypatch):
         """A solver whose runs at dt and dt/2 are off by the same, as what is decided by a step's end makes them."""
-        shift = 1e-6
+        shift = np.array([0.0, 1e-6, 0.0])  # along what the mirrored run leaves as it is
 
         class Alike(Simulation):
             def record(self, steps, stride=1, **what):
@@ -251,7 +251,29 @@ class TestTruth:
         honest = certify(model, Settings.reference(DT), 60)
         monkeypatch.setattr("reference_solver.certification.truth.Simulation", Alike)
         assert honest.error[-1] < 1e-12
-        assert certify(model, Settings.reference(DT), 60).error[-1] >= shift
+        assert certify(model, Settings.reference(DT), 60).error[-1] >= 1e-6
+
+    def test_what_goes_one_way_and_not_the_other_is_off(self, monkeypatch):
+        """A solver that is off by the same at any step, to the right: its mirrored world is off to the right, too."""
+        shift = np.array([1e-6, 0.0, 0.0])
+
+        class Sided(Simulation):
+            def record(self, steps, stride=1, **what):
+                made = super().record(steps, stride, **what)
+                return replace(made, pose=made.pose + shift)
+
+        monkeypatch.setattr("reference_solver.certification.truth.Simulation", Sided)
+        assert certify(planar(floor(), disc(0.0, 1.5), restitution=0.8), Settings.reference(DT), 60).error[-1] >= 1e-6
+
+    def test_an_end_of_a_series_counts_with_what_it_may_leave_out(self):
+        """Of a box on its corner, all steps after the last: 1e-11 of its half width, and a hundredth of that a step."""
+        box = Body(Box((0.31, 0.27)), 1.0, 0.0563, (0.0, 0.51, 0.55))
+        model = planar(floor(), box, restitution=0.45, friction=0.8)
+        certificate = certify(model, Settings.reference(DT), 144)
+        record = Simulation(model, Settings.reference(DT)).record(144, pieces=True)
+        ends = ends_of_series(model, record, DT)
+        left_out = 0.27e-11 * (1.0 + (certificate.t[-1] - ends) / DT / 100.0)
+        assert len(ends) and certificate.error[-1] > left_out.sum()
 
     def test_what_is_off_only_for_a_while_counts(self):
         """A box that topples off another's edge: off by 6e-11 m as it falls, and no more once it lies (seed 15)."""

@@ -11,17 +11,8 @@ from reference_solver.certification.known import blows, edges, gates, planar, ru
 from reference_solver.certification.known.motion import Miss, complementary, integrated, miss
 from reference_solver.certification.space import SPACES
 
-#: Motions of whose first three numbers one is refused, and why: it is no truth, and says so.
-REFUSED = {"smooth ball over an edge": "a ball that goes along an edge past its end stays on its line too long"}
 
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.xfail(strict=True, reason=REFUSED[name])] if name in REFUSED else [])
-        for name in gates.MOTIONS
-    ],
-)
+@pytest.mark.parametrize("name", gates.MOTIONS)
 def test_what_is_certified_of_a_known_motion_is_true(name):
     found = gates.misses(name, 3)
     assert gates.beyond(name, found).holds
