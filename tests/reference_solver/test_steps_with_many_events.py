@@ -177,7 +177,7 @@ def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count)
     simulation.advance(30)
     assert simulation.certificate["reasons"] == ()
     assert np.abs(simulation.pose - start).max() < 1e-12
-    contacts = simulation.contacts
+    contacts = simulation.contacts()
     assert (contacts.impulse * contacts.normal).sum(axis=1) == pytest.approx([10.0 * DT] * count, rel=1e-9)
 
 
