@@ -4,7 +4,8 @@ profiles       one contact solver each: friction pyramids (Dantzig, PGS) and exa
 translation    materials of pairs as one number per body
 simulation     one world
 engine         the adapter
-laws           what it does by design; blows of balls on a floor (`falling`) and in a line (`in_line`) step by step
+laws           what it does by design; blows of balls on a floor (`falling`) and in a line (`in_line`) step by step,
+               of boxes on an edge (`landing`), of balls that slip (`slipping`)
 """
 
 from adapters.dart.engine import DartEngine
