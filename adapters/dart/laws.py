@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from adapters.dart.falling import falling_law
 from adapters.dart.in_line import in_line_law
 from adapters.dart.landing import landing_law
-from adapters.dart.profiles import PROFILES, solved
+from adapters.dart.profiles import PROFILES, PYRAMIDS, solved
+from adapters.dart.pyramid import pyramid_law
 from adapters.dart.shipped import MIXING, PUSH_OUT, Rebound
 from adapters.dart.slipping import slipping_law
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
@@ -152,6 +153,27 @@ DEVIATIONS += tuple(
     )
     for profile in PROFILES
     for metric in ("forward_speed", "sideways", "spin_speed")
+)
+#: Scenes of what slips over a floor in both of its axes, and what its motion alone decides.
+SLIPPING: Mapping[str, tuple[str, ...]] = {
+    "slide": ("astray", "braking", "stopping_distance"),
+    "slide_to_roll": ("astray", "rolling_place", "rolling_time"),
+    "masse": ("end_x", "end_y", "turned"),
+}
+DEVIATIONS += tuple(
+    Deviation(
+        "dart",
+        PYRAMIDS,
+        scene,
+        metric,
+        pyramid_law(metric),
+        "the cone of friction is a pyramid: each axis of the floor has the whole of it, and what slips between them is "
+        "braked by up to sqrt(2) of Coulomb's friction",
+        "a boxed LCP, DantzigBoxedLcpSolver and PgsBoxedLcpSolver; recurrence in adapters/dart/pyramid.py",
+        ("6.20.",),
+    )
+    for scene, metrics in SLIPPING.items()
+    for metric in metrics
 )
 
 
