@@ -18,7 +18,8 @@ import numpy as np
 from adapters.dart.shipped import FASTEST, MIXING, PUSH_OUT, PUSHED_SHARE, THRESHOLD
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Disc, HalfSpace, Scene, Sphere
+from adapters.shapes import reach
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 
@@ -49,23 +50,33 @@ def falling_law(metric: str) -> Law:
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         up = scene.dimension - 1
-        if len(scene.bodies) != 2 or any(scene.gravity[:up]):
+        if any(scene.gravity[:up]):
             return None
-        floor, ball = scene.bodies
+        floor, ball, *others = scene.bodies
         level = tuple(float(k == up) for k in range(scene.dimension))
         if not isinstance(ball.shape, Disc | Sphere) or floor.shape != HalfSpace(level, 0.0):
             return None
         sideways = [v for k, v in enumerate(ball.twist) if k != up]
-        if any((*sideways, *ball.force, *ball.torque)) or scene.material(floor.name, ball.name).friction > 0.0:
+        # Without a way sideways or a spin there is no slip, and friction has nothing to do.
+        if any((*sideways, *ball.force, *ball.torque)) or not all(_away(ball, other, up) for other in others):
             return None
         e, steps = scene.material(floor.name, ball.name).restitution, step_count(scene.duration, dt)
         radius = ball.shape.radius
         y, v = heights(ball.pose[up] - radius, ball.twist[up], e, -scene.gravity[up], steps, dt)
         pose = np.repeat(np.array([[body.pose for body in scene.bodies]]), steps + 1, axis=0)
-        twist = np.zeros((steps + 1, 2, len(ball.twist)))
-        pose[:, 1, up], twist[:, 1, up] = y + radius, v
+        twist = np.zeros((steps + 1, len(scene.bodies), len(ball.twist)))
+        pose[:, 1, up], twist[:, 1, up] = y + radius, v  # what moves away stays where it is: nothing here asks for it
         motion = Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")
         value = measure(scene, motion)[metric][0]
         return None if value is None else (value, ROUND_OFF)
 
     return law
+
+
+def _away(ball: Body, other: Body, up: int) -> bool:
+    """Whether ``other`` starts beside the ball and moves away from it."""
+    if isinstance(other.shape, HalfSpace) or not isinstance(ball.shape, Disc | Sphere):
+        return False
+    between = np.subtract(other.pose[:up], ball.pose[:up])
+    apart = ball.shape.radius + reach(other.shape)
+    return bool(np.linalg.norm(between) > apart and between @ np.array(other.twist[:up]) >= 0.0)

@@ -45,13 +45,15 @@ def _sweeping(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             SWEEPS[solver],
-            "30 as shipped leave a column unsolved" if solver == "pgs" else "as shipped",
+            "30 as shipped leave a column unsolved" if solver == "pgs" else "100 as shipped leave two boxes unsolved",
             _SOURCE,
         ),
         Setting("tolerance", TOLERANCES[solver], "changes below it stop the sweeps", _SOURCE),
     ]
 
 
+#: Profiles whose friction is a pyramid along the axes of the floor.
+PYRAMIDS = ("default", "pgs")
 #: Changes below which the sweeps of a profile stop, as a share.
 TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
 #: Sweeps of a profile at most.
