@@ -1,7 +1,8 @@
 """A gas of rods in one line: at e = 1 rods of equal mass swap their speeds, as if each flew through all others.
 
-    |o-->   <--o  o->    <--o|      take the lengths out: n points that pass each other in L - n d, each flying freely
-    |<--------- L ---------->|      from wall to wall; sorted, and i d put back, they are the rods at any time
+    |o-->   <--o  o->    <--o|      take the lengths out: n points that pass each other in L - n d,
+    |                        |      each flying freely from wall to wall; sorted, and i d put back,
+    |<--------- L ---------->|      they are the rods at any time
 
 A whole history of meetings has a closed form [D. W. Jepsen, J. Math. Phys. 6 (1965) 405]. Each point keeps its speed
 for ever, so that the last meeting is as exact as the first; a meeting that is missed, or two that are taken for one,

@@ -76,7 +76,7 @@ def resting(scene, share=1.0, dt=DT):
 
 @pytest.mark.parametrize("n", [3, 10, 30])
 def test_what_a_sweep_leaves_shrinks_as_the_scene_says(n):
-    """One step of a row that nothing moves, swept for long: the ratio of what two sweeps leave tends to cos^2(pi/2n)."""
+    """One step of a row, swept for long: what a sweep leaves over what the one before left tends to cos^2(pi/2n)."""
     v, impulse, left = np.zeros(n), np.zeros(n), []
     v[-1] = -1.0
     for _ in range(5 * n * n // 2):
