@@ -131,7 +131,7 @@ SCENE = CanonicalScene(
     track=track,
     quick=(Variation({}, (None, *FEW)),),
     full=(Variation({}, (None, *MANY)), Variation({"n": 3.0}), Variation({"n": 30.0})),
-    planted=({"n": 2.0},),
+    planted=({},),
     primary=Primary(
         "displacement",
         "diameter",
