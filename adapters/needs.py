@@ -44,6 +44,8 @@ class Needs:
         Largest over smallest mass of the free bodies.
     gravity
         Magnitude [m/s^2].
+    pull
+        What presses bodies together [m/s^2]: gravity; without it the largest force over the mass it acts on.
     """
 
     dimension: int
@@ -56,6 +58,7 @@ class Needs:
     top_speed: float
     mass_ratio: float
     gravity: float
+    pull: float
 
 
 def needs(scene: Scene) -> Needs:
@@ -80,6 +83,7 @@ def needs(scene: Scene) -> Needs:
         top_speed=max(map(top_speed, scene.bodies)) + gravity * scene.duration,
         mass_ratio=max(masses) / min(masses),
         gravity=gravity,
+        pull=gravity or max((math.hypot(*body.force) / body.mass for body in free), default=0.0),
     )
 
 

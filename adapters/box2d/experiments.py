@@ -114,6 +114,48 @@ EXPERIMENTS += (
     ),
     *(
         Experiment(
+            "rod-gas-threshold",
+            "in a finer unit the threshold is 1/64 m/s, and every blow rebounds",
+            "default",
+            "rod_gas",
+            metric,
+            {"units_per_metre": 64.0},
+            idle=({"iterations": 1000}, {"continuous": False}),
+            within=_SINGLE,
+        )
+        for metric in ("misplaced", "wrong_speed", "energy_defect")
+    ),
+    *(
+        Experiment(
+            "starved-skin-and-sweeps",
+            "without a skin the row stays where it is; a thousand sweeps do not help",
+            "default",
+            "starved",
+            metric,
+            _BARE,
+            idle=({"iterations": 1000},),
+        )
+        for metric in ("displacement", "penetration")
+    ),
+    *(
+        Experiment(
+            family,
+            "a hundred sweeps leave no motion; without a skin one sweep still does",
+            profile,
+            "starved",
+            metric,
+            {"iterations": 100},
+            iterations=1,
+            idle=(_BARE,),
+        )
+        for family, profile, metrics in (
+            ("starved-skin-and-sweeps", "default", ("kinetic_energy",)),
+            ("starved-few-sweeps", "tuned", ("displacement", "penetration", "kinetic_energy", "load_error")),
+        )
+        for metric in metrics
+    ),
+    *(
+        Experiment(
             "bounce-gravity-in-rebound",
             "with restitution of the velocity before gravity, no sweeping and a finer unit it passes; without the "
             "first it does not",

@@ -22,6 +22,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
     "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
     "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "rod_gas": ("wrong_speed", "energy_defect", "misplaced"),
     "oblique": ("rebound_ratio", "forward_speed", "spin_speed"),
     "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),
     "pair_matrix": tuple(f"{name}[{k}]" for name in ("restitution", "friction") for k in range(1, 5)),

@@ -154,3 +154,31 @@ EXPERIMENTS += tuple(
     )
     for profile in ("default", "tuned")
 )
+
+EXPERIMENTS += (
+    *(
+        Experiment(
+            "rod-gas-threshold",
+            "without a threshold every blow rebounds; other springs or no sweeping ahead do not help",
+            "default",
+            "rod_gas",
+            metric,
+            {"restitution_threshold": 0.0},
+            idle=({"hertz": 240.0}, {"continuous": False}),
+            within=1e-6,
+        )
+        for metric in ("misplaced", "wrong_speed", "energy_defect")
+    ),
+    *(
+        Experiment(
+            "starved-soft-contact",
+            "with stiff contacts the row stays where it is; more small steps or a finer unit do not help",
+            "default",
+            "starved",
+            metric,
+            _STIFF,
+            idle=(_MORE_STEPS, {"units_per_metre": 64.0}),
+        )
+        for metric in ("displacement", "penetration")
+    ),
+)

@@ -138,6 +138,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stacked_balls", "small_speed"),
             ("cradle", "speed[4]"),
             ("galperin", "large_speed"),
+            *(("rod_gas", metric) for metric in ("misplaced", "wrong_speed", "energy_defect")),
         )
     ),
     *(
@@ -157,6 +158,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stacked_balls", "small_speed"),
             ("cradle", "speed[4]"),
             ("galperin", "large_speed"),
+            *(("rod_gas", metric) for metric in ("wrong_speed", "energy_defect")),
         )
     ),
     *(

@@ -205,4 +205,23 @@ ON_LOADS: tuple[Experiment, ...] = (
             ("slip_speed", dict[str, float](), 3),
         )
     ),
+    *(
+        Experiment(
+            "starved-few-sweeps",
+            "with enough sweeps the row stays where it is; keeping more of earlier impulses does not do it",
+            profile,
+            "starved",
+            metric,
+            {"iterations": 1000},
+            iterations=iterations,
+            idle=({"warmStartingFactor": 0.95},),
+        )
+        for profile, iterations, metrics in (
+            ("default", 1, ("displacement", "penetration", "kinetic_energy", "load_error")),
+            ("tuned", 1, ("displacement", "penetration", "kinetic_energy", "load_error")),
+            ("one", 4, ("displacement", "penetration", "kinetic_energy", "load_error")),
+            ("one", None, ("penetration",)),
+        )
+        for metric in metrics
+    ),
 )

@@ -75,6 +75,26 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     ),
     *(
         Experiment(
+            "starved-fixed-sweeps",
+            "with 1000 sweeps the row stays where it is; a smaller slop, or another start, does not hold it",
+            profile,
+            "starved",
+            metric,
+            {"iterations": 1000},
+            iterations=iterations,
+            idle=({"collision_slop": 1e-5},) if profile == "default" else ({"start_overlap": 0.0},),
+        )
+        for profile, metric, iterations in (
+            ("default", "displacement", None),
+            ("default", "penetration", None),
+            ("default", "kinetic_energy", 1),
+            ("tuned", "displacement", 1),
+            ("tuned", "penetration", 1),
+            ("tuned", "kinetic_energy", 1),
+        )
+    ),
+    *(
+        Experiment(
             "flat-box-fixed-sweeps",
             "with 100 sweeps the corners are solved",
             profile,

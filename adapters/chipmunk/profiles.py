@@ -77,7 +77,7 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
     """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
-    fall = needs.gravity * dt * dt
+    fall = needs.pull * dt * dt
     return min(0.5 * slop, 0.3 * fall) if fall > 0.0 else 0.5 * slop
 
 

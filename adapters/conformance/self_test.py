@@ -17,7 +17,7 @@ from adapters.needs import Needs
 from adapters.receipts import receipts
 
 #: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
-EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81)
+EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
 RECEIPT = "receipt "
 
 

@@ -82,6 +82,15 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             {"e": 0.5, "ratio": 1e6},
         ),
         Experiment(
+            "rod-gas-solver-tolerance",
+            "solved to round-off the rods stay in line; stiffer contacts alone do not keep them there",
+            "default",
+            "rod_gas",
+            "astray",
+            {"tolerance": 0.0},
+            idle=({"solimp": (0.9999, 0.9999, 0.001, 0.5, 1.0)},),
+        ),
+        Experiment(
             "off-centre-soft-contact",
             "a contact of one step does not turn the bar under the ball; solving further does nothing",
             "default",
@@ -107,6 +116,10 @@ EXPERIMENTS: tuple[Experiment, ...] = (
                 ("cradle-soft-contact", "cradle", "speed[4]", {}),
                 ("cradle-soft-contact", "cradle", "energy_defect", {"apart": 0.0, "n": 3.0}),
                 ("galperin-soft-contact", "galperin", "large_speed", {}),
+                *(
+                    ("rod-gas-soft-contact", "rod_gas", metric, {})
+                    for metric in ("misplaced", "wrong_speed", "energy_defect")
+                ),
             )
         ),
         *(

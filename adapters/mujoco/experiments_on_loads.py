@@ -257,4 +257,29 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
             )
             for metric, heading, within in (("slipped", 45.0, 0.0), ("pull", 45.0, 0.06), ("astray", 22.5, 4e-3))
         ),
+        *(
+            Experiment(
+                "starved-soft-contact",
+                "with rigid contacts that carry from the start the row stays where it is; solving further does nothing",
+                "default",
+                "starved",
+                metric,
+                hold,
+                idle=({"tolerance": 0.0},),
+            )
+            for metric in ("displacement", "penetration")
+        ),
+        *(
+            Experiment(
+                "starved-first-newton-step",
+                "with a hundred iterations the row rests and carries; contacts seen from 1 mm do not make it",
+                "default",
+                "starved",
+                metric,
+                {"iterations": 100},
+                iterations=1,
+                idle=({"margin": 1e-3},),
+            )
+            for metric in ("kinetic_energy", "load_error")
+        ),
     )

@@ -76,7 +76,7 @@ def tuned(needs: Needs, dt: float) -> list[Setting]:
 def _resting(needs: Needs, dt: float) -> list[Setting]:
     """What changes for bodies that only rest, stick and slide (e = 0 everywhere)."""
     settings = [Setting("kappa_plastic", KAPPA, CARRIES, MANUAL)]
-    depth = (1.0 - RIGID[0]) / KAPPA * needs.gravity * dt**2
+    depth = (1.0 - RIGID[0]) / KAPPA * needs.pull * dt**2
     touches = "the depth (1-d)/kappa g dt^2 at which a body rests: touching bodies then start and stay in contact"
     settings.append(Setting("margin", depth, touches, f"{MANUAL}; {DOC}, margin"))
     if needs.friction > 0.0:

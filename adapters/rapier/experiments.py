@@ -49,7 +49,7 @@ def _each(
 _SCENES = (
     "bounce", "far_origin", "flat_box", "heavy_on_light", "masse", "off_centre", "overhang", "overlap", "painleve",
     "pivot", "position_correction", "pyramid", "rocker", "roll_incline", "rolling_spin", "scales", "seam", "stack",
-    "tilt_table",
+    "starved", "tilt_table",
 )  # fmt: skip
 
 EXPERIMENTS: tuple[Experiment, ...] = (
@@ -227,6 +227,21 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         (_MORE_STEPS,),
         ("tuned", 2, "settle_time", {"n": 10.0}),
         ("tuned", 2, "kinetic_energy", {"n": 10.0}),
+    ),
+    *_each(
+        "starved-soft-contact",
+        "with stiff contacts the row stays where it is; more sweeps or no tolerated overlap do not help",
+        _STIFF,
+        ({"iterations": 30}, {"allowed_error": 0.0}),
+        ("default", 2, "displacement", {}),
+        ("default", 2, "penetration", {}),
+    ),
+    *_each(
+        "starved-singles-in-stiff-contact",
+        "damped 200 times as much the row rests; more small steps do not help",
+        {"damping_ratio": 2000.0},
+        (_MORE_STEPS,),
+        ("tuned", 2, "kinetic_energy", {}),
     ),
     *_each(
         "tilt-table-soft-contact",

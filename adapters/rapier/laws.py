@@ -16,6 +16,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
     "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
     "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "rod_gas": ("wrong_speed", "energy_defect"),
     "thin_wall": ("rebound_ratio",),
     "oblique": ("rebound_ratio", "sideways"),
     "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),

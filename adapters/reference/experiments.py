@@ -13,6 +13,23 @@ CANDIDATES: dict[str, tuple[Any, ...]] = {}
 
 EXPERIMENTS: tuple[Experiment, ...] = tuple(
     Experiment(
+        "starved-few-sweeps",
+        "with 1000 sweeps the row stays where it is",
+        "classical",
+        "starved",
+        metric,
+        {"iterations": 1000},
+        iterations=iterations,
+    )
+    for metric, iterations in (
+        ("displacement", None),
+        ("penetration", None),
+        ("kinetic_energy", None),
+        ("displacement", 1),
+    )
+)
+EXPERIMENTS += tuple(
+    Experiment(
         "stack-starved",
         "with 1000 sweeps the column stands",
         "classical",

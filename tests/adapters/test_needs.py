@@ -26,14 +26,21 @@ def test_what_a_scene_needs_fact_by_fact():
     moving = ball(twist=(3.0, -4.0, 0.0))
     assert needs(scene(FLOOR, moving, ball("heavy", mass=8.0), pair=Pair(restitution=0.75, friction=0.25))) == Needs(
         dimension=2, rotation=True, friction=0.25, restitution=0.75, regime="impact", slide=True, smallest_size=0.5,
-        top_speed=5.0 + 8.0 * 0.5, mass_ratio=4.0, gravity=8.0,
+        top_speed=5.0 + 8.0 * 0.5, mass_ratio=4.0, gravity=8.0, pull=8.0,
     )  # fmt: skip
 
 
 def test_nothing_that_moves_freely_needs_nothing():
-    assert needs(scene(FLOOR)) == Needs(2, False, 0.0, 0.0, "free", False, 1.0, 4.0, 1.0, 8.0)
+    assert needs(scene(FLOOR)) == Needs(2, False, 0.0, 0.0, "free", False, 1.0, 4.0, 1.0, 8.0, 8.0)
     still = needs(scene(ball(), gravity=(0.0, 0.0)))
-    assert still == Needs(2, False, 0.0, 0.0, "free", False, 0.5, 0.0, 1.0, 0.0)
+    assert still == Needs(2, False, 0.0, 0.0, "free", False, 0.5, 0.0, 1.0, 0.0, 0.0)
+
+
+def test_a_force_pulls_where_gravity_does_not():
+    pressed = ball(force=(-6.0, 8.0))
+    assert needs(scene(FLOOR, pressed)).pull == 8.0
+    assert needs(scene(FLOOR, pressed, ball("other"), gravity=(0.0, 0.0))).pull == 5.0
+    assert needs(scene(FLOOR, ball(), gravity=(0.0, 0.0))).pull == 0.0
 
 
 @pytest.mark.parametrize(

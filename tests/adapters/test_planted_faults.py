@@ -98,7 +98,7 @@ def test_a_fault_breaks_the_receipts_it_concerns_and_no_other(toy, fault, quanti
 def test_healthy_toy_holds_every_receipt_in_both_dimensions(toy, dt):
     engine = toy()
     for dimension in (2, 3):
-        needs = Needs(dimension, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81)
+        needs = Needs(dimension, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
         assert [slip for slip in receipts(engine, "default", needs, dt) if not slip.holds] == []
 
 

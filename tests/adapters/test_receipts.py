@@ -13,9 +13,9 @@ from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES,
 from adapters.receipts import QUANTITIES, receipts
 
 DT = 1 / 60
-IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81)
-REST = Needs(2, True, 0.5, 0.0, "rest", False, 1.0, 6.0, 1.0, 9.81)
-SMOOTH = Needs(2, False, 0.0, 0.8, "impact", False, 1.0, 6.0, 1.0, 9.81)
+IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
+REST = Needs(2, True, 0.5, 0.0, "rest", False, 1.0, 6.0, 1.0, 9.81, 9.81)
+SMOOTH = Needs(2, False, 0.0, 0.8, "impact", False, 1.0, 6.0, 1.0, 9.81, 9.81)
 
 
 def by_quantity(slips):

@@ -16,10 +16,10 @@ from validation.questions.detection import SIZES, detection, lines, only_by_rece
 
 DT = 1 / 240
 NEEDS = {
-    "impact": Needs(2, True, 0.0, 0.8, "impact", False, 1.0, 6.0, 1.0, 0.0),
-    "bounce": Needs(2, True, 0.0, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81),
-    "stack": Needs(2, True, 0.5, 0.0, "rest", True, 1.0, 6.0, 1.0, 9.81),
-    "incline": Needs(2, True, 0.5, 0.0, "slide", True, 1.0, 6.0, 1.0, 9.81),
+    "impact": Needs(2, True, 0.0, 0.8, "impact", False, 1.0, 6.0, 1.0, 0.0, 0.0),
+    "bounce": Needs(2, True, 0.0, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81),
+    "stack": Needs(2, True, 0.5, 0.0, "rest", True, 1.0, 6.0, 1.0, 9.81, 9.81),
+    "incline": Needs(2, True, 0.5, 0.0, "slide", True, 1.0, 6.0, 1.0, 9.81, 9.81),
 }
 ATTACKS = [("impulse", scene) for scene in NEEDS] + [("friction", "stack"), ("friction", "incline")]
 

@@ -51,9 +51,11 @@ OURS = (
     "tilt_table",
     "long_rest",
     "closing_wall",
+    "rod_gas",
     "rack",
     "edge_drop",
     "kane",
     "domino",
     "painleve",
+    "starved",
 )

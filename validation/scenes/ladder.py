@@ -18,9 +18,9 @@ from functools import lru_cache
 import numpy as np
 
 from adapters.scene import Body, HalfSpace, Pair, Scene, SceneError
-from adapters.trajectory import Sampling, Trajectory
-from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from adapters.trajectory import Trajectory
+from validation import metrics
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary
 from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, tilted, upward
 from validation.truths import leaning
 
@@ -128,20 +128,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What stands may be found one step late at either end; a fall owes what steps of first order leave out."""
+    """As of all that leans, stands or falls."""
     p = scene.params
-    if p["ratio"] >= 1.0:
-        source = "forces and moments in balance: N_w = W/2 (cot(lean) - w/L)"
-        heights = {"wall_load": math.sin(math.radians(p["lean"])), "floor_load": 1.0}
-        return leaning.standing_checks(p, dt, truth, heights, source)
-    source = "Newton's and Euler's laws with Coulomb's friction at the foot, integrated"
-    return leaning.sliding_checks(
+    return leaning.checks(
         p,
         dt,
         truth,
+        {"wall_load": math.sin(math.radians(p["lean"])), "floor_load": 1.0},
+        "forces and moments in balance: N_w = W/2 (cot(lean) - w/L)",
         lambda off: _slides(leaning.key(p), off),
         lambda lean, square: _forces(p, lean, square)[0],
-        source,
     )
 
 
@@ -170,18 +166,16 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=lambda scene: Sampling(1, max(0.0, scene.duration - bounds.WINDOW)),
-    quick=(Variation({}), Variation({"ratio": 0.8})),
-    full=tuple(
-        Variation({"ratio": r, "lean": lean}) for r in (0.5, 0.8, 1.02, 1.05, 2.0) for lean in (45.0, 60.0, 75.0)
-    ),
-    planted=({}, {"ratio": 0.8}),
+    sampling=leaning.sampling,
+    quick=leaning.QUICK,
+    full=leaning.FULL,
+    planted=leaning.STANDS_AND_SLIDES,
     primary=Primary(
         "outcome error",
         "1",
         "way of the ladder that should stand, in lengths; error of the time of the one that slides, relative to it",
         "whether it stands, and how fast it goes if it does not",
-        lambda dt: [{}, {"ratio": 0.8}],
+        lambda dt: [dict(params) for params in leaning.STANDS_AND_SLIDES],
         error,
         "the whole scene: the ladder stands",
     ),

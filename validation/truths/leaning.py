@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from adapters.scene import Scene
-from adapters.trajectory import Trajectory
+from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
-from validation.canonical import Check, Measured, Params
+from validation.canonical import Check, Measured, Params, Variation
 
 #: Steps of the classical method of fourth order: twice as many change nothing at 1e-9.
 STEPS = 200
@@ -31,6 +31,11 @@ STEPS = 200
 TOLD, AFTERMATH = math.radians(8.0), 0.2
 #: Duration of a run of what stands [s].
 DURATION = 2.0
+
+#: Cells of what leans at 60 degrees with ``ratio`` times the friction that it takes: one that stands, one that slides.
+STANDS_AND_SLIDES: tuple[Params, ...] = ({}, {"ratio": 0.8})
+QUICK = tuple(Variation(params) for params in STANDS_AND_SLIDES)
+FULL = tuple(Variation({"ratio": r, "lean": lean}) for r in (0.5, 0.8, 1.02, 1.05, 2.0) for lean in (45.0, 60.0, 75.0))
 
 #: ``rates(angle, square)`` of an angle [rad] and the square of its rate [1/s^2]: its acceleration [rad/s^2], and
 #: something else whose integral over time is asked.
@@ -85,6 +90,11 @@ def key(p: Params) -> tuple[tuple[str, float], ...]:
 # ---- what is measured ----
 
 
+def sampling(scene: Scene) -> Sampling:
+    """Every step; contacts over the last second."""
+    return Sampling(1, max(0.0, scene.duration - bounds.WINDOW))
+
+
 def way(scene: Scene, trajectory: Trajectory, body: int) -> float:
     """Largest way of a point of a body [m]: that of its centre, and what its turn moves its outermost point by."""
     pose, d = trajectory.pose[:, body], scene.dimension
@@ -107,6 +117,25 @@ def outcome(scene: Scene, truth: Mapping[str, float], found: Mapping[str, Measur
 
 
 # ---- what is owed ----
+
+
+def checks(
+    p: Params,
+    dt: float,
+    truth: Mapping[str, float],
+    heights: Mapping[str, float],
+    balance: str,
+    again: Callable[[float], Turn | None],
+    bent: Callable[[float, float], float],
+) -> list[Check]:
+    """What stands may be found one step late at either end; a fall owes what steps of first order leave out.
+
+    ``balance`` is where the loads of what stands come from; the rest as `standing_checks` and `sliding_checks`.
+    """
+    if "moved" in truth:
+        return standing_checks(p, dt, truth, heights, balance)
+    source = "Newton's and Euler's laws with Coulomb's friction at what slides on the floor, integrated"
+    return sliding_checks(p, dt, truth, again, bent, source)
 
 
 def standing_checks(

@@ -1,0 +1,167 @@
+"""A gas of rods: event by event the rods are where free flights say; methods of fixed steps stay within the bounds."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import failing
+
+from adapters.trajectory import Trajectory
+from validation.catalogue import CATALOGUE
+from validation.scenes import rod_gas
+from validation.scenes.parts import phases
+
+DT = 1 / 240
+SIZES = [0.1, 0.01, 0.001]
+
+
+def made(**params):
+    canonical = CATALOGUE["rod_gas"]
+    return canonical, canonical.scene(2, params)
+
+
+def bodies(scene):
+    x = np.array([body.pose[0] for body in scene.bodies[2:]])
+    v = np.array([body.twist[0] for body in scene.bodies[2:]])
+    mass = np.array([body.mass for body in scene.bodies[2:]])
+    return x, v, mass, -scene.bodies[1].shape.offset
+
+
+def blow(v, mass, k, e):
+    """Newton's law for neighbours k and k + 1, and momentum."""
+    together = mass[k] + mass[k + 1]
+    common, closing = (mass[k] * v[k] + mass[k + 1] * v[k + 1]) / together, v[k] - v[k + 1]
+    v[k] = common - e * mass[k + 1] / together * closing
+    v[k + 1] = common + e * mass[k] / together * closing
+
+
+def meeting(scene, e=1.0, missed=None):
+    """Rods (not points) flown from meeting to meeting; how many meetings there were. ``missed`` is passed over."""
+    x, v, mass, length = bodies(scene)
+    r, now, count, skipped = rod_gas.RADIUS, 0.0, 0, None
+    while True:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            between = np.where(v[:-1] > v[1:], (x[1:] - x[:-1] - 2.0 * r) / (v[:-1] - v[1:]), math.inf)
+        walls = [(x[0] - r) / -v[0] if v[0] < 0 else math.inf, (length - r - x[-1]) / v[-1] if v[-1] > 0 else math.inf]
+        waits = np.array([*between, *walls])
+        if skipped is not None:
+            waits[skipped] = math.inf
+        k = int(waits.argmin())
+        if now + waits[k] > scene.duration:
+            return x + v * (scene.duration - now), v, count
+        x, now, count = x + v * waits[k], now + waits[k], count + 1
+        if count == missed:
+            skipped = k
+        elif k < len(between):
+            blow(v, mass, k, e)
+        else:
+            v[0 if k == len(between) else -1] *= -e
+
+
+def recorded(scene, x, v, dt=DT):
+    """The start and the end, as an engine's record would hold them."""
+    n = len(scene.bodies)
+    pose, twist = (np.array([[getattr(body, name) for body in scene.bodies]] * 2) for name in ("pose", "twist"))
+    pose[-1, 2:, 0], twist[-1, 2:, 0] = x, v
+    assert pose.shape == (2, n, 3)
+    return Trajectory(np.array([0.0, scene.duration]), pose, twist, None, dt, "completed")
+
+
+def stepped(scene, dt):
+    """A method of fixed steps: what overlaps and closes in after a step has its blow there; nothing is pushed out."""
+    x, v, mass, length = bodies(scene)
+    for _ in range(round(scene.duration / dt)):
+        x = x + v * dt
+        for k in range(len(x) - 1):
+            if x[k + 1] - x[k] <= 2.0 * rod_gas.RADIUS and v[k] > v[k + 1]:
+                blow(v, mass, k, 1.0)
+        if x[0] <= rod_gas.RADIUS and v[0] < 0:
+            v[0] = -v[0]
+        if x[-1] >= length - rod_gas.RADIUS and v[-1] > 0:
+            v[-1] = -v[-1]
+    return recorded(scene, x, v, dt)
+
+
+@pytest.mark.parametrize(
+    "params", [{}, {"n": 1.0}, {"n": 3.0, "room": 3.0}, {"n": 10.0, "v": 7.0}, {"n": 40.0, "room": 8.0}]
+)
+def test_rods_that_meet_one_after_the_other_are_where_sorted_free_flights_are(params):
+    canonical, scene = made(**params)
+    x, v, count = meeting(scene)
+    p = scene.params
+    place, velocity = rod_gas.rods(p, p["delay"] + p["duration"])
+    assert np.allclose(x, place, rtol=0.0, atol=1e-10)
+    assert np.allclose(v, velocity, rtol=0.0, atol=1e-10)
+    told = [m for m in rod_gas.meetings(p) if m.time <= p["delay"] + p["duration"]]
+    assert len(told) == count > 0
+    assert failing(canonical, scene, recorded(scene, x, v)) == set()
+
+
+def test_meetings_say_which_rods_meet_and_how_fast():
+    """Between the meetings of a list each rod flies straight, and at each the two it names touch."""
+    _, scene = made(n=6.0)
+    p, r = scene.params, rod_gas.RADIUS
+    length = p["room"] + 12.0 * r
+    for m in rod_gas.meetings(p):
+        x, _ = rod_gas.rods(p, m.time)
+        _, before = rod_gas.rods(p, m.time - 1e-7)
+        edges = [-r, *x, length + r]
+        assert edges[m.rank + 1] - edges[m.rank] == pytest.approx(2.0 * r, abs=1e-9)
+        speeds = [0.0, *before, 0.0]
+        assert speeds[m.rank] - speeds[m.rank + 1] == pytest.approx(m.closing, abs=1e-9)
+
+
+@pytest.mark.parametrize("dt", [1 / 121, 1 / 160, DT, 1 / 960])
+@pytest.mark.parametrize("k", range(0, 16, 3))
+def test_a_method_of_fixed_steps_that_finds_meetings_late_stays_within_the_bounds(dt, k):
+    dt = 3.75 / math.ceil(3.75 / dt)  # whole steps
+    canonical, scene = made(**phases(dt)[k])
+    assert any(check.bound is not None for check in canonical.checks(scene, dt))
+    assert failing(canonical, scene, stepped(scene, dt)) == set()
+
+
+def test_what_is_late_uses_a_good_part_of_what_is_allowed():
+    """A bound of which nothing is used would see nothing."""
+    canonical, used = CATALOGUE["rod_gas"], []
+    for params in phases(DT):
+        scene = canonical.scene(2, params)
+        value, _ = canonical.measure(scene, stepped(scene, DT))["misplaced"]
+        (check,) = (c for c in canonical.checks(scene, DT) if c.metric == "misplaced")
+        used.append(value / check.bound)
+    assert 0.2 < max(used) <= 1.0
+
+
+def test_steps_that_take_two_meetings_for_one_are_not_judged():
+    canonical, scene = made()
+    coarsest = rod_gas.coarsest(scene.params)
+    assert all(check.bound is not None for check in canonical.checks(scene, coarsest))
+    assert all(check.bound is None for check in canonical.checks(scene, math.nextafter(coarsest, 1.0)))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_lost_energy_other_masses_places_and_speeds_fail(size):
+    canonical, scene = made()
+    x, v, _ = meeting(scene, e=1.0 - size)
+    lossy = failing(canonical, scene, recorded(scene, x, v))
+    assert {"wrong_speed", "energy_defect"} <= lossy
+    heavier = (*scene.bodies[:3], replace(scene.bodies[3], mass=1.0 + size), *scene.bodies[4:])
+    x, v, _ = meeting(replace(scene, bodies=heavier))
+    assert "wrong_speed" in failing(canonical, scene, recorded(scene, x, v))
+    x, v, _ = meeting(scene)
+    assert failing(canonical, scene, recorded(scene, x, v * (1.0 - size))) == {"wrong_speed", "energy_defect"}
+    (allowed,) = (c.bound for c in canonical.checks(scene, DT) if c.metric == "misplaced")
+    x[1] += allowed * (1.0 + size)
+    assert failing(canonical, scene, recorded(scene, x, v)) == {"misplaced"}
+    x[1] -= allowed * (1.0 + size)
+    off = recorded(scene, x, v)
+    off.pose[0, 3, 1] = size
+    assert failing(canonical, scene, off) == {"astray"}
+
+
+@pytest.mark.parametrize("missed", [1, 5, 13])
+def test_a_meeting_that_is_missed_fails_though_it_keeps_the_energy(missed):
+    canonical, scene = made()
+    x, v, _ = meeting(scene, missed=missed)
+    found = failing(canonical, scene, recorded(scene, x, v))
+    assert "wrong_speed" in found and "energy_defect" not in found

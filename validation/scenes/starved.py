@@ -1,0 +1,154 @@
+"""A row of balls is pressed against a wall: each contact carries the press, and a solver has to pass it on.
+
+         |
+    wall | o o o o o <-- F     nothing moves; every contact carries F,
+         | 1 2  ...  n         that of the wall as well
+
+A contact knows its neighbours alone, so that the press gets to the wall by one contact a sweep, and what a sweep over
+all contacts leaves of an error shrinks by cos^2(pi/2n): ten balls take forty sweeps for each factor of e. A solver that
+stops sooner lets the row in. Nothing else is asked: no friction, no weight, one contact from ball to ball.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from adapters.scene import Body, HalfSpace, Pair, Scene
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.bounds import WINDOW
+from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Track, Variation
+from validation.scenes.parts import along, at, ball, mass_of
+
+RADIUS = 0.5
+#: Iteration counts that starve a sweeping solver, beside each profile's own.
+FEW, MANY = (1, 4), (1, 2, 4, 10, 20, 50, 100)
+
+
+def make(dimension: int, params: Params) -> Scene:
+    """Build the row, exactly touching; the press acts from the start."""
+    p, n = params, int(params["n"])
+    wall = Body("wall", HalfSpace(along(dimension, 1.0), 0.0), motion="fixed")
+    row = [
+        at(ball(f"ball{k}", dimension, p["mass"], RADIUS, 0.0), dimension, along(dimension, (2 * k - 1) * RADIUS))
+        for k in range(1, n + 1)
+    ]
+    row[-1] = replace(row[-1], force=along(dimension, -p["press"]))
+    pairs = (Pair(restitution=0.0, friction=0.0),)
+    return Scene("starved", 1, dimension, (wall, *row), pairs, (0.0,) * dimension, p["duration"], p)
+
+
+def exact(scene: Scene) -> dict[str, float]:
+    """Equilibrium."""
+    return {"displacement": 0.0, "penetration": 0.0, "kinetic_energy": 0.0, "load_error": 0.0}
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """Farthest way of a ball and deepest overlap at any time; energy, and the worst mean load, of the last second."""
+    d = scene.dimension
+    place = trajectory.pose[:, 1:, :d]
+    late = trajectory.t > trajectory.t[-1] - WINDOW
+    measured: dict[str, Measured] = {
+        "displacement": (float(np.linalg.norm(place - place[0], axis=2).max()), ""),
+        "penetration": (metrics.deepest_overlap(scene, trajectory), ""),
+        "kinetic_energy": (float(metrics.kinetic_energy(scene, trajectory)[late].mean()), ""),
+        "load_error": (None, metrics.UNAVAILABLE),
+    }
+    off, press = [], scene.params["press"] * trajectory.dt
+    for k in range(1, len(scene.bodies)):
+        impulses = metrics.late_impulses(trajectory, k - 1, k, WINDOW)
+        if impulses is None:
+            return measured
+        off.append(abs(float(impulses[:, 0].mean()) / press - 1.0))
+    return measured | {"load_error": (max(off), "")}
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """As of a column that stands, under the acceleration that the press gives the ball that it acts on."""
+    p, n = scene.params, len(scene.bodies) - 1
+    pressed, length, source = p["press"] / p["mass"], 2.0 * RADIUS * n, "static equilibrium"
+    # The momentum that is unaccounted for is that of all balls, the load is that of one.
+    share = bounds.carried(dt)
+    allowed = {
+        "displacement": ("m", bounds.slips(n, pressed, dt)),
+        "penetration": ("m", bounds.found_late(pressed, dt, length)),
+        "kinetic_energy": ("J", bounds.still_energy(n * p["mass"], pressed, dt)),
+        "load_error": ("1", bounds.Bound(n * share.value, share.because)),
+    }
+    return [bound.check(name, unit, truth[name], source) for name, (unit, bound) in allowed.items()]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step; contacts over the last second."""
+    return Sampling(1, max(0.0, scene.duration - WINDOW))
+
+
+def track(scene: Scene) -> Track:
+    """The ball that is pressed stays where it is."""
+    last = scene.bodies[-1]
+    return Track(last.name, lambda t: last.pose[: scene.dimension])
+
+
+def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
+    """Farthest way of a ball, in diameters."""
+    value, reason = found["displacement"]
+    return (None, reason) if value is None else (value / (2.0 * RADIUS), "")
+
+
+def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
+    """``gave way`` if a ball is in another, or off its place, by a tenth of its diameter."""
+    worst = [found.get(name, (None, ""))[0] for name in ("displacement", "penetration")]
+    known = [value for value in worst if value is not None]
+    if len(known) < len(worst):
+        return "NaN"
+    return "gave way" if max(known) > 0.1 * 2.0 * RADIUS else ""
+
+
+_HELD = "held: no ball a tenth of its diameter off its place, or inside another"
+
+SCENE = CanonicalScene(
+    name="starved",
+    version=1,
+    title="Row of balls pressed against a wall, with too few sweeps",
+    family="hard",
+    figure=__doc__ or "",
+    law="nothing moves; every contact carries the press",
+    dimensions=(2,),
+    parameters=(
+        Parameter("n", 10, "1", "number of balls: forty sweeps for each factor of e", 1, 1000, integer=True),
+        Parameter("press", 10.0, "N", "force on the last ball, about the weight of one", 0.0, 1e6, positive=True),
+        Parameter("duration", 2.0, "s", "a second to give way, and one to carry", 1.0, 1e3),
+        mass_of("each ball"),
+    ),
+    make=make,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
+    track=track,
+    quick=(Variation({}, (None, *FEW)),),
+    full=(Variation({}, (None, *MANY)), Variation({"n": 3.0}), Variation({"n": 30.0})),
+    planted=({},),
+    primary=Primary(
+        "displacement",
+        "diameter",
+        "farthest way of a ball from its place within 2 s, in diameters, n = 10",
+        "nothing may move: what sweeps leave of the press lets the row in",
+        lambda dt: [{}],
+        error,
+        "the pressed row, half a second after the start",
+        0.5,
+        0.25,
+    ),
+    frontiers=(
+        Frontier("iterations", "", "iterations", 100.0, 1.0, 1.0, fate, _HELD, whole=True),
+        Frontier("balls in a row", "balls", "n", 2.0, 40.0, 100.0, fate, _HELD, whole=True),
+    ),
+    words={
+        "displacement": "lets a ball move by {value}",
+        "load_error": "leaves a contact's load off by {value} of the press",
+    },
+)
