@@ -151,7 +151,11 @@ def _level_tables(table: pd.DataFrame, column: str, smallest: float, ranked: boo
             rows.append((str(engine), str(profile), [_level_cell(by_level[level], column, ranked) for level in levels]))
         names = [level_text(level) if column == "cost" else duration(level) for level in levels]
         anchor = slug("level", column, scene, dimension)
-        out.append(LevelTable(anchor, str(scene), int(str(dimension)), primary_of(str(scene)).name, names, rows, ", ".join(refused)))
+        out.append(
+            LevelTable(
+                anchor, str(scene), int(str(dimension)), primary_of(str(scene)).name, names, rows, ", ".join(refused)
+            )
+        )
     return out
 
 

@@ -74,7 +74,9 @@ class Replay:
         stay = len(self.departures) - len(said)
         if not said:
             return "no engine leaves the tolerance"
-        return f"{', '.join(said)}" + (f"; the other {stay} never" if stay > 1 else "; the other one never" if stay else "")
+        return f"{', '.join(said)}" + (
+            f"; the other {stay} never" if stay > 1 else "; the other one never" if stay else ""
+        )
 
 
 def replays(source: Source) -> list[Replay]:

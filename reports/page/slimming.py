@@ -78,7 +78,9 @@ def _granted(node: ElementTree.Element, around: frozenset[str]) -> None:
             del node.attrib[name]
     for name in ("transform", "x2", "y2"):
         if name in node.attrib:
-            node.set(name, _HUNDREDTHS.sub(lambda found: f"{float(found[0]):.1f}".removesuffix(".0"), node.attrib[name]))
+            node.set(
+                name, _HUNDREDTHS.sub(lambda found: f"{float(found[0]):.1f}".removesuffix(".0"), node.attrib[name])
+            )
     for part in node:
         _granted(part, around | node.attrib.keys())
 
