@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import Any
@@ -19,7 +20,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from reports.answers import answers
+from reports.answers import Answer, answers
+from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.families import families
 from reports.page.scenes import scene_sections
@@ -34,6 +36,8 @@ __all__ = ["Bench", "Source", "load_source", "render"]
 
 #: Order matters: the first defines what the others use.
 SCRIPTS = ("page.js", "replay.js", "explorer.js")
+#: Lines of what is wrong that are read one after the other; of more the worst stand first, and the others open.
+SEEN = 30
 
 
 def render(source: Source) -> str:
@@ -42,6 +46,9 @@ def render(source: Source) -> str:
         _text("page.css") + engine_style(source.engines) + symbols(source.columns)
     )  # ours: nothing in it comes from a run
     script = Markup("\n".join(_text(name) for name in SCRIPTS))
+    wrong = answers(source.rows)
+    first = first_answers(source, wrong)
+    choices = choosing.choices(source)
     return small_html(
         _environment()
         .get_template("page.html.j2")
@@ -55,10 +62,13 @@ def render(source: Source) -> str:
             cite=cite(source),
             sentences=conclusions.sentences(source),
             families=families(source),
-            answers=answers(source.rows),
+            answers=wrong,
+            first_answers=first,
+            more_answers=[answer for answer in wrong if answer not in first],
             findings=conclusions.findings(source),
             by_reason=conclusions.by_reason,
-            choices=choosing.choices(source),
+            timed=[choice for choice in choices if choice.timed],
+            untimed=[choice for choice in choices if not choice.timed],
             scenes=scene_sections(source),
             replays=replay.replays(source),
             people=replay.people(source),
@@ -71,6 +81,15 @@ def render(source: Source) -> str:
             marks_used=_marks_used(source),
         )
     )
+
+
+def first_answers(source: Source, wrong: Sequence[Answer]) -> list[Answer]:
+    """What is seen without opening anything: everything of few scenes, of many the worst of each engine and family."""
+    if len(wrong) <= SEEN:
+        return list(wrong)
+    worst, _ = worst_answers(source.rows, families_of(source.rows))
+    chosen = {(answer.engine, answer.profile, answer.scene) for answer in worst}
+    return [answer for answer in wrong if (answer.engine, answer.profile, answer.scene) in chosen]
 
 
 def policy(style: str, script: str) -> str:

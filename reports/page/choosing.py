@@ -68,6 +68,11 @@ class Choice:
     candidates: list[Candidate]
 
     @property
+    def timed(self) -> bool:
+        """Whether any of those that pass was timed: only then is there a first choice."""
+        return any(candidate.cost_text for candidate in self.good)
+
+    @property
     def good(self) -> list[Candidate]:
         """Candidates that pass every check, the cheapest first."""
         return [candidate for candidate in self.candidates if candidate.largest]

@@ -48,6 +48,13 @@ def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
 
 #: Scenes on which not every engine has a clean profile that are told one by one; of more it is told by engine.
 FEW = 4
+#: Scenes that a sentence of the first screen names; of more it says how many, and the families below it name them.
+NAMED = 6
+
+
+def scenes_text(scenes: Sequence[str], of: int) -> str:
+    """Scenes by their names while a sentence can hold them, else how many of how many."""
+    return joined(scenes) if len(scenes) <= NAMED else f"{len(scenes)} of {of} scenes"
 
 
 def answering(source: Source) -> list[str]:
@@ -72,16 +79,17 @@ def agreement(source: Source) -> str:
         who = [f"{engine} ({'/'.join(clean[everywhere[0]][engine])})" for engine in engines]
         same = all(clean[s] == clean[everywhere[0]] for s in everywhere)
         parts.append(
-            f"on {joined(everywhere)} every engine has a profile within every tolerance"
+            f"on {scenes_text(everywhere, len(source.scenes))} every engine has a profile within every tolerance"
             + (f": {joined(who)}" if same else "")
             + _spread(source, everywhere[0], clean[everywhere[0]])
         )
     elsewhere = [scene for scene in source.scenes if scene not in everywhere]
     if len(elsewhere) > FEW:
         for engine in engines:
-            without = [scene for scene in elsewhere if not clean[scene].get(engine) and answers(source, scene, engine)]
+            asked = [scene for scene in source.scenes if answers(source, scene, engine)]
+            without = [scene for scene in asked if scene in elsewhere and not clean[scene].get(engine)]
             if without:
-                parts.append(f"no profile of {engine} passes everything on {joined(without)}")
+                parts.append(f"no profile of {engine} passes everything on {scenes_text(without, len(asked))}")
         return "; ".join(parts) + "."
     for scene in elsewhere:
         who = [f"{e}/{p}" for e, profiles in clean[scene].items() for p in profiles]
@@ -114,7 +122,7 @@ def departures(source: Source) -> str:
     total = sum(len(group) for group in groups.values())
     parts = []
     for (engine, profile), group in sorted(groups.items(), key=lambda item: -len(item[1]))[:3]:
-        scenes = joined(dict.fromkeys(row["scene"] for row in group))
+        scenes = scenes_text(list(dict.fromkeys(row["scene"] for row in group)), len(source.scenes))
         because = Counter(_law_text(row["reason"]) for row in group).most_common(1)[0][0]
         parts.append(f"{engine}/{profile} on {scenes} ({len(group)}: {because})")
     more = f"; and {len(groups) - 3} more" if len(groups) > 3 else ""
@@ -212,7 +220,8 @@ class Reasoned:
 
 def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list[Reasoned]:
     """Findings that have the same reason, together, in the order in which the first of each stands."""
-    cured = {(answer.engine, answer.profile, answer.scene): answer.cure for answer in answers_of(source.rows)}
+    # The settings that would do stand once, with what is wrong.
+    cured = {(a.engine, a.profile, a.scene): a.cure.partition("; ")[0] for a in answers_of(source.rows)}
     groups: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
     for finding in found:
         groups[finding.engine, finding.profile, without_prediction(finding.reason)].append(finding)

@@ -47,7 +47,7 @@ class LevelCell:
 
 @dataclass(frozen=True)
 class LevelTable:
-    """One scene and dimension: engines x levels."""
+    """One scene and dimension: engines x levels; ``refused`` names who has no line because it cannot be asked."""
 
     anchor: str
     scene: str
@@ -55,6 +55,7 @@ class LevelTable:
     name: str
     levels: list[str]
     rows: list[tuple[str, str, list[LevelCell]]]
+    refused: str
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def speed(source: Source) -> Speed | None:
         _multiples(bench),
         _scaling_figures(tables["scaling"]),
         tables["scaling_fits"].to_dict("records"),
-        _overhead(tables["overhead"]),
+        _overhead(tables["overhead"], source.columns),
         _protocol(bench),
         _voided(tables["timings"]),
     )
@@ -141,13 +142,20 @@ def _level_tables(table: pd.DataFrame, column: str, smallest: float, ranked: boo
         return out
     for (scene, dimension), group in table.groupby(["scene", "dimension"], sort=False):
         levels = [level for level in sorted(set(group["level"]), reverse=column == "cost") if level >= smallest]
-        rows = []
+        rows, refused = [], []
         for (engine, profile), own in group.groupby(["engine", "profile"], sort=False):
+            if all(str(reason).startswith("unsupported") for reason in own["reason"]):
+                refused.append(f"{engine}/{profile}")
+                continue
             by_level = {row["level"]: row for row in own.to_dict("records")}
             rows.append((str(engine), str(profile), [_level_cell(by_level[level], column, ranked) for level in levels]))
         names = [level_text(level) if column == "cost" else duration(level) for level in levels]
         anchor = slug("level", column, scene, dimension)
-        out.append(LevelTable(anchor, str(scene), int(str(dimension)), primary_of(str(scene)).name, names, rows))
+        out.append(
+            LevelTable(
+                anchor, str(scene), int(str(dimension)), primary_of(str(scene)).name, names, rows, ", ".join(refused)
+            )
+        )
     return out
 
 
@@ -240,15 +248,16 @@ def _scaling_figure(purpose: str, scene: str, dimension: int, group: pd.DataFram
     return Figure(f"fig-scaling-{title}", title, "", svg(chart, title))
 
 
-def _overhead(table: pd.DataFrame) -> Sequence[Plain]:
-    """One row per engine, profile and dimension: empty and flight, plain and with every state read."""
+def _overhead(table: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> Sequence[Plain]:
+    """One row per dimension, engine and profile, in the page's order: empty and flight, plain and with states read."""
     rows: dict[tuple[Any, ...], dict[Hashable, Any]] = {}
     for r in table.to_dict("records"):
         key = (r["engine"], r["profile"], r["dimension"])
         row = rows.setdefault(key, {"engine": r["engine"], "profile": r["profile"], "dimension": r["dimension"]})
         value = duration(r["per_step"]) if math.isfinite(r["per_step"]) else "–"
         row[f"{r['scene']}{'_sampled' if r['sampled'] else ''}"] = value
-    return list(rows.values())
+    place = {column: k for k, column in enumerate(columns)}
+    return sorted(rows.values(), key=lambda r: (r["dimension"], place.get((r["engine"], r["profile"]), len(place))))
 
 
 def _protocol(bench: Bench) -> list[tuple[str, str]]:

@@ -55,7 +55,7 @@ def people(source: Source) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Replay:
-    """One scene and dimension, for the player and, without JavaScript, as a figure and a table."""
+    """One scene and dimension, for the player and, without JavaScript, as a figure and a sentence."""
 
     id: str
     title: str
@@ -64,6 +64,19 @@ class Replay:
     figure: Figure | None
     command: str
     departures: list[tuple[str, str, float | None, str]]
+
+    @property
+    def departures_text(self) -> str:
+        """Who leaves the tolerance, and when, the first on top: ``one/default at 0.100 s; the other 3 never``."""
+        gone = sorted((d for d in self.departures if d[2] is not None), key=lambda d: d[2] or 0.0)
+        said = [f"{e}/{p} at {t:.3f} s{' (diverged)' if end == 'diverged' else ''}" for e, p, t, end in gone]
+        said += [f"{e}/{p} diverged" for e, p, t, end in self.departures if t is None and end == "diverged"]
+        stay = len(self.departures) - len(said)
+        if not said:
+            return "no engine leaves the tolerance"
+        return f"{', '.join(said)}" + (
+            f"; the other {stay} never" if stay > 1 else "; the other one never" if stay else ""
+        )
 
 
 def replays(source: Source) -> list[Replay]:

@@ -24,6 +24,13 @@ INHERITED = (
 )  # fmt: skip
 #: What a reader of a part of a chart would be told, if there were one.
 UNREAD = ("class", "role", "aria-hidden", "aria-roledescription")
+#: What SVG takes for granted where nothing around a part says otherwise [SVG 1.1, property index: initial values].
+GRANTED = {"font-weight": "normal", "stroke-dasharray": "1,0", "stroke-width": "1", "x2": "0", "y2": "0",
+           "version": "1.1"}  # fmt: skip
+#: The font is the page's; what is saved of it states it once.
+FONT = "font-family"
+#: A place or a length in hundredths of a unit, of which tenths are seen.
+_HUNDREDTHS = re.compile(r"-?\d+\.\d\d+")
 #: What vl-convert says of axes, which have titles of their own.
 AXES = ("X-axis", "Y-axis")
 _TRANSLATED = re.compile(r"translate\((-?[\d.]+),(-?[\d.]+)\)")
@@ -37,6 +44,7 @@ def small_svg(text: str) -> str:
     """An SVG drawing that looks the same: one value once, straight runs of points as one line, no empty group."""
     root = ElementTree.fromstring(_NAMESPACE.sub("", text))
     _clean(root)
+    _granted(root, frozenset())
     return ElementTree.tostring(root, encoding="unicode", short_empty_elements=True).replace(" />", "/>")
 
 
@@ -60,6 +68,21 @@ def _clean(node: ElementTree.Element) -> None:
         _hand_up(node, list(node))
         node[:] = list(_kept(node))  # a group that has handed up all it said says nothing any more
         _join_rules(node)
+
+
+def _granted(node: ElementTree.Element, around: frozenset[str]) -> None:
+    """Take what needs no saying from the parts of a clean drawing; ``around``: what the groups about a part say."""
+    node.attrib.pop(FONT, None)
+    for name, value in GRANTED.items():
+        if node.get(name) == value and name not in around:
+            del node.attrib[name]
+    for name in ("transform", "x2", "y2"):
+        if name in node.attrib:
+            node.set(
+                name, _HUNDREDTHS.sub(lambda found: f"{float(found[0]):.1f}".removesuffix(".0"), node.attrib[name])
+            )
+    for part in node:
+        _granted(part, around | node.attrib.keys())
 
 
 def _kept(node: ElementTree.Element) -> Iterator[ElementTree.Element]:

@@ -229,13 +229,15 @@ def test_needs_follow_from_the_scene() -> None:
 PINNED = "43a280c6c7e6f74a"
 
 
-def test_two_entries_that_say_different_things_of_one_pair_are_refused():
-    bodies = (
-        Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"),
-        Body("ball", Disc(0.5), pose=(0.0, 1.0, 0.0)),
-    )
-    vague = (Pair("ball", "*", friction=0.1), Pair("*", "floor", friction=0.2))
-    with pytest.raises(SceneError, match="pair floor-ball: 2 entries"):
-        Scene("s", 1, 2, bodies, vague, (0.0, -9.81), 1.0)
-    named = (*vague, Pair("floor", "ball", friction=0.3))
-    assert Scene("s", 1, 2, bodies, named, (0.0, -9.81), 1.0).material("ball", "floor").friction == 0.3
+def test_two_entries_that_say_different_things_of_a_pair_that_never_meets_are_named_when_it_is_asked():
+    wall = Body("wall", HalfSpace((1.0, 0.0), 0.0), motion="fixed")
+    doubtful = (Pair("wall", "*", 0.5, 0.1), Pair("*", "floor", 0.2, 0.1), Pair("ball", "floor"), Pair("ball", "wall"))
+    posed = scene(FLOOR, wall, BALL, pairs=doubtful)
+    with pytest.raises(SceneError, match=r"^pair wall-floor: 2 entries say different things"):
+        posed.material("wall", "floor")
+
+
+def test_a_name_that_cannot_be_one_is_cut_to_what_a_name_may_be():
+    with pytest.raises(SceneError, match="cannot be the name of a body") as caught:
+        scene(FLOOR, replace(BALL, name="b" * 500))
+    assert len(str(caught.value)) < 300

@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from reports import page
+from reports.answers import answers
 from reports.command import main
-from reports.page import Source, as_data, load_source, policy, render
+from reports.page import Source, as_data, first_answers, load_source, policy, render
 from reports.page.choosing import choices, cures
-from reports.page.conclusions import findings, sentences
+from reports.page.conclusions import NAMED, findings, scenes_text, sentences
 from reports.page.explorer import explorer
 from reports.page.families import families, sentence
-from reports.page.replay import people, replays
+from reports.page.replay import Replay, people, replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import slug
 from validation.cells import Slot
@@ -186,6 +188,38 @@ def test_where_many_scenes_part_the_engines_each_engine_says_where_it_has_no_cle
     assert first.startswith("on scene0 every engine has a profile")
     assert "no profile of two passes everything on scene1, scene2, scene3, scene4 and scene5." in first
     assert "no profile of one" not in first
+
+
+def test_a_sentence_names_few_scenes_and_counts_many():
+    few = [f"scene{k}" for k in range(NAMED)]
+    assert scenes_text(few, 40) == ", ".join(few[:-1]) + f" and {few[-1]}"
+    assert scenes_text([*few, "more"], 40) == f"{NAMED + 1} of 40 scenes"
+
+
+def test_of_many_things_that_are_wrong_the_worst_of_each_engine_and_family_come_first(page_source, monkeypatch):
+    wrong = answers(page_source.rows)
+    assert first_answers(page_source, wrong) == wrong
+    monkeypatch.setattr(page, "SEEN", 2)
+    first = first_answers(page_source, wrong)
+    family = {scene: each.name for each in families(page_source) for scene in each.scenes}
+    assert [answer for answer in wrong if answer in first] == first and 0 < len(first) < len(wrong)
+    places = [(answer.engine, family[answer.scene]) for answer in first]
+    assert len(set(places)) == len(places)
+    for answer in wrong:
+        if answer.profile == "default":
+            rival = first[places.index((answer.engine, family[answer.scene]))]
+            assert rival.failing >= answer.failing
+    made = render(page_source)
+    assert f"The other {len(wrong) - len(first)}, scene by scene" in made
+    table = made.partition("<table class=wrongs")[0] + made.partition('class="wrongs blocks"')[2]
+    assert all(answer.wrong.replace("&", "&amp;") in table for answer in wrong if "<" not in answer.wrong)
+
+
+def test_only_scenes_that_were_timed_have_a_first_choice(page_source):
+    found = choices(page_source)
+    assert any(choice.timed for choice in found)
+    assert not any(choice.timed for choice in choices(Source(page_source.run, page_source.rows, [])))
+    assert all(any(c.cost_text for c in choice.good) for choice in found if choice.timed)
 
 
 def test_a_drift_within_the_tolerance_changes_the_stated_spread_only():
@@ -431,3 +465,17 @@ def test_the_guides_of_a_chart_have_the_slopes_they_claim_also_where_the_picture
         rise = np.diff(np.log(ends["error"])) / np.diff(np.log(ends["dt"]))
         assert rise == pytest.approx(float(order), rel=1e-9)
         assert ends["error"].min() >= low * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("departures", "said"),
+    [
+        ([("a", "x", None, "ok")], "no engine leaves the tolerance"),
+        ([("a", "x", 0.2, "ok"), ("b", "y", 0.1, "diverged")], "b/y at 0.100 s (diverged), a/x at 0.200 s"),
+        ([("a", "x", 0.2, "ok"), ("b", "y", None, "ok")], "a/x at 0.200 s; the other one never"),
+        ([("a", "x", None, "diverged"), ("b", "y", None, "ok"), ("c", "z", None, "ok")],
+         "a/x diverged; the other 2 never"),
+    ],
+)  # fmt: skip
+def test_who_leaves_the_tolerance_is_told_in_a_line_the_first_on_top(departures, said):
+    assert Replay("i", "t", "s", {}, None, "c", departures).departures_text == said

@@ -32,3 +32,11 @@ def test_a_reason_is_proven_on_its_engine():
     proofs = json.loads(result.stdout)
     assert len(proofs) == len(chosen("stack-touching-start", ["chipmunk"])["chipmunk"])
     assert all(proof["holds"] and proof["why_not"] == "" for proof in proofs)
+
+
+@pytest.mark.parametrize(("option", "name"), [("--engine", "mujoco"), ("--scene", "slide"), ("--profile", "soft")])
+def test_who_is_not_in_the_run_is_said_and_not_that_nothing_fails(page_folder, option, name):
+    result = run("--out", str(page_folder), option, name)
+    assert result.exit_code == 2 and result.stdout == ""
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith(f"crosscheck: {option}: this run has no rows of '{name}', but of ")

@@ -52,6 +52,20 @@ def test_one_look_is_said_once_and_parts_that_differ_keep_theirs():
     assert "class" not in small and "graphics-symbol" not in small and 'role="img"' in small
 
 
+def test_what_svg_takes_for_granted_is_left_out_unless_a_group_says_otherwise():
+    small = small_svg(
+        '<svg version="1.1" role="img" aria-label="a"><g stroke-width="3" font-family="serif"><path d="M0,0L9,9" '
+        'stroke="red" stroke-width="1"/><path d="M0,0L9,9" stroke="red"/></g><path d="M0,0L9,9" stroke="red" '
+        'stroke-width="1" stroke-dasharray="1,0"/><line transform="translate(80.87,18.04) rotate(-90)" x2="0" '
+        'y2="-4.96" stroke-dasharray="5,3"/></svg>'
+    )
+    assert small == (
+        '<svg role="img" aria-label="a"><g stroke-width="3" stroke="red"><path d="M0,0l9,9" stroke-width="1"/>'
+        '<path d="M0,0l9,9"/></g><path d="M0,0l9,9" stroke="red"/>'
+        '<line transform="translate(80.9,18) rotate(-90)" y2="-5" stroke-dasharray="5,3"/></svg>'
+    )
+
+
 class Seen(HTMLParser):
     """Tags with attributes, and text: what a browser is given, closing tags aside."""
 

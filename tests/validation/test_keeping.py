@@ -1,5 +1,6 @@
 """Stores of several machines become one without losing or doubling a row; what is too old goes by rules."""
 
+import hashlib
 import sqlite3
 from datetime import UTC, datetime, timedelta
 
@@ -7,7 +8,7 @@ import pytest
 
 from validation.cells import Observation, Outcome, Slot
 from validation.records import store as storing
-from validation.records.keeping import TABLES, Rules, doomed, merge, prune
+from validation.records.keeping import TABLES, Rules, _copy, doomed, merge, prune
 from validation.records.store import Run, Store, StoreError
 
 SLOTS = [Slot("impact", (("v", float(v)),), 2, "chipmunk", "tuned", 1 / 240) for v in range(1, 5)]
@@ -119,6 +120,91 @@ def test_what_cannot_be_merged_is_one_line_and_changes_nothing(tmp_path, monkeyp
     assert contents(ours) == before
 
 
+def test_a_run_of_another_machine_gets_an_id_from_what_it_is_and_a_third_is_refused(tmp_path, monkeypatch):
+    """The id is that of the run and six digits of what it is, at most 63 characters; which it is does not change."""
+    ours = filled(tmp_path / "a", "one", monkeypatch)
+    long = "r" * 60
+    for k, machine in enumerate(("one", "two", "two")):
+        store = ours if k == 0 else filled(tmp_path / f"b{k}", machine, monkeypatch)
+        db = sqlite3.connect(store.path)
+        for table, column in (("runs", "id"), *((table, "run") for table in TABLES)):
+            db.execute(f"UPDATE {table} SET {column} = ?", (long,))
+        if k == 2:  # the same id once more, and of it the id that is made: somebody else's
+            db.execute("UPDATE runs SET date = '2020-01-01T00:00:00+00:00'")
+        db.commit()
+    merge(ours, tmp_path / "b1")
+    (_, second) = ours.runs()
+    identity = sqlite3.connect(ours.path).execute("SELECT date, machine, plan FROM runs WHERE id = ?", (second.id,))
+    digest = hashlib.sha256(repr(identity.fetchone()).encode()).hexdigest()[:6]
+    assert second.id == f"{long[:56]}-{digest}"
+    merge(ours, tmp_path / "b2")
+    assert len({run.id for run in ours.runs()}) == 3
+    db = sqlite3.connect(ours.path)
+    db.execute("UPDATE runs SET date = '2019-01-01T00:00:00+00:00' WHERE id != ?", (long,))
+    db.commit()
+    with pytest.raises(StoreError, match=f"^merge: two runs are called {long} and are not the same$"):
+        merge(ours, tmp_path / "b1")
+
+
+def test_a_name_of_any_length_is_refused_in_a_line(tmp_path, monkeypatch):
+    ours = filled(tmp_path / "a", "one", monkeypatch)
+    filled(tmp_path / "b", "two", monkeypatch)
+    for folder in ("a", "b"):
+        db = sqlite3.connect(tmp_path / folder / storing.FILE)
+        db.execute("UPDATE runs SET id = ?", ("r" * 200,))
+        db.commit()
+    merge(ours, tmp_path / "b")
+    db = sqlite3.connect(ours.path)
+    db.execute("UPDATE runs SET date = '2019-01-01T00:00:00+00:00'")
+    db.commit()
+    with pytest.raises(StoreError) as caught:
+        merge(ours, tmp_path / "b")
+    assert len(str(caught.value)) == len("merge: two runs are called  and are not the same") + 80
+
+
+def test_a_finished_run_stays_finished_and_one_that_only_the_other_finished_is_finished_here(tmp_path, monkeypatch):
+    for here in (True, False):
+        ours = filled(tmp_path / f"a{here}", "one", monkeypatch, finish=True)
+        ours.close()
+        (tmp_path / f"b{here}").mkdir()
+        (tmp_path / f"b{here}" / storing.FILE).write_bytes(ours.path.read_bytes())
+        open_one = ours.path if not here else tmp_path / f"b{here}" / storing.FILE
+        db = sqlite3.connect(open_one)
+        db.execute("UPDATE runs SET finished = 0")
+        db.commit()
+        ours = Store(tmp_path / f"a{here}")
+        merge(ours, tmp_path / f"b{here}")
+        assert [run.finished for run in ours.runs()] == [True]
+
+
+def test_a_store_from_before_a_table_was_there_is_merged_without_it(tmp_path, monkeypatch):
+    ours = filled(tmp_path / "a", "one", monkeypatch)
+    filled(tmp_path / "b", "two", monkeypatch).close()
+    db = sqlite3.connect(tmp_path / "b" / storing.FILE)
+    db.execute("DROP TABLE protocols")
+    db.commit()
+    db.close()
+    source = sqlite3.connect(tmp_path / "b" / storing.FILE)
+    with ours.writing() as here:
+        assert _copy(here, source, "protocols", "any", "any") == (0, 0)
+
+
+def test_a_store_that_breaks_while_it_is_read_is_one_line_with_its_path(tmp_path, monkeypatch):
+    from validation.records import keeping
+
+    ours = filled(tmp_path / "a", "one", monkeypatch)
+    filled(tmp_path / "b", "two", monkeypatch)
+
+    def breaks(db, source):
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            source.execute("DELETE FROM runs")
+        raise sqlite3.DatabaseError("disk image\nof 3 lines")
+
+    monkeypatch.setattr(keeping, "_merged", breaks)
+    with pytest.raises(StoreError, match=r"^merge: cannot read .*b/\S+: disk image[^\n]*$"):
+        merge(ours, tmp_path / "b")
+
+
 NOW = datetime(2026, 11, 22, tzinfo=UTC)
 
 
@@ -148,3 +234,30 @@ def test_pruned_runs_leave_no_row_and_give_their_room_back(tmp_path, monkeypatch
     assert len(gone) == 39 and [each.id for each in store.runs()] == [newest]
     assert {row[0] for rows in (contents(store)[table] for table in TABLES) for row in rows} == {newest}
     assert store.path.stat().st_size < size
+
+
+def test_recordings_are_kept_of_the_newest_finished_run_of_each_title_alone(tmp_path, monkeypatch):
+    store = filled(tmp_path, "one", monkeypatch, (0.1, 0.2))
+    other, _ = store.start("quick: bounce", SLOTS, fresh=True)
+    store.finish(other)
+    last, _ = store.start("quick: impact", SLOTS, fresh=True)  # not finished: it is no newest
+    with store.writing() as db:
+        for each in store.runs():
+            db.execute("INSERT INTO recordings VALUES (?, 's', '{}', x'00')", (each.id,))
+    first, second, *_ = store.runs()
+    assert prune(store, Rules()) == [] and len(contents(store)["recordings"]) == 4
+    assert prune(store, Rules(recordings=True)) == []
+    assert {row[0] for row in contents(store)["recordings"]} == {second.id, other.id}
+    assert first.id != second.id and last.id in {run.id for run in store.runs()}
+
+
+def test_the_age_of_a_run_is_measured_from_now_or_from_the_time_that_is_given(tmp_path, monkeypatch):
+    store = filled(tmp_path, "one", monkeypatch, (0.1, 0.2))
+    assert doomed(store.runs(), Rules(days=1)) == [] and len(doomed(store.runs(), Rules(days=-1))) == 1
+    tomorrow = datetime.now(UTC) + timedelta(days=1.5)
+    assert prune(store, Rules(days=2), tomorrow) == []
+    assert len(prune(store, Rules(days=1), tomorrow)) == 1
+
+
+def test_what_is_as_old_as_the_rule_stays():
+    assert doomed([run(1, days=3), run(2)], Rules(days=3), NOW) == []

@@ -509,3 +509,11 @@ def test_half_a_turn_in_space_is_the_largest_there_is_and_in_the_plane_whole_tur
     assert metrics.turned(np.array([(0.0, 0.0, 0.5), (0.0, 0.0, 10.5)])) == 10.0
     pose = np.array([(0.0, 0.0, 0.0, *q) for q in turned((0.6, 0.0, 0.8), (0.0, math.pi, 5.0))])
     assert metrics.turned(pose) == pytest.approx(math.pi)
+
+
+def test_the_largest_relative_error_is_told_and_a_missing_value_with_its_reason():
+    found = {"a": (2.2, ""), "b": (-3.6, "read late"), "lost": (None, "it never touched"), "later": (None, "gone")}
+    truth = {"a": 2.0, "b": -3.0, "lost": 1.0, "later": 1.0}
+    assert metrics.relative_error(found, truth, ["a", "b"]) == (pytest.approx(0.2, rel=1e-12), "")
+    assert metrics.relative_error(found, truth, ["a"]) == (pytest.approx(0.1, rel=1e-12), "")
+    assert metrics.relative_error(found, truth, ["a", "lost", "later"]) == (None, "it never touched")

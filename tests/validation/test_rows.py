@@ -56,6 +56,17 @@ def test_what_the_metric_says_stands_once_before_what_the_verdict_says():
     assert judged(metrics={}).value is None
 
 
+def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatch):
+    class Brought:
+        def brought(self, engine, profile):
+            return "its softness" if (engine, profile) == ("nameless", "soft") else None
+
+    real = rows.resolve
+    monkeypatch.setattr(rows, "resolve", lambda scene: Brought() if scene == "incline" else real(scene))
+    why = "as soft as its author made it: a model's own profile is no engine's"
+    assert rows._known(SEEN, SLOT, CHECK) == rows.Known(None, False, why)
+
+
 def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     monkeypatch.setattr(rows, "findings_of", lambda engine: None)

@@ -99,3 +99,57 @@ def test_the_most_serious_cell_is_followed():
 def test_a_check_that_no_row_has_is_said():
     found = bisect(2, [SLOT], "rebound", Engine([0.5, 0.4]))
     assert isinstance(found, Unchanged) and "no such row" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [("apex", ["apex[1]", "apex[2]"]), ("apex[1]", ["apex[1]"]), ("bounce/apex[1]", ["apex[1]"]), ("ape", []),
+     ("apex[1", []), ("[1]", [])],
+)  # fmt: skip
+def test_a_check_is_meant_by_its_name_its_series_or_its_place_in_it(asked, meant):
+    from validation.releases.bisection import _meant
+
+    assert [metric for metric in ("apex[1]", "apex[2]", "rest[1][2]") if _meant(metric, asked)] == meant
+    assert not _meant("rest[1][2]", "rest[1]") and _meant("rest[1][2]", "rest")
+
+
+def test_who_was_asked_is_said_in_order_and_only_the_cell_that_is_followed_is_asked_between_the_ends():
+    """The cell as it is and from starts moved by units in the last place: the floor of both sides."""
+    cells = []
+
+    class Listening(Engine):
+        def __call__(self, index, slots):
+            cells.append((index, [slot.ulp for slot in slots], {slot.params for slot in slots}))
+            return super().__call__(index, slots)
+
+    other = replace(SLOT, params=(("e", 0.7), ("v", 4.0)))
+    found = bisect(5, [other, SLOT], "rebound_ratio", Listening([0.5, 0.5, 0.5, 0.4, 0.4]))
+    assert found.asked == (0, 4, 2, 3) == tuple(index for index, *_ in cells)
+    ends, between = cells[:2], cells[2:]
+    assert all(params == {SLOT.params, other.params} for _, _, params in ends)
+    assert all(params == {SLOT.params} and moved[0] == 0 and len(set(moved)) == len(moved) > 1
+               for _, moved, params in between)  # fmt: skip
+
+
+def test_a_flip_is_followed_by_its_verdict_whatever_the_value_does():
+    """The value moves at 1 and stays right; the verdict goes at 3."""
+    found = bisect(5, [SLOT], "rebound_ratio", Engine([0.5, 0.5 + 1e-13, 0.5 + 1e-13, 0.4, 0.3]))
+    assert (found.before, found.after, found.change.kind) == (2, 3, Kind.FLIP)
+
+
+def test_nothing_changed_has_no_reason_and_the_end_that_is_silent_has_its_own():
+    assert bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.4, 0.5])) == Unchanged("")
+    first = bisect(3, [SLOT], "rebound_ratio", Engine([None, 0.5, 0.5]))
+    assert first == Unchanged("release 0 cannot be asked: no wheel")
+    last = bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.5, None]))
+    assert last == Unchanged("release 2 cannot be asked: no wheel")
+
+
+def test_a_release_that_names_no_reason_has_that_of_its_rows():
+    class Refusing(Engine):
+        def __call__(self, index, cells):
+            told = super().__call__(index, cells)
+            return replace(told, reason="") if self.ratios[index] is None else told
+
+    found = bisect(3, [SLOT], "rebound_ratio", Refusing([0.5, None, 0.4]))
+    assert "no wheel" in found.silent[1]

@@ -7,13 +7,15 @@ import pytest
 from reports.command import releasing
 from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
-from validation.findings import Family, Finding, FindingsError
-from validation.judging.comparison import Kind
+from validation.findings import Family, Finding, Findings, FindingsError, row_key
+from validation.judging.comparison import Change, Kind
+from validation.judging.verdicts import Physics
+from validation.records.store import RELEASE_TITLE, Store
 from validation.releases import history, notes
 from validation.releases.choosing import Release
 from validation.releases.driving import Effort
 from validation.releases.floors import moved_starts
-from validation.releases.history import steps, told_by
+from validation.releases.history import Told, steps, told_by
 
 SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
 OTHER = Slot("impact", (("e", 0.5), ("v", 8.0)), 2, "toy", "default", 1 / 240)
@@ -106,8 +108,6 @@ def test_rows_that_end_without_an_answer_are_counted_apart_from_those_that_fail(
 
 
 def test_a_missing_answer_never_replaces_one(tmp_path):
-    from validation.records.store import RELEASE_TITLE, Store
-
     store = Store(tmp_path)
     for outcome in (Outcome.OK, Outcome.NOT_INSTALLED):
         run, _ = store.start(f"{RELEASE_TITLE}chipmunk==1.0: impact", [], fresh=True)
@@ -120,8 +120,6 @@ def test_a_missing_answer_never_replaces_one(tmp_path):
 
 
 def test_versions_are_in_the_order_of_versions(tmp_path):
-    from validation.records.store import RELEASE_TITLE, Store
-
     store = Store(tmp_path)
     for version in ("3.10.0", "3.9.0", "3.9.0", "4.0.0rc1", "4.0.0"):
         store.start(f"{RELEASE_TITLE}toy=={version}: impact", [], fresh=True, apart=version)
@@ -139,6 +137,185 @@ def test_what_passes_beyond_the_band_of_a_finding_of_other_releases_is_mended(mo
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, value, 0.01))
     (row,) = [row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio"]
     assert row.physics == "pass" and history.mended(row) is is_mended
+
+
+# ---- what one release says of itself ----
+
+
+def test_a_release_is_told_by_its_name_its_rows_and_its_times():
+    times = {("toy", "default", "impact", 2): 2.0}
+    release = told_by(
+        "toy", "2", [Observation(SLOT, "c", 1, "2", Outcome.OK, metrics={"rebound_ratio": (0.4, "")})], times
+    )
+    assert (release.name, release.reason, release.doubted, release.times) == ("toy==2", "", (), times)
+    assert {row.run for row in release.rows} == {"toy==2"} and release.count(Physics.FAIL) >= 1
+    fails = [row for row in release.rows if row.physics == "fail"]
+    assert release.count(Physics.FAIL) == len(fails) < len(release.rows)
+    nothing = told_by("toy", "2", [])
+    assert (nothing.rows, nothing.reason, nothing.times) == ((), "it was not asked", {})
+
+
+def test_an_invalid_release_has_answered_and_needs_no_reason():
+    assert told("2", None, outcome=Outcome.INVALID).reason == ""
+
+
+HELD, BROKEN, WORSE = ({"quantity": name, "holds": holds} for name, holds in
+                       (("mass", True), ("friction", False), ("gravity", False)))  # fmt: skip
+
+
+def test_a_profile_of_which_a_receipt_fails_has_no_verdicts_and_others_keep_theirs():
+    """Two cells of one profile, the second right: what is right by chance is not right either."""
+    metrics = {"rebound_ratio": (0.5, "")}
+    sound = replace(SLOT, profile="sound")
+    found = [
+        Observation(SLOT, "c", 1, "2", Outcome.OK, metrics=metrics, receipts=(HELD, BROKEN, WORSE)),
+        Observation(OTHER, "c", 1, "2", Outcome.OK, metrics=metrics, receipts=(WORSE,)),
+        Observation(sound, "c", 1, "2", Outcome.OK, metrics=metrics, receipts=(HELD,)),
+    ]
+    release = told_by("toy", "2", found)
+    why = "receipt friction fails in impact"
+    assert release.doubted == (f"default: {why}",)
+    doubted = [row for row in release.rows if row.profile == "default"]
+    assert {(r.outcome, r.physics, r.standing, r.reason) for r in doubted} == {
+        ("invalid", None, None, f"no verdict: {why}")
+    }
+    assert len({row.slot["params"]["v"] for row in doubted}) == 2
+    kept = [row for row in release.rows if row.profile == "sound" and row.metric == "rebound_ratio"]
+    assert [(row.outcome, row.physics) for row in kept] == [("ok", "pass")]
+
+
+def test_what_was_invalid_before_keeps_its_own_reason():
+    found = [Observation(SLOT, "c", 1, "2", Outcome.INVALID, "it sinks", receipts=(BROKEN,))]
+    assert all("no verdict" not in row.reason and "it sinks" in row.reason for row in told_by("toy", "2", found).rows)
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "pace"),
+    [({"a": 6.0, "b": 2.0, "c": 9.0}, {"a": 2.0, "b": 1.0, "d": 5.0}, 2.5), ({"a": 6.0}, {"b": 1.0}, None)],
+)
+def test_the_pace_of_a_release_is_the_median_over_what_both_were_timed_on(own, other, pace):
+    first, second = (Told("toy", "1", (), times=times) for times in (own, other))
+    assert first.pace(second) == pace
+
+
+# ---- what a store has of releases ----
+
+
+@pytest.fixture
+def releases(tmp_path):
+    """A store, and `add(version, ratio, slot)` that answers a cell on a release."""
+    store = Store(tmp_path)
+
+    def add(version, ratio, slot=SLOT, outcome=Outcome.OK, engine="toy"):
+        run, _ = store.start(f"{RELEASE_TITLE}{engine}=={version}: a: b==c", [], fresh=True, apart=version)
+        store.add(run, Observation(slot, "c", 1, version, outcome, "gone", {"rebound_ratio": (ratio, "")}))
+        return run
+
+    yield store, add
+    store.close()
+
+
+def ratios_of(release):
+    return {row.params["v"]: row.value for row in release.rows if row.metric == "rebound_ratio"}
+
+
+def test_all_that_a_store_has_of_an_engine_is_told_oldest_first_unless_some_is_named(releases, monkeypatch):
+    store, add = releases
+    for version, ratio, slot in (("10", 0.3, SLOT), ("9", 0.5, SLOT), ("9", 0.4, OTHER)):
+        add(version, ratio, slot)
+    add("1", 0.2, engine="other")
+    monkeypatch.setattr(history, "times", lambda *asked: {"asked": asked})
+    every = history.told(store, "toy")
+    assert [(t.engine, t.version, ratios_of(t)) for t in every] == [
+        ("toy", "9", {4.0: 0.5, 8.0: 0.4}), ("toy", "10", {4.0: 0.3})
+    ]  # fmt: skip
+    assert [t.times["asked"] for t in every] == [(store, "toy", "9"), (store, "toy", "10")]
+    assert [t.version for t in history.told(store, "toy", ["10"])] == ["10"]
+    assert [ratios_of(t) for t in history.told(store, "toy", ["9"], [OTHER])] == [{8.0: 0.4}]
+    assert history.engines(store) == ["toy", "other"] and history.versions(store, "toy") == ["9", "10"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "kept"),
+    [(Outcome.OK, Outcome.OK, 0.4), (Outcome.OK, Outcome.INVALID, 0.4), (Outcome.OK, Outcome.NOT_INSTALLED, 0.5),
+     (Outcome.NOT_INSTALLED, Outcome.UNSUPPORTED, 0.4), (Outcome.INVALID, Outcome.NOT_INSTALLED, 0.4)],
+)  # fmt: skip
+def test_the_newest_answer_to_a_cell_counts_and_what_is_none_replaces_no_answer(releases, first, second, kept):
+    store, add = releases
+    add("1", 0.5, outcome=first)
+    add("1", 0.4, outcome=second)
+    add("2", 0.1)
+    (found,) = history.observations(store, "toy", "1")
+    assert found.metrics["rebound_ratio"][0] == kept
+
+
+def test_the_newest_ratio_of_each_scene_of_a_release_is_its_time(releases, monkeypatch):
+    import pandas as pd
+
+    store, add = releases
+    runs = {add(version, 0.5).id: k for k, version in enumerate(("1", "1", "2"))}
+    add("1", 0.5, engine="other")
+
+    def ratios(asked, run):
+        assert asked is store
+        row = {"engine": "toy", "profile": "soft", "scene": "impact", "dimension": 3, "ratio": 2.0 + runs[run.id]}
+        return pd.DataFrame([row, row | {"scene": f"scene{runs[run.id]}"}])
+
+    monkeypatch.setattr(history, "ratios", ratios)
+    assert history.times(store, "toy", "1") == {
+        ("toy", "soft", "impact", 3): 3.0, ("toy", "soft", "scene0", 3): 2.0, ("toy", "soft", "scene1", 3): 3.0
+    }  # fmt: skip
+    assert history.times(store, "toy", "3") == {}
+
+
+# ---- what moved, as data and in words ----
+
+
+def test_a_step_as_data_has_both_releases_its_largest_change_and_how_many_moved():
+    step = next(s for s in steps([told("1", 0.5, (SLOT, OTHER)), told("2", 0.4, (SLOT, OTHER))])
+                if s.family.first.metric == "rebound_ratio")  # fmt: skip
+    assert step.as_dict() == {"before": "1", "after": "2", "rows": 2, "change": step.family.first.as_dict()}
+
+
+def test_a_slot_is_the_same_however_its_fields_are_ordered():
+    slot = SLOT.as_dict()
+    other = dict(reversed(slot.items()))
+    assert list(other) != list(slot)
+    assert history.identity({"slot": slot, "metric": "a"}) == history.identity({"slot": other, "metric": "a"})
+
+
+@pytest.mark.parametrize(
+    ("iterations", "said"),
+    [(None, "soft stack 3-D n=10 apex: 1 -> 2"), (4, "soft stack 3-D n=10 at 4 iterations apex: 1 -> 2")],
+)
+def test_a_change_is_told_with_its_cell(iterations, said):
+    change = Change(
+        Kind.FLIP, True, "toy", "soft", "stack", 3, "n=10", "apex", "1", "2", 1.0, {"iterations": iterations}
+    )
+    assert history.sentence(change) == said
+
+
+def test_a_row_has_the_finding_of_its_own_engine_and_cell(monkeypatch):
+    family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "")
+    finding = Finding(family, 0.4, 0.01)
+    listed = Findings("toy", {"slow": family}, (), {row_key(SLOT, "rebound_ratio"): finding})
+    monkeypatch.setattr(history, "findings_of", lambda engine: listed if engine == "toy" else None)
+    rows = told("2", 0.4, (SLOT, OTHER)).rows
+    assert [(row.params["v"], row.metric) for row in rows if history.finding_of(row) is finding] == [
+        (4.0, "rebound_ratio")
+    ]
+    assert history.finding_of(replace(rows[0], engine="other")) is None
+    mended = next(row for row in told("2", 0.5).rows if row.metric == "rebound_ratio")
+    assert not history.mended(replace(mended, engine="other"))
+
+
+@pytest.mark.parametrize(("listed", "found", "is_mended"), [(None, 0.5, True), (0.4, 0.41, False), (0.4, 0.411, True)])
+def test_what_had_no_value_is_mended_by_any_and_the_end_of_a_band_is_in_it(monkeypatch, listed, found, is_mended):
+    family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "<2")
+    monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, listed, 0.41 - 0.4))
+    row = next(row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio")
+    assert history.mended(replace(row, value=found)) is is_mended
+    assert not history.mended(replace(row, value=found, physics="fail"))
 
 
 @pytest.fixture
