@@ -140,9 +140,9 @@ def findings(
         prove_and_show(prove, wanted["engine"], as_json)
         return
     rows, _, _ = load(out, run)
-    for name, chosen in wanted.items():
+    for name, asked in wanted.items():
         there = list(dict.fromkeys(row[name] for row in rows))
-        if absent := [one for one in chosen if one not in there]:
+        if absent := [one for one in asked if one not in there]:
             raise SceneError(f"--{name}: this run has no rows of {absent[0]!r}, but of {', '.join(there)}")
     rows = [row for row in rows if all(row[name] in chosen for name, chosen in wanted.items() if chosen)]
     if new:

@@ -1,6 +1,7 @@
 """`export`, `merge` and `prune` as a user calls them."""
 
 import json
+import shutil
 
 import pandas as pd
 import pytest
@@ -88,3 +89,16 @@ def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
     assert "1 run would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
     assert "1 run went" in call("prune", "--keep", 1, "--out", tmp_path).stdout
     assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 1
+
+
+def test_a_run_that_neither_machine_finished_is_not_finished_by_a_merge(out, tmp_path):
+    folders = [shutil.copytree(out, tmp_path / name) for name in ("ours", "theirs")]
+    for folder in folders:
+        store = Store(folder)
+        with store.writing() as db:
+            db.execute("UPDATE runs SET finished = 0")
+        store.close()
+    call("merge", folders[1], "--out", folders[0])
+    store = Store(folders[0], create=False)
+    assert [run.finished for run in store.runs()] == [False, False]
+    store.close()

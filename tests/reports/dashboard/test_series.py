@@ -214,3 +214,20 @@ def test_a_store_without_a_finished_run_is_one_line(tmp_path):
     Store(tmp_path).close()
     done = CliRunner().invoke(main, ["dashboard", "--out", str(tmp_path)])
     assert done.exit_code == 2 and "has no finished run" in done.output
+
+
+@pytest.mark.parametrize("was", [True, False])
+def test_the_collector_is_afterwards_as_it_was_also_when_something_breaks(was):
+    import gc
+
+    from reports.dashboard.series import _nothing_thrown_away
+
+    before = gc.isenabled()
+    try:
+        (gc.enable if was else gc.disable)()
+        with pytest.raises(RuntimeError), _nothing_thrown_away():
+            assert not gc.isenabled()
+            raise RuntimeError
+        assert gc.isenabled() is was
+    finally:
+        (gc.enable if before else gc.disable)()
