@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.scene import Body, Box, Scene
+from adapters.scene import Body, Box, HalfSpace, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.questions.invariance import RELATIONS, Change, compare, floor, judged, measured, unit_of
+from validation.questions.invariance import RELATIONS, Change, compare, floor, judged, measured, size_of, unit_of
 
 BY_NAME = {relation.name: relation for relation in RELATIONS}
 LINES = [(name, d) for name, scene in CATALOGUE.items() for d in scene.dimensions]
@@ -99,6 +99,30 @@ def test_points_of_turning_bodies_move_as_the_world_was_mapped(name, dimension):
     )  # fmt: skip
     found = corner(np.array(mapped.pose), np.array(mapped.twist), dimension, own)
     assert found[0] == pytest.approx(world @ place) and found[1] == pytest.approx(world @ speed)
+
+
+@pytest.mark.parametrize(("name", "dimension"), LINES)
+def test_a_bystander_is_out_of_reach_and_in_no_wall(name, dimension):
+    """Between walls that face each other their directions cancel: it stands beside the scene, not on its first body."""
+    scene = CATALOGUE[name].scene(dimension)
+    far = BY_NAME["bystander"].pose(scene).scene.bodies[-1]
+    size = size_of(scene)
+    place = np.array(far.pose[:dimension])
+    for body in scene.bodies:
+        if isinstance(body.shape, HalfSpace):
+            assert place @ body.shape.normal - body.shape.offset >= 0.0
+        elif body.motion == "free":
+            assert np.linalg.norm(place - body.pose[:dimension]) > 40.0 * size
+
+
+def test_where_walls_close_in_from_all_sides_there_is_no_place_for_a_bystander():
+    scene = CATALOGUE["rod_gas"].scene(2)
+    walls = [
+        Body(f"w{k}", HalfSpace((math.cos(angle), math.sin(angle)), -9.0), motion="fixed")
+        for k, angle in enumerate((0.5 * math.pi, 1.25 * math.pi, 1.75 * math.pi))
+    ]
+    closed = replace(scene, bodies=(*walls, *scene.bodies[2:]))
+    assert isinstance(BY_NAME["bystander"].pose(closed), str)
 
 
 def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():

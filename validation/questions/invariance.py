@@ -220,12 +220,11 @@ def with_a_bystander(scene: Scene) -> Posed | str:
     # Up as far as it falls in twice the time, and beside all half-spaces' reach: it only flies.
     fall = 2.0 * math.hypot(*scene.gravity) * scene.duration**2
     up = -np.array(scene.gravity) / (math.hypot(*scene.gravity) or 1.0)
-    place = np.array(free.pose[:d]) + up * fall
-    for body in scene.bodies:
-        if isinstance(body.shape, HalfSpace):
-            place = place + 50.0 * size_of(scene) * np.array(body.shape.normal)
-    if not any(isinstance(body.shape, HalfSpace) for body in scene.bodies):
-        place[-1] += 50.0 * size_of(scene)
+    normals = [np.array(body.shape.normal) for body in scene.bodies if isinstance(body.shape, HalfSpace)]
+    away = _away(normals, d)
+    if away is None:
+        return "its walls leave no place that is out of reach"
+    place = np.array(free.pose[:d]) + up * fall + 50.0 * size_of(scene) * away
     far = Body(name, free.shape, free.mass, free.inertia, (*_plain(place), *free.pose[d:]))
     pairs = (*scene.pairs, Pair(name, "*", 0.0, 0.0))
 
@@ -233,6 +232,16 @@ def with_a_bystander(scene: Scene) -> Posed | str:
         return _mapped(found, lambda pose: pose[:, :-1], lambda twist: twist[:, :-1], lambda rows: rows)
 
     return Posed(replace(scene, bodies=(*scene.bodies, far), pairs=pairs), back)
+
+
+def _away(normals: Sequence[Array], dimension: int) -> Array | None:
+    """A direction that leads into no half-space, (d,): off all of them, or along those that face each other."""
+    upright = np.eye(dimension)[-1]
+    away: Array = np.sum(normals, axis=0) if normals else upright
+    if np.linalg.norm(away) < 1e-9:
+        away = max((axis - (axis @ normals[0]) * normals[0] for axis in np.eye(dimension)), key=np.linalg.norm)
+        away = away / np.linalg.norm(away)
+    return away if all(normal @ away > -1e-9 for normal in normals) else None
 
 
 RELATIONS = (
