@@ -31,6 +31,7 @@ from reference_solver.planar.entries import enter_release, enter_sub_step
 from reference_solver.planar.entries import enter_settled as enter_settled_piece
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors
+from reference_solver.planar.lasting import displace
 from reference_solver.planar.ledger import copy_ledger, enter_contacts
 from reference_solver.planar.manifolds import detect, keep_remembered, pass_on, row_key
 from reference_solver.planar.meeting import Meeting
@@ -268,6 +269,26 @@ def find_loaded(island: Island) -> int:
     if island.options.solver == BLOCK:
         prepare_blocks(island.bodies, island.rows)
     return int(island.rows.counts[CONTACTS]) if has_room(island) else -1
+
+
+@inner_kernel
+def keep_places(island: Island) -> None:
+    """In what phases keep of their start."""
+    bodies, lasting = island.bodies, island.sub.lasting
+    for i in range(len(bodies.kind)):
+        for d in range(3):
+            lasting.base[i, d] = bodies.pose[i, d]
+        for d in range(3):
+            lasting.displacement[i, d] = 0.0
+
+
+@inner_kernel
+def put_back(island: Island) -> None:
+    """Poses, and what goes with them."""
+    bodies, lasting = island.bodies, island.sub.lasting
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] == FREE:
+            displace(bodies, lasting, i)
 
 
 @inner_kernel

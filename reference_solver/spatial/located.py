@@ -19,6 +19,8 @@ from reference_solver.spatial.ledger import copy_ledger, enter_contacts, enter_i
 from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
 from reference_solver.spatial.meeting import Meeting
 from reference_solver.spatial.motion import accelerate, displace
+from reference_solver.spatial.operations import Spatial
+from reference_solver.spatial.operations import displace as displace_from_start
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import warm_start
 from reference_solver.spatial.separation import radius_of
@@ -324,6 +326,27 @@ def price_of_creeping(island: Island) -> float:
 def find_loaded(island: Island) -> int:
     """Points of the end, with the forces that they carried: the clock tells that it is them who are wanted."""
     return find_contacts(island)
+
+
+@inner_kernel
+def keep_places(island: Island) -> None:
+    """In what phases keep of their start."""
+    bodies, lasting = island.bodies, island.sub.lasting
+    for i in range(len(bodies)):
+        for d in range(7):
+            lasting.base[i, d] = bodies.pose[i, d]
+        for d in range(6):
+            lasting.displacement[i, d] = 0.0
+
+
+@inner_kernel
+def put_back(island: Island) -> None:
+    """Poses, and what goes with them."""
+    bodies, lasting = island.bodies, island.sub.lasting
+    space = Spatial(bodies, bodies.pose, bodies.twist)
+    for i in range(len(bodies)):
+        if bodies.motion[i] == FREE:
+            displace_from_start(space, lasting, i)
 
 
 @inner_kernel

@@ -57,6 +57,7 @@ from reference_solver.stepping.operations import (
     follow_path,
     gained_speed,
     is_free,
+    keep_places,
     leaves_bounds,
     levers_of_start,
     misses_end,
@@ -65,6 +66,7 @@ from reference_solver.stepping.operations import (
     press_for,
     press_until_stick,
     price_of_creeping,
+    put_back,
     release,
     return_to_start,
     solve_end,
@@ -215,11 +217,20 @@ def settle(island: Island) -> bool:
     keep_state(island.sub.journal, island.bodies.pose, island.bodies.twist)
     moved = close_gaps(island)
     if moved:
+        before = math.inf
         for k in range(CLOSINGS):
             if find_loaded(island) < 0:
                 return False
-            if k == CLOSINGS - 1 or deepest_overlap(island) <= PUSHED_INTO:
+            deepest = deepest_overlap(island)
+            if deepest > before:
+                put_back(island)
+                if find_loaded(island) < 0:
+                    return False
                 break
+            if k == CLOSINGS - 1 or deepest <= PUSHED_INTO:
+                break
+            before = deepest
+            keep_places(island)
             close_gaps(island)
     misses = misses_end(island, clock[UNSETTLED])
     if misses:

@@ -229,6 +229,18 @@ def find_loaded(island: Any) -> int:
 
 
 @operation
+def keep_places(island: Any) -> None:
+    """Keep all poses for `put_back`; what a phase began with is lost."""
+    raise NotImplementedError
+
+
+@operation
+def put_back(island: Any) -> None:
+    """Put all bodies where `keep_places` found them."""
+    raise NotImplementedError
+
+
+@operation
 def close_gaps(island: Any) -> bool:
     """Move bodies until the gaps of the contacts found are closed (E28); whether rows are not what they were."""
     raise NotImplementedError
@@ -325,6 +337,8 @@ OF_ISLANDS = (
     gained_speed,
     price_of_creeping,
     find_loaded,
+    keep_places,
+    put_back,
     close_gaps,
     deepest_overlap,
     misses_end,
