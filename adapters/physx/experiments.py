@@ -53,12 +53,12 @@ _SCENES = (
 
 def _each(
     family: str, says: str, off: _Settings, idle: tuple[_Settings, ...], *rows: tuple[str, int, str, dict[str, float]],
-    within: float = 0.0, iterations: int | None = None,
+    within: float = 0.0, iterations: int | None = None, dt: float | None = None,
 ) -> tuple[Experiment, ...]:  # fmt: skip
     """Experiments that differ in their rows only: profile, dimension, metric, parameters."""
     scene = max((name for name in _SCENES if family.startswith(name.replace("_", "-"))), key=len)
     return tuple(
-        Experiment(family, says, profile, scene, metric, off, params, dimension, iterations, idle, within)
+        Experiment(family, says, profile, scene, metric, off, params, dimension, iterations, idle, within, dt)
         for profile, dimension, metric, params in rows
     )
 
@@ -450,6 +450,14 @@ EXPERIMENTS += (
         within=_SINGLES,
     ),
     *_each(
+        "rod-gas-small-steps",
+        "in a single small step rods are where they should be; five times as many, and later contacts, do not help",
+        {"iterations": 1},
+        (_SWEPT, _UNSEEN),
+        ("tuned", 2, "misplaced", {"n": 16.0, "room": 20.0, "duration": 2.75}),
+        dt=1.0 / 960.0,
+    ),
+    *_each(
         "rack-small-steps",
         "in one step it comes within singles; other manifolds do not help",
         _WHOLE,
@@ -518,6 +526,43 @@ EXPERIMENTS += (
         ("pgs", 2, "displacement", {}),
         ("pgs", 2, "penetration", {}),
         iterations=1,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row stays; in small steps, or seen later, it does not",
+        _SWEPT,
+        (_SMALL, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {"n": 30.0}),
+        dt=1.0 / 60.0,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row stays; in small steps, or seen later, it does not",
+        _SWEPT,
+        (_SMALL, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {}),
+        ("pgs", 2, "load_error", {}),
+        iterations=1,
+        dt=1.0 / 60.0,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row rests; with overlaps left, or seen later, it does not",
+        _SWEPT,
+        (_LEFT, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {}),
+        iterations=20,
+        dt=1.0 / 960.0,
+    ),
+    *_each(
+        "starved-small-steps",
+        "with as many sweeps as there are the row stays; in one step it still gives way",
+        _SWEPT,
+        (_WHOLE, _UNSEEN),
+        ("default", 2, "kinetic_energy", {}),
+        ("tuned", 2, "load_error", {}),
+        iterations=1,
+        dt=1.0 / 60.0,
     ),
     *_each(
         "heavy-on-light-few-sweeps",
