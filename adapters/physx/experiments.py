@@ -46,19 +46,19 @@ _SINGLES, _SPINS = 1e-6, 1e-5
 _SCENES = (
     "bounce", "closing_wall", "cradle", "edge_drop", "flat_box", "galperin", "heavy_on_light", "impact", "incline",
     "kane", "masse", "oblique", "off_centre", "overhang", "overlap", "painleve", "pivot", "position_correction",
-    "pressed_box", "pyramid", "rack", "rocker", "rocking_block", "roll_incline", "rolling_spin", "seam", "shove",
-    "slide_to_roll", "stack", "stacked_balls", "thin_wall", "tilt_table", "tumble",
+    "pressed_box", "pyramid", "rack", "rocker", "rocking_block", "rod_gas", "roll_incline", "rolling_spin", "seam",
+    "shove", "slide_to_roll", "stack", "stacked_balls", "starved", "thin_wall", "tilt_table", "tumble",
 )  # fmt: skip
 
 
 def _each(
     family: str, says: str, off: _Settings, idle: tuple[_Settings, ...], *rows: tuple[str, int, str, dict[str, float]],
-    within: float = 0.0,
+    within: float = 0.0, iterations: int | None = None, dt: float | None = None,
 ) -> tuple[Experiment, ...]:  # fmt: skip
     """Experiments that differ in their rows only: profile, dimension, metric, parameters."""
     scene = max((name for name in _SCENES if family.startswith(name.replace("_", "-"))), key=len)
     return tuple(
-        Experiment(family, says, profile, scene, metric, off, params, dimension, idle=idle, within=within)
+        Experiment(family, says, profile, scene, metric, off, params, dimension, iterations, idle, within, dt)
         for profile, dimension, metric, params in rows
     )
 
@@ -205,6 +205,32 @@ EXPERIMENTS += (
         {**_REBOUNDS, **_UNSEEN, **_WHOLE},
         ({**_UNSEEN, **_WHOLE}, _SWEPT),
         ("default", 2, "energy_defect", {}),
+        ("pgs", 2, "energy_defect", {}),
+        within=_SINGLES,
+    ),
+    *_each(
+        "rod-gas-no-slow-rebound",
+        "where whatever approaches rebounds it comes near; more sweeps, one step and late contacts do not help",
+        _REBOUNDS,
+        (_SWEPT, _WHOLE, _UNSEEN),
+        ("default", 2, "misplaced", {}),
+        ("default", 2, "wrong_speed", {}),
+        ("default", 2, "energy_defect", {}),
+        within=1e-5,
+    ),
+    *_each(
+        "rod-gas-no-slow-rebound",
+        "where whatever approaches rebounds rods are where they should be; more sweeps and late contacts do not help",
+        _REBOUNDS,
+        (_SWEPT, _UNSEEN),
+        ("pgs", 2, "misplaced", {}),
+    ),
+    *_each(
+        "rod-gas-no-slow-rebound",
+        "where whatever approaches rebounds, not seen ahead, it comes within singles; either alone does not help",
+        {**_REBOUNDS, **_UNSEEN},
+        (_REBOUNDS, _UNSEEN),
+        ("pgs", 2, "wrong_speed", {}),
         ("pgs", 2, "energy_defect", {}),
         within=_SINGLES,
     ),
@@ -415,6 +441,23 @@ EXPERIMENTS += (
         ("tuned", 3, "astray", {}),
     ),
     *_each(
+        "rod-gas-small-steps",
+        "in a single small step it comes within singles; five times as many, later contacts and rebounds do not help",
+        {"iterations": 1},
+        (_SWEPT, _UNSEEN, _REBOUNDS),
+        ("tuned", 2, "wrong_speed", {}),
+        ("tuned", 2, "energy_defect", {}),
+        within=_SINGLES,
+    ),
+    *_each(
+        "rod-gas-small-steps",
+        "in a single small step rods are where they should be; five times as many, and later contacts, do not help",
+        {"iterations": 1},
+        (_SWEPT, _UNSEEN),
+        ("tuned", 2, "misplaced", {"n": 16.0, "room": 20.0, "duration": 2.75}),
+        dt=1.0 / 960.0,
+    ),
+    *_each(
         "rack-small-steps",
         "in one step it comes within singles; other manifolds do not help",
         _WHOLE,
@@ -439,7 +482,88 @@ EXPERIMENTS += (
         ("default", 2, "settle_time", {"n": 10.0}),
         ("tuned", 2, "kinetic_energy", {"n": 10.0}),
     ),
+    *_each(
+        "starved-small-steps",
+        "in one step, with no more sweeps, the row rests; other manifolds and later contacts do not help",
+        _WHOLE,
+        (_ANEW, _UNSEEN),
+        ("default", 2, "kinetic_energy", {}),
+    ),
+    *_each(
+        "starved-small-steps",
+        "in one step, with no more sweeps, the row rests; twice as many small steps, or sweeps after them, do not help",
+        _WHOLE,
+        ({"iterations": 100}, _AFTER),
+        ("tuned", 2, "kinetic_energy", {}),
+        ("tuned", 2, "load_error", {}),
+    ),
+    *_each(
+        "starved-small-steps",
+        "in one step, with no more sweeps, the row rests; other manifolds and later contacts do not help",
+        _WHOLE,
+        (_ANEW, _UNSEEN),
+        ("default", 2, "kinetic_energy", {}),
+        ("tuned", 2, "kinetic_energy", {}),
+        iterations=4,
+    ),
     # ---- sweeps
+    *_each(
+        "starved-few-sweeps",
+        "with as many sweeps as there are the row stays; in one step, or over velocities alone, it does not",
+        _SWEPT,
+        (_WHOLE, _AFTER),
+        ("default", 2, "displacement", {}),
+        ("default", 2, "penetration", {}),
+        ("tuned", 2, "displacement", {}),
+        ("tuned", 2, "penetration", {}),
+        iterations=1,
+    ),
+    *_each(
+        "starved-few-sweeps",
+        "with as many sweeps as there are the row stays; in small steps, or over velocities alone, it does not",
+        _SWEPT,
+        (_SMALL, _AFTER),
+        ("pgs", 2, "displacement", {}),
+        ("pgs", 2, "penetration", {}),
+        iterations=1,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row stays; in small steps, or seen later, it does not",
+        _SWEPT,
+        (_SMALL, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {"n": 30.0}),
+        dt=1.0 / 60.0,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row stays; in small steps, or seen later, it does not",
+        _SWEPT,
+        (_SMALL, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {}),
+        ("pgs", 2, "load_error", {}),
+        iterations=1,
+        dt=1.0 / 60.0,
+    ),
+    *_each(
+        "starved-few-sweeps-pgs",
+        "with as many sweeps as there are the row rests; with overlaps left, or seen later, it does not",
+        _SWEPT,
+        (_LEFT, _UNSEEN),
+        ("pgs", 2, "kinetic_energy", {}),
+        iterations=20,
+        dt=1.0 / 960.0,
+    ),
+    *_each(
+        "starved-small-steps",
+        "with as many sweeps as there are the row stays; in one step it still gives way",
+        _SWEPT,
+        (_WHOLE, _UNSEEN),
+        ("default", 2, "kinetic_energy", {}),
+        ("tuned", 2, "load_error", {}),
+        iterations=1,
+        dt=1.0 / 60.0,
+    ),
     *_each(
         "heavy-on-light-few-sweeps",
         "with as many sweeps as there are it passes; other manifolds and kept spins do not help",
