@@ -17,7 +17,10 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.cpu import CPUContext
 from numba.core.typed_passes import NativeLowering
+
+from reference_solver.structures import Convention
 
 
 class Module(JITCodeLibrary):
@@ -64,7 +67,7 @@ class ModuleLowering(NativeLowering):
     def run_pass(self, state: Any) -> bool:
         """Lower without making the function callable from Python."""
         state.library = Module(state.targetctx.codegen(), state.func_id.func_qualname)
-        context, state.targetctx = state.targetctx, copy.copy(state.targetctx)
+        context, state.targetctx = state.targetctx, conventional(state.targetctx)
         state.targetctx.get_executable = not_callable
         try:
             return bool(super().run_pass(state))
@@ -82,7 +85,27 @@ class ProgramLowering(NativeLowering):
         """Lower with all code that is called."""
         state.library = Program(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return bool(super().run_pass(state))
+        context, state.targetctx = state.targetctx, conventional(state.targetctx)
+        try:
+            return bool(super().run_pass(state))
+        finally:
+            state.targetctx = context
+
+
+class Context(CPUContext):  # type: ignore[misc]
+    """numba's context with our convention for structures."""
+
+    @property
+    def call_conv(self) -> Convention:
+        """How functions are called."""
+        return Convention(self)
+
+
+def conventional(context: Any) -> Any:
+    """Return numba's context with our convention for structures."""
+    ours = copy.copy(context)
+    ours.__class__ = Context
+    return ours
 
 
 def not_callable(library: Any, description: Any, environment: Any) -> Any:

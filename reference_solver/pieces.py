@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.model import POSE_SIZE, TWIST_SIZE, Array
+from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
@@ -31,6 +32,7 @@ FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING = 0, 1, 2, 3, 4
 PIECES, BODIES, CONTACTS, STEPS = 0, 1, 2, 3
 
 
+@structure
 class Journal(NamedTuple):
     """Room for the pieces of a run, as kernels fill it; arrays of length 0 where nothing is recorded."""
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
@@ -73,6 +74,7 @@ BODY = np.dtype(
 Records: TypeAlias = Any
 
 
+@structure
 class Problem(NamedTuple):
     """A contact problem and the room to solve it. Unknown i is velocity i % D of the body with node i // D."""
 

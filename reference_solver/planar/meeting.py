@@ -34,8 +34,10 @@ from reference_solver.stepping.time_of_impact import (
     VELOCITY,
     set_normal,
 )
+from reference_solver.structures import structure
 
 
+@structure
 class Meeting(NamedTuple):
     """A pair of bodies at a time of the step; the first may be a plane (`time_of_impact`)."""
 

@@ -53,6 +53,7 @@ from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
+from reference_solver.structures import structure
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -72,6 +73,7 @@ COUNTS = 6
 MOST_BODIES = 1 << 24
 
 
+@structure
 class Bodies(NamedTuple):
     """Bodies i = 0 .. n-1."""
 
@@ -85,6 +87,7 @@ class Bodies(NamedTuple):
     pressed: Array  # (n, 2): sum of the sizes of those impulses over mass [m/s], and over inertia [rad/s]
 
 
+@structure
 class Pairs(NamedTuple):
     """Laws of the pairs and room for candidates of the broadphase."""
 
@@ -95,6 +98,7 @@ class Pairs(NamedTuple):
     candidate: Indices  # (capacity,): a * n + b, ascending
 
 
+@structure
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
@@ -112,6 +116,7 @@ class Rows(NamedTuple):
     kept_impulse: Array  # (c, 2)
 
 
+@structure
 class SubStep(NamedTuple):
     """One sub-step of the located scheme: frozen, with constant accelerations (E19), or a phase of turning rows."""
 
@@ -135,6 +140,7 @@ class SubStep(NamedTuple):
     journal: Journal
 
 
+@structure
 class Ledger(NamedTuple):
     """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
 
@@ -143,6 +149,7 @@ class Ledger(NamedTuple):
     real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
 
 
+@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -156,6 +163,7 @@ class Island(NamedTuple):
     tally: Array  # (SIZE,)
 
 
+@structure
 class World(NamedTuple):
     """Islands of the whole world, and room for the bodies of one of them."""
 
@@ -166,6 +174,7 @@ class World(NamedTuple):
     tally: Array  # (SIZE,): to go back to where a step is made again
 
 
+@structure
 class Buffer(NamedTuple):
     """Samples of a run; `integer` and `real` of length 0 where contacts are not recorded."""
 

@@ -48,11 +48,13 @@ from reference_solver.stepping.time_of_impact import (
     VELOCITY,
     set_normal,
 )
+from reference_solver.structures import structure
 
 #: Corners of a box, the most a core has.
 MOST_CORNERS = 8
 
 
+@structure
 class Meeting(NamedTuple):
     """A pair of bodies at a time of the step; the first may be a plane (`time_of_impact`)."""
 

@@ -22,8 +22,10 @@ from reference_solver.spatial.vector import (
 )
 from reference_solver.stepping import operations
 from reference_solver.stepping.lasting import CONTACTS, Lasting
+from reference_solver.structures import structure
 
 
+@structure
 class Spatial(NamedTuple):
     """The bodies under a type of their own, by which the step knows space."""
 

@@ -33,6 +33,7 @@ from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
 from reference_solver.stepping.options import Options
+from reference_solver.structures import structure
 from reference_solver.tally import SIZE as TALLY_SIZE
 
 Indices = NDArray[np.int64]
@@ -154,6 +155,7 @@ Manifolds: TypeAlias = Any
 Memory: TypeAlias = Any
 
 
+@structure
 class Buffer(NamedTuple):
     """Samples of a run; `names` and `real` of length 0 where contacts are not recorded."""
 
@@ -165,6 +167,7 @@ class Buffer(NamedTuple):
     journal: Journal
 
 
+@structure
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
@@ -234,6 +237,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
     )
 
 
+@structure
 class SubStep(NamedTuple):
     """What is left of the step, and room to try poses; velocities of a sub-step stand in `BODY`."""
 
@@ -257,6 +261,7 @@ class SubStep(NamedTuple):
     journal: Journal
 
 
+@structure
 class Ledger(NamedTuple):
     """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
 
@@ -265,6 +270,7 @@ class Ledger(NamedTuple):
     real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
 
 
+@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -279,6 +285,7 @@ class Island(NamedTuple):
     tally: Array  # (SIZE,)
 
 
+@structure
 class World(NamedTuple):
     """Islands of the whole world, and room for the bodies of one of them."""
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.stepping.operations import Bodies, is_free
+from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
@@ -29,6 +30,7 @@ ROOM = (1.0, 8.0)
 MADE, LEFT_BOUNDS, NO_ROOM = 0, 1, 2
 
 
+@structure
 class Islands(NamedTuple):
     """Which free bodies belong together; n bodies, c candidates, d axes."""
 

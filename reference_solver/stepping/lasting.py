@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.model import Array
+from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
@@ -35,6 +36,7 @@ STAGES = 7
 KINDS, PLACES = 8, 24
 
 
+@structure
 class Lasting(NamedTuple):
     """Contacts k of an island and its n bodies; V velocities, T tangents, P numbers of a pose, D axes."""
 

@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 from reference_solver.needs import Needs
 from reference_solver.settings import Settings
+from reference_solver.structures import structure
 
 SCALAR, BLOCK = 0, 1
 FIXED_STEP, LOCATED, MIDPOINT = 0, 1, 2
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 
+@structure
 class Options(NamedTuple):
     """Numbers and flags of `Settings` and `Needs`."""
 

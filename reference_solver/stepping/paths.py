@@ -9,6 +9,7 @@ import numpy as np
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.structures import structure
 
 #: Coefficients of a polynomial of degree five.
 COEFFICIENTS = 6
@@ -16,6 +17,7 @@ COEFFICIENTS = 6
 ROUNDED_UP = 1.0 + 1e-14
 
 
+@structure
 class Paths(NamedTuple):
     """Where bodies are between their events; V = 3 | 6 velocities, P = 3 | 7 numbers of a pose.
 
