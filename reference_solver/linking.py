@@ -92,7 +92,7 @@ class ProgramLowering(NativeLowering):
             state.targetctx = context
 
 
-class Context(CPUContext):  # type: ignore[misc]
+class Context(CPUContext):
     """numba's context with our convention for structures."""
 
     @property

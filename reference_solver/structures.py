@@ -46,13 +46,14 @@ class Structure(types.Type):
 
     def __init__(self, kind: Any, members: Any) -> None:
         self.instance_class, self.members = kind, tuple(types.unliteral(member) for member in members)
-        digest = hashlib.sha256(f"{kind.__module__} {self.members}".encode()).hexdigest()[:12]
-        super().__init__(f"{kind.__name__}_{digest}")
+        # Types are looked up by the hash of their key, some millions of times: names of members stand for members.
+        self.digest = hashlib.sha256(" ".join((kind.__module__, *map(str, self.members))).encode()).hexdigest()
+        super().__init__(f"{kind.__name__}_{self.digest[:12]}")
 
     @property
     def key(self) -> Any:
         """What tells one from another."""
-        return self.instance_class, self.members
+        return self.instance_class, self.digest
 
     def place(self, field: str) -> int:
         """Return the index of a field."""
@@ -91,7 +92,7 @@ def structure(plain: T) -> T:
 
 
 @register_default(Structure)
-class StructureModel(models.PrimitiveModel):  # type: ignore[misc]
+class StructureModel(models.PrimitiveModel):
     """A pointer to words; each member begins at one."""
 
     def __init__(self, manager: Any, structure: Structure) -> None:
@@ -157,12 +158,12 @@ def constructed(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 
 
 @infer_getattr
-class Fields(AttributeTemplate):  # type: ignore[misc]
+class Fields(AttributeTemplate):
     """Types of what a structure holds."""
 
     key = Structure
 
-    def generic_resolve(self, typ: Structure, attr: str) -> Any:
+    def generic_resolve(self, typ: Structure, attr: str) -> Any:  # type: ignore[override]
         """Return the type of a field; None if there is no such field."""
         return typ.members[typ.place(attr)] if attr in typ.instance_class._fields else None
 
@@ -192,7 +193,7 @@ def from_tuple(typ: Structure, obj: Any, c: Any) -> NativeValue:
     return NativeValue(pointer, is_error=failed)
 
 
-class Convention(CPUCallConv):  # type: ignore[misc]
+class Convention(CPUCallConv):
     """Calls of kernels: memory of structures is read and by nothing else written to while a function runs."""
 
     def decorate_function(self, fn: Any, args: Any, fe_argtypes: Any, noalias: bool = False) -> None:

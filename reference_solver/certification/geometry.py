@@ -16,6 +16,7 @@ Shapes are known by what they have, so that `reference_solver.shapes` and any ot
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -277,6 +278,8 @@ def _deepest(a: Core, b: Core) -> tuple[Array, Array]:
     candidates = _edge_normals(a, b) if d == 2 else _face_normals(a, b)
     if candidates is None:
         return np.full(s, np.inf), _across(a, b)
+    if d == 2:
+        candidates = np.concatenate([candidates, *_ends(a, b)], axis=1)
     apart = _parted(a, b, candidates)
     best = apart.argmax(axis=1)
     rows = np.arange(s)
@@ -315,6 +318,18 @@ def _edge_normals(a: Core, b: Core) -> Array | None:
         outward = np.stack([along[..., 1], -along[..., 0]], -1)
         found.append(sign * outward / np.linalg.norm(outward, axis=2, keepdims=True))
     return np.concatenate(found, axis=1) if found else None
+
+
+def _ends(a: Core, b: Core) -> Iterator[Array]:
+    """Directions (s, 2, 2) in which planar cores part beyond the ends of a segment: what lies on its line is not in it.
+
+    Square to the line both are apart by nothing but round-off, of either sign.
+    """
+    for core in (a, b):
+        if core.kind == "segment":
+            along = core.vertex[:, 1:] - core.vertex[:, :1]
+            along = along / np.linalg.norm(along, axis=2, keepdims=True)
+            yield np.concatenate([along, -along], axis=1)
 
 
 def _face_normals(a: Core, b: Core) -> Array | None:

@@ -30,6 +30,7 @@ from reference_solver.planar.impact import flies, gap_noise
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
 from reference_solver.planar.press import FAR
+from reference_solver.planar.rows import still_speed
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Pairs, Rows, SubStep
 from reference_solver.planar.time_of_impact import next_impact
 from reference_solver.stepping import phase
@@ -50,7 +51,7 @@ AHEAD = 1.5
 
 
 @inner_kernel
-def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float) -> bool:
+def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float, dt: float) -> bool:
     """Note all rows that touch and do not part as lasting contacts; False if there are none, or too many.
 
     The same part as in the frozen solve of ``length``.
@@ -59,7 +60,8 @@ def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float) -
     for c in range(rows.counts[CONTACTS]):
         speed = rows.real[c, SPEED]
         u = normal_velocity(bodies.twist, rows, c)
-        if rows.real[c, GAP] > gap_noise(bodies, rows, c) or (u > NOISE * speed and flies(bodies, rows, c, u, length)):
+        leaves = u > max(NOISE * speed, still_speed(bodies, rows, c, dt)) and flies(bodies, rows, c, u, length)
+        if leaves or rows.real[c, GAP] > gap_noise(bodies, rows, c):
             continue
         if count == len(lasting.row):
             return False
@@ -72,12 +74,12 @@ def note_contacts(bodies: Bodies, rows: Rows, lasting: Lasting, length: float) -
 
 
 @inner_kernel
-def turns(bodies: Bodies, rows: Rows, sub: SubStep, length: float) -> bool:
+def turns(bodies: Bodies, rows: Rows, sub: SubStep, length: float, dt: float) -> bool:
     """Whether rows of lasting contacts change along the frozen path, or end; bodies are where they were afterwards."""
     lasting = sub.lasting
     copy_vectors(sub.start, bodies.twist)
     found = False
-    if note_contacts(bodies, rows, lasting, length):
+    if note_contacts(bodies, rows, lasting, length, dt):
         evaluate(bodies, lasting)
         keep_rows(lasting)
         phase.keep_limits(bodies, lasting)

@@ -42,7 +42,7 @@ from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, speed_at, tangent_velocity
 from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
-from reference_solver.planar.rows import measure_speed, prepare_masses
+from reference_solver.planar.rows import measure_speed, prepare_masses, still_speed
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
 from reference_solver.stepping.clock import HELD, LEFT, is_patient
 from reference_solver.stepping.impacts import (
@@ -191,7 +191,7 @@ def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float
         u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
         measure_speed(bodies, rows, c, options.dt)
         rows.integer[c, IMPACT] = 0
-        if u >= -NOISE * rows.real[c, SPEED]:
+        if u >= -max(NOISE * rows.real[c, SPEED], still_speed(bodies, rows, c, options.dt)):
             continue
         if rows.integer[c, MEETS] == 0:
             continue

@@ -154,7 +154,7 @@ def enter_path(island: Island, length: float) -> float:
     """The frozen path, or that of a phase where rows turn along it."""
     bodies, rows, sub = island.bodies, island.rows, island.sub
     flight.begin_flight(bodies, rows, sub, length)
-    if sub.clock[HELD] > 0.0 or sub.clock[BRIEF] > 0.0 or not curve.turns(bodies, rows, sub, length):
+    if sub.clock[HELD] > 0.0 or sub.clock[BRIEF] > 0.0 or not curve.turns(bodies, rows, sub, length, island.options.dt):
         return 0.0
     if sub.clock[ROCKING] > 0.0 or sub.clock[JAMMED] > 0.0:
         return NO_PHASE

@@ -25,7 +25,7 @@ from reference_solver.planar.impact import doubt, flies, gap_noise
 from reference_solver.planar.iteration import solve_velocities
 from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
 from reference_solver.planar.midpoint import reach_end, turn_rows
-from reference_solver.planar.rows import measure_speed, warm_start
+from reference_solver.planar.rows import measure_speed, still_speed, warm_start
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.noise import NOISE
@@ -62,7 +62,7 @@ def press(
         speed = rows.real[c, SPEED]
         rows.real[c, SLIP] = tangent_velocity(bodies.twist, rows, c)
         rows.real[c, PN], rows.real[c, PT] = time * rows.real[c, FORCE_N], time * rows.real[c, FORCE_T]
-        leaves = not held and u > NOISE * speed
+        leaves = not held and u > max(NOISE * speed, still_speed(bodies, rows, c, options.dt))
         if leaves and flies(bodies, rows, c, u, length):
             rows.real[c, TARGET] = -FAR * (speed + u)
             rows.real[c, PN] = rows.real[c, PT] = 0.0

@@ -120,9 +120,14 @@ def measure_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
     meeting = math.sqrt(approach * approach + slip * slip)
     moving = speed_at(bodies, a, rows.real[c, ARM_A], rows.real[c, ARM_A + 1])
     moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
-    still = STILL * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) / dt
-    rows.real[c, SPEED] = max(max(meeting, push), max(SPEED_SHARE * moving, still))
+    rows.real[c, SPEED] = max(max(meeting, push), max(SPEED_SHARE * moving, still_speed(bodies, rows, c, dt)))
     return push
+
+
+@inner_kernel
+def still_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
+    """Speed below which the bodies of row c stand still to each other: loads elsewhere leave as much where none act."""
+    return STILL * min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT]) / dt
 
 
 @inner_kernel

@@ -69,7 +69,7 @@ def press_until_stick(
             break
         if k == 0:
             begin_flight(bodies, rows, sub, length)
-            if turns(bodies, rows, sub, length):
+            if turns(bodies, rows, sub, length, options.dt):
                 break
         if end < length and length - slipped <= CLOSE * length:
             break

@@ -11,7 +11,7 @@ from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import collect_momentum
-from reference_solver.spatial.prepare import measure_speed, set_response
+from reference_solver.spatial.prepare import measure_speed, set_response, still_speed
 from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
@@ -114,7 +114,7 @@ def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -
             u = velocity_at(v, w, manifolds, m, p)
             set_reference_speed(bodies, manifolds, m, p, u, options.dt)
             manifolds.impact[m, p] = 0
-            if u[2] >= -NOISE * manifolds.speed[m, p]:
+            if u[2] >= -max(NOISE * manifolds.speed[m, p], still_speed(bodies, manifolds, m, options.dt)):
                 continue
             if manifolds.lasts[m, p]:
                 found = max(found, TURNED)

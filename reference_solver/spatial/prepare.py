@@ -110,9 +110,14 @@ def measure_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vecto
     push = load_speed(bodies, manifolds, m, p, dt)
     moving = length(point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0)))
     moving += length(point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0)))
-    still = STILL * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]]) / dt
-    manifolds.speed[m, p] = max(max(length(u), push), max(SPEED_SHARE * moving, still))
+    manifolds.speed[m, p] = max(max(length(u), push), max(SPEED_SHARE * moving, still_speed(bodies, manifolds, m, dt)))
     return push
+
+
+@inner_kernel
+def still_speed(bodies: Bodies, manifolds: Manifolds, m: int, dt: float) -> float:
+    """Speed below which two bodies stand still to each other: loads elsewhere leave as much where none act."""
+    return STILL * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]]) / dt
 
 
 @inner_kernel

@@ -13,7 +13,7 @@ from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
 from reference_solver.spatial.phase import is_exact
-from reference_solver.spatial.prepare import warm_start
+from reference_solver.spatial.prepare import still_speed, warm_start
 from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
@@ -65,7 +65,8 @@ def begin_press(
             set_reference_speed(bodies, manifolds, m, p, u, options.dt)
             clear_point(manifolds, m, p)
             manifolds.slip[m, p, 0], manifolds.slip[m, p, 1] = u[0], u[1]
-            leaves = u[2] > NOISE * manifolds.speed[m, p] and (struck or manifolds.lasts[m, p] == 0)
+            least = max(NOISE * manifolds.speed[m, p], still_speed(bodies, manifolds, m, options.dt))
+            leaves = u[2] > least and (struck or manifolds.lasts[m, p] == 0)
             if leaves and flies(bodies, manifolds, m, p, u[2], length):
                 manifolds.open[m, p] = 1
                 continue

@@ -162,3 +162,25 @@ def test_one_pose_gives_a_number_and_shapes_of_two_dimensions_are_refused():
         gap(Disc(0.5), (0, 0), Disc(0.5), (2, 0))
     with pytest.raises(ValueError, match="none of"):
         gap("disc", (0, 0, 0), Disc(0.5), (2, 0, 0))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("other", [Disc(0.05), Capsule(0.3, 0.05)])
+def test_what_lies_on_the_line_of_a_capsule_is_as_far_as_its_end(d, other):
+    """Square to the line both are apart by round-off, of either sign: that is no overlap of the cores."""
+    a = Capsule(0.5, 0.1)
+    half = other.half_length if isinstance(other, Capsule) else 0.0
+    if d == 3 and isinstance(other, Disc):
+        other = Sphere(0.05)
+    where = poses(d, 500, 7, 1.0)
+    turn = rotation(where)
+    for side in (1.0, -1.0):
+        there = where.copy()
+        there[:, :d] += side * 1.2 * turn[:, :, 0]
+        found = nearest(a, where, other, there)
+        assert found.gap == pytest.approx(1.2 - 0.5 - half - 0.15, abs=NOISE)
+        assert found.normal == pytest.approx(side * turn[:, :, 0], abs=NOISE)
+        assert nearest(other, there, a, where).gap == pytest.approx(found.gap, abs=NOISE)
+    inside = where.copy()
+    inside[:, :d] += 0.3 * turn[:, :, 0]
+    assert gap(a, where, other, inside) == pytest.approx(-0.15, abs=NOISE)
