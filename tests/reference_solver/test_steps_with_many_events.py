@@ -176,7 +176,8 @@ def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count)
     start = simulation.pose.copy()
     simulation.advance(30)
     assert simulation.certificate["reasons"] == ()
-    assert np.abs(simulation.pose - start).max() < 1e-12
+    # Before, what parted by round-off where no load acts was let go, and sank 5e-13 m.
+    assert np.abs(simulation.pose - start).max() < 1e-15 and np.abs(simulation.twist).max() < 1e-12
     contacts = simulation.contacts()
     assert (contacts.impulse * contacts.normal).sum(axis=1) == pytest.approx([10.0 * DT] * count, rel=1e-9)
 
