@@ -17,6 +17,9 @@ from reference_solver.shapes import Disc, Sphere
 SLIP_NOISE = 1e-11
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
+#: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
+#: the contacts of a body is rounded at that size.
+UNITS = 4.0
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
@@ -77,7 +80,11 @@ def _laws(run: Run) -> Iterator[float]:
     correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
     impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
 
-    yield _worst(np.where(correction, 0.0, -pressed - over.lean * held_back), scale)
+    # Impulses of one solve are known to some units in the last place of the largest of them, not of each.
+    largest = np.zeros(len(pieces))
+    np.maximum.at(largest, owner, np.linalg.norm(pieces.impulse, axis=1))
+    unseen = UNITS * np.spacing(largest)[owner]
+    yield _worst(np.where(correction, 0.0, -pressed - unseen - over.lean * held_back), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning - np.where(frozen, 0.0, SLIP_NOISE * mass * speed)
     yield _worst(np.where(correction, 0.0, excess), scale)

@@ -132,6 +132,13 @@ class TestRecords:
     def test_a_pull(self, sliding):
         assert "pull" in self.broken(sliding, impulse=-sliding[1].pieces.impulse)
 
+    @pytest.mark.parametrize(("units", "pulls"), [(2.0, False), (1e5, True)])
+    def test_a_pull_is_more_than_the_round_off_of_the_largest_impulse_beside_it(self, sliding, units, pulls):
+        impulse = sliding[1].pieces.impulse.copy()
+        impulse[0, 1] = -units * np.spacing(impulse[1, 1])  # the first two contacts are those of one piece
+        assert sliding[1].pieces.first_contact[1] == 2 and impulse[1, 1] > 0.0
+        assert ("pull" in self.broken(sliding, impulse=impulse)) is pulls
+
     def test_a_contact_on_a_body_that_its_piece_does_not_hold(self, sliding):
         body = sliding[1].pieces.body.copy()
         body[1] = 0
