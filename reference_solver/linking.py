@@ -20,7 +20,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.cpu import CPUContext
 from numba.core.typed_passes import NativeLowering
 
-from reference_solver.structures import Convention
+from reference_solver.structure_types import Convention
 
 
 class Module(JITCodeLibrary):

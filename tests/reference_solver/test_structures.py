@@ -113,7 +113,7 @@ def test_kernels_are_handed_one_pointer_for_each():
     from numba.core import types
     from numba.core.registry import cpu_target
 
-    from reference_solver.structures import Structure
+    from reference_solver.structure_types import Structure
 
     outer, places = an_outer()
     weighed(outer, places)
