@@ -191,7 +191,7 @@ def _divided(entries: Sequence[_Entry], over: str) -> list[Panel]:
     for entry in entries:
         cells = {key: briefs for key, briefs in entry.summary.cells.items() if briefs}
         asked |= dict.fromkeys(cells)
-        for key in cells | entry.ratios:
+        for key in dict.fromkeys((*cells, *entry.ratios)):
             columns[key].append(_Answer(entry, cells.get(key, {}), entry.ratios.get(key)))
     return [_panel(key, over, columns[key]) for key in sorted(asked)]
 
@@ -235,9 +235,11 @@ def _points(engine: str, present: Sequence[_Answer]) -> tuple[Point, ...]:
 def _counted(cells: Mapping[str, Brief], wanted: Sequence[str]) -> tuple[float | None, int, int]:
     """Largest error, if all cells that are wanted have one; checks that fail; checks that are judged."""
     errors = [error for slot in wanted if slot in cells and (error := cells[slot][0]) is not None]
-    briefs = cells.values()
     largest = max(errors) if errors and len(errors) == len(wanted) else None
-    return largest, sum([brief[FAILS] for brief in briefs]), sum([brief[JUDGED] for brief in briefs])
+    fails = judged = 0
+    for _, failing, asked, _ in cells.values():
+        fails, judged = fails + failing, judged + asked
+    return largest, fails, judged
 
 
 def _flips(before: Mapping[str, Brief], cells: Mapping[str, Brief]) -> tuple[int, int]:
