@@ -27,6 +27,8 @@ _STEERING = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
 
 def one_line(text: Any, most: int = REASON) -> str:
     """First line of ``text`` that says something, control characters shown as escapes, at most ``most`` characters."""
+    if type(text) is str and len(text) <= most and text.isascii() and text.isprintable():
+        return text.strip()  # a line as it should be, as most are
     whole = _as_text(text, 8 * most)
     return _cut(_visible(next((line for line in whole.splitlines() if line.strip()), "").strip()), most)
 

@@ -117,7 +117,9 @@ def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price:
 def answers(rows: Sequence[Plain]) -> list[Answer]:
     """What each engine as shipped gets wrong, scene by scene; of other profiles, what they make worse than that."""
     groups, found = _by_profile(rows), []
-    pairs = dict.fromkeys((key[1], key[0]) for key in sorted(groups, key=lambda key: _position(rows, key)))
+    engines, scenes = (list(dict.fromkeys(row[name] for row in rows)) for name in ("engine", "scene"))
+    ordered = sorted(groups, key=lambda key: (engines.index(key[1]), scenes.index(key[0])))
+    pairs = dict.fromkeys((engine, scene) for scene, engine, _ in ordered)
     for engine, scene in pairs:
         own = {key[2]: group for key, group in groups.items() if (key[0], key[1]) == (scene, engine)}
         shipped, *others = own
@@ -129,13 +131,6 @@ def answers(rows: Sequence[Plain]) -> list[Answer]:
                 Answer(engine, profile, scene, len(_failing(group)), len(group), text, _cure(own, profile))
             )  # fmt: skip
     return found
-
-
-def _position(rows: Sequence[Plain], key: tuple[str, str, str]) -> tuple[int, int]:
-    """Engines, then scenes, in the order of the rows."""
-    engines = list(dict.fromkeys(row["engine"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    return engines.index(key[1]), scenes.index(key[0])
 
 
 def _by_profile(rows: Iterable[Plain]) -> dict[tuple[str, str, str], list[Plain]]:

@@ -13,8 +13,8 @@ import sqlite3
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -37,27 +37,43 @@ Key = tuple[str, str, str, int]
 
 @dataclass(frozen=True)
 class Summary:
-    """Cells of a run by panel, each under a key that is equal in every run that asked the same."""
+    """Cells of a run by panel, each under a key that is equal in every run that asked the same.
+
+    Parameters
+    ----------
+    versions
+        Of the engines.
+    times
+        Ratio to an opponent's time, and the opponent, where it was timed.
+    """
 
     cells: Mapping[Key, Mapping[str, Brief]]
     versions: Mapping[str, str]
+    times: Mapping[Key, tuple[float, str]] = field(default_factory=dict)
 
     def as_text(self) -> str:
-        """JSON that `from_text` reads back."""
-        cells = [[list(key), dict(briefs)] for key, briefs in self.cells.items()]
-        return json.dumps({"cells": cells, "versions": dict(self.versions)}, separators=(",", ":"))
+        """JSON that `from_text` reads back; each panel a text of its own, mostly the same as in another run."""
+        panels = [json.dumps([*key, dict(briefs)], separators=(",", ":")) for key, briefs in self.cells.items()]
+        times = [[*key, *taken] for key, taken in self.times.items()]
+        return json.dumps({"panels": panels, "versions": dict(self.versions), "times": times}, separators=(",", ":"))
 
 
 def from_text(text: str) -> Summary:
-    """Inverse of `Summary.as_text`."""
+    """Inverse of `Summary.as_text`; a panel that is equal in two runs is one object."""
     data = json.loads(text)
-    cells = {
-        (str(key[0]), str(key[1]), str(key[2]), int(key[3])): {
-            slot: (error, fails, judged, sure) for slot, (error, fails, judged, sure) in briefs.items()
-        }
-        for key, briefs in data["cells"]
-    }
-    return Summary(cells, data["versions"])
+    times = {_key(*asked): (float(ratio), str(opponent)) for *asked, ratio, opponent in data["times"]}
+    return Summary(dict(map(_panel, data["panels"])), data["versions"], times)
+
+
+@lru_cache(maxsize=100_000)
+def _panel(text: str) -> tuple[Key, Mapping[str, Brief]]:
+    """Cells of a panel; engines repeat themselves, so that of hundreds of runs few texts differ."""
+    *asked, briefs = json.loads(text)
+    return _key(*asked), {slot: (error, fails, judged, sure) for slot, (error, fails, judged, sure) in briefs.items()}
+
+
+def _key(engine: object, profile: object, scene: object, dimension: int) -> Key:
+    return str(engine), str(profile), str(scene), int(dimension)
 
 
 def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = None) -> Summary:

@@ -59,8 +59,8 @@ def shown_cell(
     """
     own = [
         o for o in observations
-        if (o.slot.scene, o.slot.dimension, o.slot.engine, o.slot.profile) == (scene, dimension, engine, profile)
-        and o.settings and o.slot.iterations is None
+        if o.slot.scene == scene and o.slot.engine == engine and o.slot.profile == profile
+        and o.slot.dimension == dimension and o.settings and o.slot.iterations is None
     ]  # fmt: skip
     canonical = resolve(scene)
     wanted = canonical.minimal(canonical.representative if params is None else params)

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from reports.stages import stage, warm_up
 from reports.wording import plural
-from validation.cells import Slot
+from validation.cells import Observation, Slot
 from validation.records.store import Run, Store
 from validation.running.tracks import representatives
 from validation.workers import TIMEOUT, run_cells
@@ -30,12 +30,14 @@ def run_plan(
     fresh: bool = False,
     finish: bool = True,
     cluster: str = "",
+    known: Sequence[Observation] = (),
 ) -> Run:
     """Run what the store does not have yet of this plan; the observations are in the store afterwards.
 
     ``finish`` marks the run as complete; a bench does so itself, after its timings. A run of which cells were left
     after time-outs is not complete: it says so, and the same command resumes it. ``cluster`` is the address of a Dask
     cluster to run on instead of here; its motions are not recorded, and OUT/cluster.jsonl says what ran where.
+    ``known`` are answers of another run to cells of this plan, which are kept here as well instead of being run.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
@@ -56,6 +58,7 @@ def run_plan(
 
     if not cluster:
         warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
+    todo = _without(known, store, run, todo)
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
@@ -84,3 +87,13 @@ def run_plan(
     elif finish:
         store.finish(run)
     return store.run(run.id)
+
+
+def _without(known: Sequence[Observation], store: Store, run: Run, todo: Sequence[Slot]) -> list[Slot]:
+    """What is left to run once the known answers are kept."""
+    asked, answered = set(todo), set()
+    for observation in known:
+        if observation.slot in asked:
+            store.add(run, observation)
+            answered.add(observation.slot)
+    return [slot for slot in todo if slot not in answered]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,9 @@ Tables = dict[str, pd.DataFrame]
 SHOWN_LEVELS = (1e-1, 1e-2, 1e-3, 1e-5)
 
 
-def tables_of(store: Store, run: Run) -> Tables:
-    """All tables of a bench run by name."""
-    points, scaling = work.work_points(store, run), reading.scaling(store, run)
+def tables_of(store: Store, run: Run, observations: Sequence[Observation] | None = None) -> Tables:
+    """All tables of a bench run by name; ``observations`` are its own, where they were read already."""
+    points, scaling = work.work_points(store, run, observations), reading.scaling(store, run)
     return {
         "work_points": points,
         "time_at_equal_error": work.time_at_equal_error(points),
@@ -82,14 +82,15 @@ def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], 
     once by luck is no recommendation.
     """
     passes: dict[tuple[Any, ...], dict[float, bool]] = defaultdict(lambda: defaultdict(lambda: True))
-    for observation in store.observations(run):
+    observations = store.observations(run)
+    for observation in observations:
         slot = observation.slot
         if slot.iterations is None:
             good = all(row["physics"] == "pass" or row["value"] is None for row in physics(observation))
             passes[slot.scene, slot.dimension, slot.engine, slot.profile][slot.dt] &= (
                 good and observation.outcome is Outcome.OK
             )
-    points = work.work_points(store, run)
+    points = work.work_points(store, run, observations)
     own = points[points["iterations"].isna()].to_dict("records") if len(points) else []
     cost = {(p["scene"], p["dimension"], p["engine"], p["profile"], p["dt"]): p["cost"] for p in own}
     found = {}

@@ -108,7 +108,7 @@ class Slot:
 
     def key(self) -> str:
         """Sixteen hex digits that identify the slot."""
-        return hashlib.sha256(json.dumps(_said(asdict(self)), sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(_said(vars(self)), sort_keys=True).encode()).hexdigest()[:16]
 
     def params_text(self) -> str:
         """``e=0.8 height=1.03``."""
@@ -120,13 +120,13 @@ class Slot:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that `slot_from_dict` reads back."""
-        data = _said({**asdict(self), "params": dict(self.params)})
+        data = _said({**vars(self), "params": dict(self.params)})
         return data | {"switched": dict(self.switched)} if self.switched else data
 
 
-def _said(data: dict[str, Any]) -> dict[str, Any]:
+def _said(data: Mapping[str, Any]) -> dict[str, Any]:
     """A slot without experiment has no field of it: what was stored and hashed before there were any stays equal."""
-    return data if data["switched"] else {name: value for name, value in data.items() if name != "switched"}
+    return {name: value for name, value in data.items() if name != "switched" or value}
 
 
 def slot_from_dict(data: Mapping[str, Any]) -> Slot:

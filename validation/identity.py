@@ -12,7 +12,7 @@ import hashlib
 import os
 import platform
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
@@ -86,21 +86,36 @@ def _closure(module: str, inner: set[str], rim: set[str]) -> list[Path]:
     return list(found.values())
 
 
-def _imported(module: str, path: Path) -> list[str]:
+def _imported(module: str, path: Path) -> tuple[str, ...]:
     """Modules that a source file may import, by name; what turns out to be none is not located."""
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    names = []
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    return _named(path.read_bytes(), module if path.name == "__init__.py" else module.rpartition(".")[0])
+
+
+@cache
+def _named(source: bytes, package: str) -> tuple[str, ...]:
+    """Modules that a source in ``package`` names; scenes share most of theirs, and each is read for every scene."""
+    names: list[str] = []
+    for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            source = "." * node.level + (node.module or "")
+            named = "." * node.level + (node.module or "")
             try:
-                source = resolve_name(source, package)
+                named = resolve_name(named, package)
             except ImportError:  # beyond the top of its package
                 continue
-            names += [source, *(f"{source}.{alias.name}" for alias in node.names)]
-    return names
+            names += [named, *(f"{named}.{alias.name}" for alias in node.names)]
+    return tuple(names)
+
+
+def _statements(module: ast.Module) -> Iterator[ast.AST]:
+    """Statements at any depth; expressions, which are most of a module and import nothing, are not walked through."""
+    left: list[ast.AST] = [module]
+    while left:
+        for node in ast.iter_child_nodes(left.pop()):
+            if not isinstance(node, ast.expr):
+                left.append(node)
+                yield node
 
 
 def code_hash(asked: Iterable[tuple[str, str]]) -> str:

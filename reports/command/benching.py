@@ -31,7 +31,7 @@ from reports.terminal import terminal
 from reports.wording import plural
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
-from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
+from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
 from validation.bench.units import Unit, prepared
 from validation.cells import Outcome, Slot, parse_dt
 from validation.posed import primary_of
@@ -49,7 +49,7 @@ AGREEMENT = 0.9
 @click.option("--seed", type=int, help="Of the random order; drawn and printed if not given.")
 @click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
 @click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
-@click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
+@click.option("--fresh", is_flag=True, help="Start a new run, and run what the last run answered.")
 @click.option(
     "--piles", type=click.IntRange(20), metavar="N", help="Instead: piles of 20 to N bodies, by two profiles."
 )
@@ -89,9 +89,13 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
     title = f"bench {request.suite}: {' '.join(request.scenes)}"
+    source, known = ("", []) if options["fresh"] else answered(store, cells)
+    if known:
+        console.print(f"{plural(len(known), 'cell')} of {len(cells)} as run {source} answered them: they are the same")
     run = run_plan(
-        store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False
-    )
+        store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False,
+        known=known,
+    )  # fmt: skip
     if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
         store.close()
         click.echo("crosscheck: bench: no cell has a result, so there is nothing to time", err=True)

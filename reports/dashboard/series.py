@@ -6,8 +6,9 @@ import gc
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -23,12 +24,11 @@ from validation.releases.timing import CALLED
 from validation.running.plan import QUICK_DT
 
 #: Places in a `reports.brief.Brief`.
-FAILS, SURE = 1, 3
+FAILS, JUDGED, SURE = 1, 2, 3
 
 
-@dataclass(frozen=True)
-class Point:
-    """One run or release in a panel.
+class Point(NamedTuple):
+    """One run or release in a panel; a tuple, because 500 runs of the quick suite have a third of a million.
 
     Parameters
     ----------
@@ -97,6 +97,14 @@ class _Entry:
     commit: str = ""
 
 
+class _Answer(NamedTuple):
+    """What an entry has of a panel: cells, none if it only timed it; ratio of times and opponent."""
+
+    entry: _Entry
+    cells: Mapping[str, Brief]
+    times: tuple[float, str] | None
+
+
 def panels(store: Store, folder: Path, say: Callable[[str], None] = lambda line: None) -> list[Panel]:
     """All panels of a store: over its runs, then over its releases."""
     kept = Kept(folder)
@@ -129,19 +137,17 @@ def _runs(store: Store, kept: Kept, say: Callable[[str], None]) -> list[_Entry]:
     for run in store.runs():
         if not run.finished or run.title.startswith((SCATTER_TITLE, RELEASE_TITLE)):
             continue
-        if run.id in timed:
-            times = _times(ratios(store, run))
-            if entries and not entries[-1].ratios and entries[-1].commit == run.commit:
-                entries[-1].ratios = times
-            else:
-                entries.append(_Entry(_day(run), _said(run), run.id, Summary({}, {}), times, run.commit))
-            continue
         summary = kept.get(run.id)
         if summary is None:
             say(f"judging run {run.id}")
-            summary = summarise(store.observations(run))
+            of_bench = run.id in timed
+            summary = Summary({}, {}, _times(ratios(store, run))) if of_bench else summarise(store.observations(run))
             kept.put(run.id, summary)
-        entries.append(_Entry(_day(run), _said(run), run.id, summary, commit=run.commit))
+        last = entries[-1] if entries else None
+        if run.id in timed and last and not last.ratios and last.commit == run.commit:
+            last.ratios = summary.times
+        else:
+            entries.append(_Entry(_day(run), _said(run), run.id, summary, summary.times, run.commit))
     return entries
 
 
@@ -161,10 +167,10 @@ def _releases(store: Store, kept: Kept, engine: str) -> list[_Entry]:
         summary = kept.get(name)
         if summary is None:
             found = history.observations(store, engine, version)
-            summary = summarise(found, history.told_by(engine, version, found).rows)
+            taken = {key: (ratio, CALLED) for key, ratio in history.times(store, engine, version).items()}
+            summary = replace(summarise(found, history.told_by(engine, version, found).rows), times=taken)
             kept.put(name, summary)
-        taken = {key: (ratio, CALLED) for key, ratio in history.times(store, engine, version).items()}
-        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary, taken))
+        entries.append(_Entry(version, f"{engine} {version}", runs[-1].id, summary, summary.times))
     return entries
 
 
@@ -179,55 +185,72 @@ def _times(table: pd.DataFrame) -> dict[Key, tuple[float, str]]:
 
 
 def _divided(entries: Sequence[_Entry], over: str) -> list[Panel]:
-    keys: dict[Key, None] = {}
+    """Panels of the entries; each entry is walked through once, as looking a panel up in all of them is slow."""
+    columns: dict[Key, list[_Answer]] = defaultdict(list)
+    asked: dict[Key, None] = {}
     for entry in entries:
-        keys |= dict.fromkeys(entry.summary.cells)
-    return [_panel(key, over, entries) for key in sorted(keys)]
+        cells = {key: briefs for key, briefs in entry.summary.cells.items() if briefs}
+        asked |= dict.fromkeys(cells)
+        for key in dict.fromkeys((*cells, *entry.ratios)):
+            columns[key].append(_Answer(entry, cells.get(key, {}), entry.ratios.get(key)))
+    return [_panel(key, over, columns[key]) for key in sorted(asked)]
 
 
-def _panel(key: Key, over: str, entries: Sequence[_Entry]) -> Panel:
-    present = [entry for entry in entries if entry.summary.cells.get(key) or key in entry.ratios]
-    newest = next(entry.summary.cells[key] for entry in reversed(present) if entry.summary.cells.get(key))
-    points: list[Point] = []
-    before: dict[str, Brief] = {}
-    for entry in present:
-        cells = {slot: b for slot, b in entry.summary.cells.get(key, {}).items() if slot in newest}
-        points.append(_point(entry, key, cells, newest, before))
-        before |= cells
+def _panel(key: Key, over: str, present: Sequence[_Answer]) -> Panel:
+    points = _points(key[0], present)
     primary = resolve(key[2]).primary
-    opponents = {entry.ratios[key][1] for entry in present if key in entry.ratios}
     return Panel(
         key,
         over,
-        tuple(points),
+        points,
         primary.unit if primary else "",
         primary.law if primary else "",
         tuple(_steps([p.error for p in points], ERROR, EXACT)),
         tuple(_steps([p.ratio for p in points], TIME, 0.0)),
-        ", ".join(sorted(opponents)),
+        ", ".join(sorted({answer.times[1] for answer in present if answer.times})),
         "-".join((over, *map(str, key))).replace("_", "-"),
     )
 
 
-def _point(
-    entry: _Entry, key: Key, cells: Mapping[str, Brief], newest: Mapping[str, Brief], before: Mapping[str, Brief]
-) -> Point:
-    wanted = {slot for slot, brief in newest.items() if brief[0] is not None}
-    errors = [cells[slot][0] for slot in wanted if slot in cells and cells[slot][0] is not None]
-    complete = bool(wanted) and len(errors) == len(wanted)
-    both = [(before[slot], cells[slot]) for slot in cells if slot in before and cells[slot][2]]
-    return Point(
-        entry.label,
-        entry.title,
-        entry.run,
-        entry.summary.versions.get(key[0], ""),
-        max(error for error in errors if error is not None) if complete else None,
-        sum(brief[1] for brief in cells.values()),
-        sum(brief[2] for brief in cells.values()),
-        sum(bool(now[SURE] and not was[FAILS]) for was, now in both),
-        sum(bool(was[SURE] and not now[FAILS]) for was, now in both),
-        entry.ratios[key][0] if key in entry.ratios else None,
-    )
+def _points(engine: str, present: Sequence[_Answer]) -> tuple[Point, ...]:
+    """A point for each answer; one that is the same as the one before it is counted as that one was."""
+    newest = next(answer.cells for answer in reversed(present) if answer.cells)
+    wanted = [slot for slot, brief in newest.items() if brief[0] is not None]
+    points: list[Point] = []
+    before: dict[str, Brief] = {}
+    earlier: Mapping[str, Brief] | None = None
+    counted: tuple[float | None, int, int] = (None, 0, 0)
+    for entry, own, times in present:
+        flips = (0, 0)
+        if own != earlier:
+            cells = {slot: brief for slot, brief in own.items() if slot in newest}
+            counted, flips, earlier = _counted(cells, wanted), _flips(before, cells), own
+            before |= cells
+        version = entry.summary.versions.get(engine, "")
+        ratio = times[0] if times else None
+        points.append(Point(entry.label, entry.title, entry.run, version, *counted, *flips, ratio))
+    return tuple(points)
+
+
+def _counted(cells: Mapping[str, Brief], wanted: Sequence[str]) -> tuple[float | None, int, int]:
+    """Largest error, if all cells that are wanted have one; checks that fail; checks that are judged."""
+    errors = [error for slot in wanted if slot in cells and (error := cells[slot][0]) is not None]
+    largest = max(errors) if errors and len(errors) == len(wanted) else None
+    fails = judged = 0
+    for _, failing, asked, _ in cells.values():
+        fails, judged = fails + failing, judged + asked
+    return largest, fails, judged
+
+
+def _flips(before: Mapping[str, Brief], cells: Mapping[str, Brief]) -> tuple[int, int]:
+    """Cells in which a check begins to fail, and ceases to."""
+    lost = mended = 0
+    for slot, now in cells.items():
+        was = before.get(slot)
+        if was is not None and now[JUDGED]:
+            lost += bool(now[SURE] and not was[FAILS])
+            mended += bool(was[SURE] and not now[FAILS])
+    return lost, mended
 
 
 def _steps(values: Sequence[float | None], rule: Rule, exact: float) -> list[tuple[int, Step]]:

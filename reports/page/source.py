@@ -118,4 +118,4 @@ def load_source(folder: Path, run: str = "latest") -> Source:
 def _bench(store: Store, run: Run) -> Bench:
     observations = store.observations(run)
     rows = [row for observation in observations for row in speed.physics(observation)]
-    return Bench(run, store.protocol(run) or {}, speed.tables_of(store, run), observations, rows)
+    return Bench(run, store.protocol(run) or {}, speed.tables_of(store, run, observations), observations, rows)

@@ -41,6 +41,7 @@ def test_a_force_pulls_where_gravity_does_not():
     assert needs(scene(FLOOR, pressed)).pull == 8.0
     assert needs(scene(FLOOR, pressed, ball("other"), gravity=(0.0, 0.0))).pull == 5.0
     assert needs(scene(FLOOR, ball(), gravity=(0.0, 0.0))).pull == 0.0
+    assert needs(scene(FLOOR, gravity=(0.0, 0.0))).pull == 0.0  # nobody is there to be pulled
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,17 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
 
 from reports import speed
 from reports.command import main
+from validation import workers
 from validation.bench import reading
 from validation.bench.lane import QUICK
+from validation.bench.sweep import answered
 from validation.records.store import Store
 
 ONE = ["bench", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--dt", "1/60", "--dt", "1/240"]
@@ -111,3 +114,81 @@ def test_what_is_not_a_number_is_null_in_json():
 
     table = pd.DataFrame([{"a": math.nan, "b": 1.0, "c": "x"}])
     assert speed.plain(table) == [{"a": None, "b": 1.0, "c": "x"}]
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Slots that are run in worker processes, as they are asked for."""
+    found = []
+
+    def run_cells(slots, *args, **options):
+        found.extend(slots)
+        return workers.run_cells(slots, *args, **options)
+
+    monkeypatch.setattr("reports.progress.run_cells", run_cells)
+    return found
+
+
+def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_path, asked):
+    pytest.importorskip("pymunk")
+    out, who = tmp_path / "out", ["--engine", "chipmunk", "--profile", "tuned", "--dim", "2"]
+    assert call("run", "incline", "--quick", *who, "--out", out).exit_code == 0
+    ran = set(asked)
+    asked.clear()
+    words = ["bench", "incline", *who, "--dt", "1/120", "--dt", "1/240", "--seed", 1, "--brief", "--out", out]
+    done = call(*words)
+    assert done.exit_code == 0 and "as run" in done.stderr, done.stderr
+    store = Store(out, create=False)
+    judged, benched = store.runs()
+    wanted = set(benched.plan)
+    known = wanted & {slot.key() for slot in ran}
+    assert known and {slot.key() for slot in asked} == wanted - known
+    asked.clear()
+    assert call(*words, "--fresh").exit_code == 0  # runs all of it
+    assert {slot.key() for slot in asked} == wanted
+
+    def answers(run):
+        return {o.slot: replace(o, wall_time_s=0.0) for o in store.observations(run)}
+
+    again = store.runs()[-1]
+    assert answers(benched) == answers(again) and {o.slot for o in store.observations(judged)} & answers(again).keys()
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("statement", "left"),
+    [
+        ("UPDATE observations SET body = json_set(body, '$.cell', 'another')", 0),
+        ("UPDATE observations SET body = json_set(body, '$.outcome', 'crashed')", 0),
+        ("UPDATE runs SET machine = json_set(machine, '$.cpu', 'another')", 0),
+        ("UPDATE runs SET finished = 0", 0),
+        ("UPDATE runs SET title = 'scatter of another'", 0),
+        ("UPDATE runs SET title = 'release chipmunk==7.0.0: impact'", 0),
+        ("UPDATE runs SET title = 'another'", 1),
+    ],
+)
+def test_an_answer_of_another_cell_machine_or_kind_of_run_is_not_taken(tmp_path, statement, left):
+    pytest.importorskip("pymunk")
+    words = [
+        "run",
+        "impact",
+        "--param",
+        "e=.5",
+        "--engine",
+        "chipmunk",
+        "--profile",
+        "tuned",
+        "--dim",
+        "2",
+        "--dt",
+        ".01",
+    ]
+    assert call(*words, "--out", tmp_path).exit_code == 0
+    store = Store(tmp_path)
+    slots = [o.slot for o in store.observations(store.run())]
+    run, found = answered(store, slots)
+    assert run == store.run().id and [o.slot for o in found] == slots and len(slots) == 1
+    with store.writing() as db:
+        db.execute(statement)
+    assert len(answered(store, slots)[1]) == left
+    store.close()

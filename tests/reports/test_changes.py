@@ -153,7 +153,10 @@ def test_a_side_is_all_that_a_release_was_asked_dated_by_its_newest_run(released
     folder, newest = released
     runs = {run.id: replace(run, date=f"on day {k}", commit=f"commit {k}") for k, run in enumerate(newest.values())}
     seen = changes.Store.runs
-    monkeypatch.setattr(changes.Store, "runs", lambda store: [runs.get(run.id, run) for run in seen(store)])
+    seen = changes.Store.release_runs
+    monkeypatch.setattr(
+        changes.Store, "release_runs", lambda store, *asked: [runs.get(run.id, run) for run in seen(store, *asked)]
+    )
     found = load_side("nameless==9.0", folder)
     own = runs[newest["9.0"].id]
     assert (found.run, found.date, found.commit) == ("nameless==9.0", own.date, own.commit)

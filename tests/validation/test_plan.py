@@ -1,10 +1,13 @@
 """Which slots a run has: profiles are chosen by what they are, not by how they are called."""
 
+import ast
+
 import pytest
 
 from adapters import registry
 from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
+from validation import identity
 from validation.running import plan
 from validation.running.plan import FULL_DT, Request, slots
 
@@ -30,3 +33,27 @@ def test_an_engine_of_which_nothing_is_known_has_its_rows_too(monkeypatch):
     monkeypatch.setattr(plan, "find", lambda engine: Found(engine, None, "", "nothing is called that"))
     monkeypatch.setattr(plan, "facts", lambda engine: None)
     assert {slot.profile for slot in slots(Request(["impact"], ["anything"]))} == {NOT_KNOWN}
+
+
+def test_no_import_of_any_depth_is_overlooked_where_expressions_are_not_walked_through():
+    """The identity of a cell hangs on it: against a walk through every node of each source of ours."""
+    deep = (
+        b"def f():\n  try:\n    match 1:\n      case 1:\n        with x: import deep\n  except E: from . import other\n"
+    )
+    sources = [path.read_bytes() for name in ("adapters", "validation") for path in identity._sources(name)]
+    assert len(sources) > 200 and set(identity._named(deep, "a.b")) == {"deep", "a.b", "a.b.other"}
+    for source in (deep, *sources):
+        found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        named = {alias.name for node in found if isinstance(node, ast.Import) for alias in node.names}
+        named |= {name for node in found if isinstance(node, ast.ImportFrom) for name in _from(node, "a.b")}
+        assert set(identity._named(source, "a.b")) == named
+
+
+def _from(node, package):
+    """Names that a `from` import may load; none beyond the top of the package."""
+    parts = package.split(".")
+    if node.level > len(parts):
+        return []
+    base = ".".join([*parts[: len(parts) - node.level + 1], *([node.module] if node.module else [])])
+    base = base if node.level else node.module
+    return [base, *(f"{base}.{alias.name}" for alias in node.names)]

@@ -28,8 +28,7 @@ POINT = [*SERIES, "dt", "iterations"]
 
 def bench_runs(store: Store) -> list[Run]:
     """Runs that timed something, oldest first."""
-    runs = (run for run in store.runs() if not run.title.startswith(RELEASE_TITLE))  # theirs says how they were asked
-    return [run for run in runs if store.protocol(run) is not None]
+    return [run for run in store.timed_runs() if not run.title.startswith(RELEASE_TITLE)]  # theirs: how they were asked
 
 
 def timings_summary(store: Store, run: Run) -> pd.DataFrame:

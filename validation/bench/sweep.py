@@ -20,10 +20,14 @@ from validation.bench.units import Unit, iteration_units, overhead_units, size_u
 from validation.bench.work import accuracy
 from validation.canonical import Suite
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Slot, slot_from_dict
+from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
+from validation.identity import machine
 from validation.posed import primary_of, resolve
+from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Store
 from validation.running.plan import Request, slots
 
+#: Outcomes that the same cell has again.
+REPEATS = (Outcome.OK, Outcome.DIVERGED, Outcome.UNSUPPORTED, Outcome.INVALID)
 #: Step at which cost with every step sampled is timed as well.
 SAMPLED_DT = 1.0 / 240.0
 
@@ -88,6 +92,22 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
                 for count in sweep.counts(scene):
                     found.update(dict.fromkeys(slots(replace(wanted, iterations=[count]))))
     return list(found)
+
+
+def answered(store: Store, slots: Sequence[Slot]) -> tuple[str, list[Observation]]:
+    """What the newest run of verdicts answered to the very same cells on this machine, and its id.
+
+    The same cell: scene, code, engine, adapter, settings and interpreter are equal, as its identity says; engines that
+    crashed or hung are asked again. A time is never taken over.
+    """
+    runs = store.runs()
+    apart, timed = (SCATTER_TITLE, RELEASE_TITLE), {run.id for run in store.timed_runs()}
+    judged = [run for run in runs if run.finished and run.id not in timed and not run.title.startswith(apart)]
+    if not judged or judged[-1].machine != machine():
+        return "", []
+    wanted = set(slots)
+    found = [o for o in store.observations(judged[-1]) if o.slot in wanted and o.outcome in REPEATS]
+    return judged[-1].id, [o for o in found if o.cell and o.cell == prepare(o.slot).cell.key()]
 
 
 def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ COST_LEVELS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
 Row = Mapping[Hashable, Any]
 
 
-def work_points(store: Store, run: Run) -> pd.DataFrame:
+def work_points(store: Store, run: Run, observations: Iterable[Observation] | None = None) -> pd.DataFrame:
     """One row per scene, dimension, engine, profile, step and iteration count: what was bought, and for how much.
 
     Columns: `POINT` (``iterations`` None: the profile's own), ``params``, ``slot`` (the timed cell, as the command
@@ -37,9 +37,10 @@ def work_points(store: Store, run: Run) -> pd.DataFrame:
     ``cost_corrected`` (without what an empty scene costs per step on the same engine and profile),
     ``cost_sampled`` (with every step read; only where that was timed); ``state_hash`` of the timed call;
     ``on_front`` (of its own series' lower envelope), ``best`` (of the envelope over all engines).
+    ``observations`` are those of the run, where they were read already.
     """
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
-    for observation in store.observations(run):
+    for observation in store.observations(run) if observations is None else observations:
         slot = observation.slot
         if resolve(slot.scene).primary:
             groups[tuple(getattr(slot, name) for name in POINT)].append(observation)

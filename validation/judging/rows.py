@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pandas as pd
@@ -82,8 +82,8 @@ class Row:
         return self.standing in ALARMING_STANDINGS or self.outcome in ALARMING_OUTCOMES
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
+        """Plain data; its lists and tables are not copied."""
+        return dict(vars(self))
 
 
 def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] = ()) -> list[Row]:
@@ -280,7 +280,7 @@ def _study_row(run: str, result: StudyResult) -> Row:
     said = result.reason if result.value is not None else ""
     reason = "; ".join(text for text in (said, verdict.reason) if text)
     row = _assemble(run, result.observation, slot, {}, check, result.value, verdict, reason)
-    return Row(**{**asdict(row), "cells": list(result.cells), "state_hash": "", "steps": 0, "wall_time_s": 0.0})
+    return replace(row, cells=list(result.cells), state_hash="", steps=0, wall_time_s=0.0)
 
 
 def frame(rows: Sequence[Row]) -> pd.DataFrame:

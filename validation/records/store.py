@@ -50,6 +50,7 @@ _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS scenes (
     run TEXT NOT NULL REFERENCES runs(id), name TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, name))""",
 )
+_COLUMNS = "id, date, commit_hash, machine, title, plan, finished"
 _T = TypeVar("_T")
 #: A run's id names files and folders, so a store from elsewhere must not choose it freely.
 _ID = re.compile(r"[0-9A-Za-z][0-9A-Za-z_-]{0,63}")
@@ -210,9 +211,7 @@ class Store:
 
     def runs(self) -> list[Run]:
         """All runs, oldest first: in the order in which they were started, whatever the clock said."""
-        with self._guarded("read"):
-            ids = self._db.execute("SELECT id FROM runs ORDER BY rowid").fetchall()
-        return [self.run(run_id) for (run_id,) in ids]
+        return self._runs("1")
 
     def run(self, run_id: str = "latest") -> Run:
         """Return one run; the latest is a bench or a scatter only if there is nothing else.
@@ -225,22 +224,27 @@ class Store:
         last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC LIMIT 1"
         apart = (f"{SCATTER_TITLE}%", f"{RELEASE_TITLE}%")
         where, args = ("id = ?", (run_id,)) if run_id != "latest" else (last, apart)
-        columns = "id, date, commit_hash, machine, title, plan, finished"
         with self._guarded("read"):
-            row = self._db.execute(f"SELECT {columns} FROM runs WHERE {where}", args).fetchone()
-            known = [str(r[0]) for r in self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20")]
+            row = self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where}", args).fetchone()
             if row is None:
-                said = one_line(", ".join(known) or "none")
+                known = self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20").fetchall()
+                said = one_line(", ".join(str(r[0]) for r in known) or "none")
                 raise MissingError(f"run: there is no run {run_id!r} in {self.path}; it has {said}")
-            if not _ID.fullmatch(str(row[0])):
-                raise ValueError(f"{one_line(str(row[0]), 80)!r} is not the id of a run")
-            texts = (one_line(row[1]), one_line(row[2]), dict(json.loads(row[3])), one_line(row[4]))
-            return Run(row[0], *texts, tuple(json.loads(row[5])), bool(row[6]))
+            return _run_of(row)
+
+    def _runs(self, where: str, *values: str) -> list[Run]:
+        with self._guarded("read"):
+            query = f"SELECT {_COLUMNS} FROM runs WHERE {where} ORDER BY rowid"
+            return [_run_of(row) for row in self._db.execute(query, values).fetchall()]
+
+    def timed_runs(self) -> list[Run]:
+        """Runs that have a protocol, oldest first: they timed something."""
+        return self._runs("id IN (SELECT run FROM protocols)")
 
     def release_runs(self, engine: str, version: str = "") -> list[Run]:
         """Runs on other releases of an engine (or on one of them), oldest first."""
         name = f"{RELEASE_TITLE}{engine}=={version}" + (":" if version else "")
-        return [run for run in self.runs() if run.title.startswith(name)]
+        return self._runs("substr(title, 1, length(?)) = ?", name, name)
 
     def observations(self, run: Run) -> list[Observation]:
         """Observations of a run, in the order of its plan; its scene files need not be there any more."""
@@ -314,6 +318,14 @@ class Store:
             order = {key: position for position, key in enumerate(run.plan)}
             rows.sort(key=lambda row: order.get(row[0], len(order)))
             return [(slot_from_dict(json.loads(slot)), recording_from_bytes(body)) for _, slot, body in rows]
+
+
+def _run_of(row: Sequence[Any]) -> Run:
+    name, date, made_at, here, title, plan, finished = row
+    if not _ID.fullmatch(str(name)):
+        raise ValueError(f"{one_line(str(name), 80)!r} is not the id of a run")
+    texts = (one_line(date), one_line(made_at), dict(json.loads(here)), one_line(title))
+    return Run(name, *texts, tuple(json.loads(plan)), bool(finished))
 
 
 def _opened(path: Path) -> sqlite3.Connection:

@@ -22,6 +22,7 @@ from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import at, ball, pose_at, states, upward
+from validation.truths.quadrature import gauss
 from validation.truths.rolling import gyration
 
 K = gyration(2)
@@ -69,7 +70,7 @@ def _leaving(v: float, mu: float, g: float, radius: float, hill: float) -> tuple
 
 def _time(v: float, g: float, reach: float, angle: float) -> float:
     """Time [s] without friction from the top to ``angle``: the integral of reach/speed."""
-    x, weight = np.polynomial.legendre.leggauss(96)
+    x, weight = gauss(96)
     phi = 0.5 * angle * (x + 1.0)
     return float(0.5 * angle * (weight @ (reach / np.sqrt(v * v + 4.0 * g * reach * np.sin(0.5 * phi) ** 2))))
 

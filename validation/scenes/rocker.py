@@ -22,6 +22,7 @@ from adapters.trajectory import Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import block, mass_of, pose_at, standard_gravity, states, tilted, upward
+from validation.truths.quadrature import gauss
 
 #: Swings from side to side that are followed.
 SWINGS = 3
@@ -47,7 +48,7 @@ def _raised(p: Params, theta: Array) -> Array:
 
 def _swing(p: Params) -> float:
     """Time from one side to the other [s]: twice that from the side to level; theta = start sin(s)."""
-    x, weight = np.polynomial.legendre.leggauss(NODES)
+    x, weight = gauss(NODES)
     s = 0.25 * math.pi * (x + 1.0)
     start = np.array(math.radians(p["tilt"]))
     theta = start * np.sin(s)
@@ -140,7 +141,7 @@ def _left_out(p: Params) -> tuple[float, float]:
     next one takes the velocity a dt off it, (a dt)^2/2 of energy.
     """
     start = np.array(math.radians(p["tilt"]))
-    x, weight = np.polynomial.legendre.leggauss(NODES)
+    x, weight = gauss(NODES)
     theta = start * np.sin(0.5 * math.pi * x)
     inertia, r, h = _inertia(p, theta), p["radius"], 0.5 * p["thickness"]
     speed = np.sqrt(2.0 * p["g"] * (_raised(p, start) - _raised(p, theta)) / inertia)

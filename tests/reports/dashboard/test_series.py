@@ -1,17 +1,21 @@
 """Series over runs and releases: exactly the planted steps are marked, and nothing is in series without a step."""
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 
 from reports.brief import FILE, Kept, Summary, summarise
 from reports.command import main
-from reports.dashboard import events
+from reports.dashboard import events, render
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
+from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
 from validation.records.store import Store
@@ -134,6 +138,83 @@ def test_runs_that_asked_something_else_bring_no_step():
     assert [point.error for point in panel.points] == [0.1, 0.1, None, 0.1] and not panel.moved
 
 
+BRIEFS = st.tuples(
+    st.none() | st.sampled_from([0.0, 1e-9, 0.1, 0.3]), st.integers(0, 2), st.integers(0, 2), st.integers(0, 2)
+).map(lambda b: (b[0], min(b[1], b[2]), b[2], min(b[1], b[2], b[3])))
+PANELS = st.dictionaries(st.sampled_from("abc"), BRIEFS, max_size=3)
+KEY = ("e", "p", "impact", 2)
+
+
+def by_definition(panels):
+    """Errors, counts and flips of points as `Point` defines them, each point from all that came before it."""
+    newest = [own for own in panels if own][-1]
+    for k, own in enumerate(panels):
+        cells = {slot: brief for slot, brief in own.items() if slot in newest}
+        answers = [cells.get(slot, (None,))[0] for slot, brief in newest.items() if brief[0] is not None]
+        lost = mended = 0
+        for slot, (_, fails, judged, sure) in cells.items():
+            earlier = [other[slot] for other in panels[:k] if slot in other]
+            if earlier and judged:
+                lost += sure > 0 and earlier[-1][1] == 0
+                mended += earlier[-1][3] > 0 and fails == 0
+        error = max(answers) if answers and None not in answers else None
+        yield error, sum(b[1] for b in cells.values()), sum(b[2] for b in cells.values()), lost, mended
+
+
+@given(st.lists(st.tuples(PANELS, st.booleans(), st.integers(1, 3)), min_size=1, max_size=8))
+def test_points_are_as_defined_whatever_repeats_is_missing_or_was_only_timed(history):
+    entries = [
+        _Entry(f"{k}.{i}", "", "", Summary({KEY: own}, {}), {KEY: (1.0 + k, "reference/reference")} if timed else {})
+        for k, (own, timed, times) in enumerate(history)
+        for i in range(times)
+    ]
+    found = _divided(entries, "runs")
+    present = [entry for entry in entries if entry.summary.cells[KEY] or entry.ratios]
+    if not any(entry.summary.cells[KEY] for entry in present):
+        assert found == []
+        return
+    (panel,) = found
+    assert [point.label for point in panel.points] == [entry.label for entry in present]
+    assert [point.ratio for point in panel.points] == [entry.ratios.get(KEY, (None,))[0] for entry in present]
+    wanted = list(by_definition([entry.summary.cells[KEY] for entry in present]))
+    assert [tuple(point[4:9]) for point in panel.points] == wanted
+
+
+def long_history(folder, runs=500):
+    """What the quick suite keeps of ``runs`` runs and benches: every tenth panel scatters, the others repeat."""
+    engines = [(*who, dimension) for who in SERIES for dimension in (2, 3)]
+    keys = [(engine, profile, scene, dim) for scene in CATALOGUE for engine, profile, dim in engines]
+    names = [Slot("impact", (("v", float(v)),), 2, "e", "p", 1 / 240).key() for v in range(4)]
+    rng, store, kept = np.random.default_rng(5), Store(folder), Kept(folder)
+    for _ in range(runs):
+        run, _ = store.start("quick: all", [], fresh=True)
+        store.finish(run)
+        factors = np.exp(0.03 * rng.normal(size=len(keys)) * (np.arange(len(keys)) % 10 == 0))
+        briefs = ({name: (0.1 * v * float(f), 1, 4, 1) for v, name in enumerate(names)} for f in factors)
+        kept.put(run.id, Summary(dict(zip(keys, briefs, strict=True)), {"bullet": "1"}))
+        bench, _ = store.start("bench quick: all", [], fresh=True)
+        store.set_protocol(bench, {})
+        store.finish(bench)
+        kept.put(
+            bench.id,
+            Summary({}, {}, {key: (float(f), "reference/reference") for key, f in zip(keys, factors, strict=True)}),
+        )
+    kept.close()
+    return store, len(keys)
+
+
+def test_a_dashboard_of_500_runs_and_benches_takes_less_than_ten_seconds(tmp_path):
+    store, count = long_history(tmp_path)
+    begun = time.process_time()
+    found = panels(store, tmp_path)
+    page = render(found, "long")
+    took = time.process_time() - begun
+    store.close()
+    assert len(found) == count > 400 and all(len(panel.points) == 500 for panel in found)
+    assert page.count('class="panel"') == count and page.count('class="line time"') == count
+    assert took < 10.0  # s, of one core; imports not counted
+
+
 def test_errors_that_are_exact_are_one_level():
     key = ("e", "p", "impact", 2)
     sizes = [1e-16, 3e-9, 0.0, 2e-12]
@@ -148,6 +229,7 @@ def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeyp
     panels(store, history_folder)
     assert (history_folder / FILE).exists()
     monkeypatch.setattr("reports.dashboard.series.summarise", lambda *a: pytest.fail("judged again"))
+    monkeypatch.setattr("reports.dashboard.series.ratios", lambda *a: pytest.fail("ratios taken again"))
     panels(store, history_folder)
     monkeypatch.setattr("reports.brief.judging_code", lambda: "other code")
     with pytest.raises(pytest.fail.Exception):
@@ -177,6 +259,17 @@ def test_where_nothing_can_be_kept_it_is_made_each_time(tmp_path):
     kept.put("run", Summary({}, {}))
     assert kept.get("run") is None
     kept.close()
+
+
+def test_a_panel_that_is_equal_in_two_runs_is_one_object(tmp_path):
+    kept, other = Kept(tmp_path), ("e", "q", "impact", 2)
+    for run, error in (("first", 0.1), ("second", 0.2)):
+        panel = {"s": (0.5, 0, 1, 0)}
+        kept.put(run, Summary({KEY: panel, other: {"s": (error, 0, 1, 0)}}, {}, {KEY: (2.0, "a/b")}))
+    first, second = kept.get("first"), kept.get("second")
+    kept.close()
+    assert first.cells[KEY] is second.cells[KEY] and first.cells[other] != second.cells[other]
+    assert first.times == {KEY: (2.0, "a/b")}
 
 
 def test_a_summary_that_older_code_wrote_is_made_again(tmp_path):
