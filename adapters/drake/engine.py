@@ -47,7 +47,7 @@ class DrakeEngine(Engine):
         dimensions=frozenset({3}),
         scheme=Scheme("detect, forces and contacts at once, position", 1),
         customary_dt=1.0 / 1000.0,
-        roles=MappingProxyType({"default": "shipped", "tamsi": "tuned", "sap": "one"}),
+        roles=MappingProxyType({"default": "shipped", "sap": "one", "tamsi": "tuned"}),
         apart=True,
         quirks=(
             Quirk(
