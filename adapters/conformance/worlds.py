@@ -164,7 +164,8 @@ def history(engine: Engine) -> str:
     for profile in engine.profiles:
         scene = accepted(engine, profile, sliding(), rolling())
         before = driven(engine, scene, profile).state_hash()
-        for other in (striking(), accepted(engine, profile, resting(-1, 4.0), resting(-1, 4.0, box=False))):
+        lying = (resting(-1, 4.0), resting(-1, 4.0, box=False))
+        for other in (accepted(engine, profile, striking(), *lying), accepted(engine, profile, *lying)):
             driven(engine, other, profile)
             if driven(engine, scene, profile).state_hash() != before:
                 return f"{profile}: {scene.name} comes out otherwise after {other.name}"

@@ -4,9 +4,10 @@ profiles       one contact solver each: friction pyramids (Dantzig, PGS) and exa
 translation    materials of pairs as one number per body
 simulation     one world
 engine         the adapter
-laws           what it does by design; blows of balls on a floor (`falling`) and in a line (`in_line`) step by step,
-               of boxes on an edge (`landing`), of balls that slip (`slipping`), and what
-               slips on a floor under a pyramid (`pyramid`)
+laws           what it does by design; blows of balls on a floor (`falling`), in a line (`in_line`) and in a plane
+               (`balls`) step by step, of boxes on an edge (`landing`) that slides (`rubbing`), of balls that slip
+               (`slipping`), and what slips on a floor under a pyramid (`pyramid`)
+experiments    what shows the reasons in `findings` to be true
 """
 
 from adapters.dart.engine import DartEngine

@@ -49,17 +49,21 @@ class DartSimulation(Simulation):
         self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
 
     def _solver(self, dartpy: Any, settings: Mapping[str, Any]) -> Any:
-        """Make and set the solver of the contact problem; Dantzig's is there already."""
+        """Make and set the solver of the contact problem, and who answers where it finds none; Dantzig's is there."""
         held, name = self.world.getConstraintSolver(), settings["solver"]
+        option = dartpy.constraint.PgsBoxedLcpSolverOption()
+        # Sweeps that end above the tolerance count as failed, and what the second choice finds is taken as it is: where
+        # PGS is asked for, that has to be as many sweeps.
+        first = ("iterations", "tolerance") if name == "pgs" else ("second_sweeps", "second_tolerance")
+        option.mMaxIteration, option.mRelativeDeltaXTolerance = (settings[key] for key in first)
+        option.mDeltaXThreshold = settings[first[1]] * (1.0 if name == "pgs" else 1e-3)
+        held.getSecondaryBoxedLcpSolver().setOption(option)
         if name == "dantzig":
             return held.getBoxedLcpSolver()
         if name == "pgs":
             # Its class has no constructor in Python; every world brings one as its second choice.
             self.other = dartpy.simulation.World()
             solver = self.other.getConstraintSolver().getSecondaryBoxedLcpSolver()
-            option = dartpy.constraint.PgsBoxedLcpSolverOption()
-            option.mMaxIteration, option.mDeltaXThreshold = settings["iterations"], settings["tolerance"]
-            option.mRelativeDeltaXTolerance = settings["tolerance"]
             solver.setOption(option)
         else:
             solver = getattr(dartpy.constraint, {"nsgs": "Nsgs", "fbf": "Fbf"}[name] + "FrictionSolver")()

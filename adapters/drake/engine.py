@@ -1,0 +1,138 @@
+"""Drake behind the plugin line: spatial, compliant contact that is solved implicitly, discrete steps.
+
+    step:  detect  ->  solve  M (v' - v) = dt (M g + f) + J^T j(x, v')  ->  q' = q + dt N(q) v'
+
+Profiles differ in the approximation of ``j``, and in nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.drake.landing import slowest_rebound
+from adapters.drake.profiles import PROFILES, checked
+from adapters.drake.simulation import DrakeSimulation
+from adapters.drake.translation import frictions
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
+from adapters.needs import Needs
+from adapters.probes import REBOUND_SPEED
+from adapters.receipts import UNTOLD
+from adapters.scene import Scene
+from adapters.settings import checked_step
+
+#: What the solver of a convex step leaves, as a share of what it changes, and of a speed [m/s]; measured 6e-6 at most.
+SOLVED_SHARE, SOLVED = 1e-5, 1e-6
+#: Profiles whose friction does not keep to the load of the step, and why.
+APPROXIMATE: Mapping[str, str] = MappingProxyType(
+    {
+        "default": "friction is limited by the load that springs would have at the velocities of the step's start, "
+        "which of a box that rocks is another one",
+        "sap": "what slips is lifted by a share of its slip and glides: it hops over the floor",
+        "similar": "what slips is lifted by a share of its slip and glides: it hops over the floor",
+    }
+)
+
+
+@final
+class DrakeEngine(Engine):
+    """Spatial engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="drake",
+        title="Drake",
+        package="drake",
+        dimensions=frozenset({3}),
+        scheme=Scheme("detect, forces and contacts at once, position", 1),
+        customary_dt=1.0 / 1000.0,
+        roles=MappingProxyType({"default": "shipped", "sap": "one", "tamsi": "tuned"}),
+        apart=True,
+        quirks=(
+            Quirk(
+                "contacts have no restitution: what they dissipate depends on the speed, and on the step",
+                "restitution above 0 is refused",
+                "MultibodyPlant, Hunt & Crossley dissipation; measured with 1.51.1",
+            ),
+            Quirk(
+                "a pair of shapes has one point of contact, over whose corners a box rocks",
+                "boxes and half-spaces are hydroelastic: a surface each; pairs with a ball have their point",
+                "ContactModel.kHydroelasticWithFallback; measured with 1.51.1",
+            ),
+            Quirk(
+                "bodies overlap at rest: contacts are springs",
+                "left alone; stiffness and modulus are the engine's own",
+                "SceneGraphConfig.default_proximity_properties",
+            ),
+            Quirk(
+                "slips below a tolerance are viscous, so that nothing that friction holds stands still",
+                "left alone: 0.1 mm/s as shipped",
+                "MultibodyPlantConfig.stiction_tolerance",
+            ),
+            Quirk(
+                "friction of a pair is the harmonic mean of two numbers",
+                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "CalcContactFrictionFromSurfaceProperties",
+            ),
+            Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 1.51.1"),
+        ),
+    )
+    profiles = PROFILES
+    expected = (
+        Expected(
+            "memory",
+            "a plant and a scene graph that were built into a diagram are never freed by the bindings",
+            "RobotLocomotion/drake issue 24529; measured with 1.51.1: an empty plant leaves 90 kB",
+        ),
+    )
+
+    def version(self) -> str:
+        """Version of the installed distribution."""
+        import pydrake  # noqa: F401  (a release that cannot be imported has no version)
+
+        return version("drake")
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse restitution, bodies that are moved as prescribed, and tables that no single bodies' numbers give."""
+        for body in scene.bodies:
+            if body.motion == "prescribed":
+                return f"{body.name}.motion: the adapter moves no body as prescribed"
+        if any(restitution > 0.0 for restitution, _ in scene.materials()):
+            return "pairs: contacts of drake have no restitution"
+        if frictions(scene) is None:
+            return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
+        return None
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a scene that `refuses` names, a bad step or setting.
+        """
+        dt, chosen = checked_step(dt), checked(settings)
+        reason = self.refuses(scene, "")
+        if reason:
+            raise EngineError(reason)
+        return DrakeSimulation(scene, dt, chosen)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """What springs throw back, and friction where the approximation of contact does not keep to the load."""
+        declared = {}
+        if needs.regime == "impact":
+            most = slowest_rebound(profile, REBOUND_SPEED, dt) / REBOUND_SPEED
+            declared["restitution"] = Declared(
+                0.5 * most, 0.5 * most + SOLVED, "what overlaps is pushed out by springs"
+            )
+        if profile != "tamsi":
+            because = "the step is solved to a share of 1e-5 of what it changes"
+            declared["impulse"] = Declared(1.0, SOLVED_SHARE, because)
+        if needs.friction > 0.0 and profile in APPROXIMATE:
+            because = APPROXIMATE[profile]
+            told = Declared(needs.friction, UNTOLD, because)
+            declared |= {"friction": told, "friction_impulse": told}
+            if profile == "sap":
+                declared["impulse"] = Declared(1.0, UNTOLD, because)
+        return declared

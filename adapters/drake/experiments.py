@@ -1,0 +1,81 @@
+"""Experiments on Drake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from adapters.experiment import Experiment
+
+CANDIDATES: dict[str, tuple[Any, ...]] = {
+    "approximation": ("lagged", "sap", "tamsi", "similar"),
+    "boxes": ("hydroelastic", "point"),
+    "point_stiffness": (1e4, 1e8),
+    "modulus": (1e5, 1e6, 1e8),
+    "dissipation": (0.0, 1.0, 10.0),
+    "relaxation_time": (0.0, 0.01),
+    "stiction_tolerance": (1e-6, 1e-5),
+}
+
+_Settings = Mapping[str, Any]
+#: Friction by the load of the step itself, solved with it.
+_IMPLICIT: _Settings = {"approximation": "tamsi"}
+#: Slips are viscous below a micrometre per second alone.
+_STICKS: _Settings = {"stiction_tolerance": 1e-6}
+#: Softer boxes.
+_SOFT: _Settings = {"modulus": 1e6}
+
+_SAYS = {
+    "glides": "where friction goes by the load of the step it passes",
+    "friction-by-an-earlier-load": "where friction goes by the load of the step it passes",
+    "viscous-friction": "where only slower slips are viscous it stays",
+}
+#: Family, profile, dimension, metric and parameters of a row; the settings that cure it, and those that must not.
+_ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Settings, ...]], ...] = (
+    ("far-origin-glides", "sap", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("far-origin-glides", "similar", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("hilltop-friction-by-an-earlier-load", "default", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_STICKS,)),
+    ("hilltop-glides", "sap", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
+    ("hilltop-glides", "similar", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
+    ("incline-friction-by-an-earlier-load", "default", 2, "acceleration", {"ratio": 1.1}, _IMPLICIT, (_STICKS,)),
+    ("incline-glides", "sap", 2, "acceleration", {"ratio": 1.001}, _IMPLICIT, (_SOFT,)),
+    ("incline-glides", "similar", 2, "creep", {}, _IMPLICIT, (_SOFT,)),
+    ("incline-viscous-friction", "tamsi", 2, "creep", {"ratio": 0.99}, _STICKS, (_SOFT,)),
+    ("ladder-friction-by-an-earlier-load", "default", 2, "passing_spin", {"ratio": 0.8}, _IMPLICIT, (_STICKS,)),
+    ("ladder-viscous-friction", "default", 2, "wall_load", {}, _STICKS, (_SOFT,)),
+    ("ladder-glides", "sap", 2, "passing_time", {"ratio": 0.8}, _IMPLICIT, (_SOFT,)),
+    ("ladder-glides", "similar", 2, "passing_spin", {"ratio": 0.8}, _IMPLICIT, (_SOFT,)),
+    ("masse-glides", "sap", 3, "final_vx", {}, _IMPLICIT, (_SOFT,)),
+    ("masse-glides", "similar", 3, "final_vx", {}, _IMPLICIT, (_SOFT,)),
+    ("painleve-friction-by-an-earlier-load", "default", 2, "turning_time", {"ratio": 0.6}, _IMPLICIT, (_STICKS,)),
+    ("painleve-glides", "sap", 2, "turning_time", {"ratio": 0.6}, _IMPLICIT, (_SOFT,)),
+    ("painleve-glides", "similar", 2, "turning_time", {"ratio": 0.6}, _IMPLICIT, (_SOFT,)),
+    ("pinch-viscous-friction", "default", 2, "creep", {}, _STICKS, (_SOFT,)),
+    ("incline-viscous-friction", "default", 2, "creep", {"ratio": 0.9}, _STICKS, (_SOFT,)),
+    ("pinch-viscous-friction", "tamsi", 2, "creep", {"margin": 1.05}, _STICKS, (_SOFT,)),
+    ("pressed-box-friction-by-an-earlier-load", "default", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_STICKS,)),
+    ("pressed-box-glides", "sap", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_SOFT,)),
+    ("pressed-box-glides", "similar", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_SOFT,)),
+    ("rocker-friction-by-an-earlier-load", "default", 2, "amplitude", {"tilt": 5.0}, _IMPLICIT, (_STICKS,)),
+    ("roll-incline-glides", "sap", 2, "acceleration", {"ratio": 1.5}, _IMPLICIT, (_SOFT,)),
+    ("roll-incline-glides", "similar", 2, "acceleration", {"ratio": 1.5}, _IMPLICIT, (_SOFT,)),
+    ("rolling-spin-glides", "sap", 3, "hop", {}, _IMPLICIT, (_SOFT,)),
+    ("seam-glides", "sap", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("seam-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("slide-glides", "sap", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("slide-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("slide-to-roll-glides", "sap", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
+    ("slide-to-roll-glides", "similar", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
+)
+
+
+def _experiment(
+    family: str, profile: str, dimension: int, metric: str, params: dict[str, float], off: _Settings,
+    idle: tuple[_Settings, ...],
+) -> Experiment:  # fmt: skip
+    kind = next(kind for kind in _SAYS if family.endswith(kind))
+    scene = family.removesuffix(f"-{kind}").replace("-", "_")
+    return Experiment(family, _SAYS[kind], profile, scene, metric, off, params, dimension, None, idle)
+
+
+EXPERIMENTS: tuple[Experiment, ...] = tuple(_experiment(*row) for row in _ROWS)

@@ -1,0 +1,32 @@
+"""What Drake does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.drake.landing import landing_law
+from adapters.drake.profiles import PROFILES
+from adapters.law import Deviation, exactly
+
+#: Scenes of a ball that falls straight onto a floor without a rebound, and what its motion decides.
+FALLING: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change"),
+    "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_growth", "rest_time"),
+}
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "drake",
+        (profile,),
+        scene,
+        exactly(metric),
+        landing_law(metric, profile),
+        "contacts are springs that dissipate: what overlaps when it is found is pushed out, by Hunt and Crossley at up "
+        "to 1/d, 20 mm/s as shipped, by SAP within its relaxation time",
+        "MultibodyPlant, discrete contact; recurrence in adapters/drake/landing.py",
+        ("1.51.",),
+    )
+    for profile in PROFILES
+    for scene, metrics in FALLING.items()
+    for metric in metrics
+)

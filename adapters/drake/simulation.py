@@ -1,0 +1,199 @@
+"""One Drake plant and what is read from it: contacts are solved where the step begins, velocities before positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.drake.profiles import APPROXIMATIONS
+from adapters.drake.translation import frictions, pair_of
+from adapters.engine import Array, Contacts, Simulation
+from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+
+
+class DrakeSimulation(Simulation):
+    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        import pydrake.all
+
+        # Its stubs know no arrays as NumPy types them.
+        drake: Any = pydrake.all
+        self.scene, self.dt, self.settings, self.drake = scene, dt, settings, drake
+        builder = drake.DiagramBuilder()
+        self.plant, graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
+        plant = self.plant
+        approximation = getattr(drake.DiscreteContactApproximation, APPROXIMATIONS[settings["approximation"]])
+        plant.set_discrete_contact_approximation(approximation)
+        plant.set_contact_model(drake.ContactModel.kHydroelasticWithFallback)
+        plant.set_stiction_tolerance(settings["stiction_tolerance"])
+        plant.mutable_gravity_field().set_gravity_vector(list(scene.gravity))
+        self.frictions = frictions(scene) or []
+        self.owner: dict[Any, int] = {}
+        self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
+        plant.Finalize()
+        diagram = builder.Build()
+        self.simulator: Any = drake.Simulator(diagram)
+        self.context: Any = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+        self.inspector: Any = graph.model_inspector()
+        for body, asked in zip(self.bodies, scene.bodies, strict=True):
+            if asked.motion == "free":
+                plant.SetFreeBodyPose(self.context, body, self._place(asked))
+                twist = drake.SpatialVelocity(np.array(asked.twist[3:]), np.array(asked.twist[:3]))
+                plant.SetFreeBodySpatialVelocity(self.context, body, twist)
+        self._load()
+        self.simulator.Initialize()
+        self.steps = 0
+
+    def _place(self, asked: Body) -> Any:
+        turn = np.array(asked.pose[3:], float)
+        quaternion = self.drake.Quaternion(turn / float(np.linalg.norm(turn)))
+        return self.drake.RigidTransform(quaternion, np.array(asked.pose[:3], float))
+
+    def _made(self, index: int, asked: Body) -> Any:
+        """Register a body and its shape."""
+        drake, shape = self.drake, asked.shape
+        free = asked.motion == "free"
+        if free:
+            assert isinstance(asked.inertia, tuple)
+            unit = drake.UnitInertia(*np.divide(asked.inertia, asked.mass))
+            body = self.plant.AddRigidBody(f"body {index}", drake.SpatialInertia(asked.mass, [0.0, 0.0, 0.0], unit))
+            place = drake.RigidTransform()
+        else:
+            body, place = self.plant.world_body(), self._place(asked)
+        held = drake.ProximityProperties()
+        friction = self.frictions[index]
+        drake.AddContactMaterial(
+            dissipation=self.settings["dissipation"],
+            # Two in series: each has twice the pair's.
+            point_stiffness=2.0 * self.settings["point_stiffness"],
+            friction=drake.CoulombFriction(friction, friction),
+            properties=held,
+        )
+        # Times of a pair add up.
+        held.AddProperty("material", "relaxation_time", 0.5 * self.settings["relaxation_time"])
+        if isinstance(shape, HalfSpace):
+            normal = np.array(shape.normal)
+            place = drake.HalfSpace.MakePose(normal, shape.offset * normal)
+            made: Any = drake.HalfSpace()
+        elif isinstance(shape, Sphere):
+            made = drake.Sphere(shape.radius)
+        else:
+            assert isinstance(shape, Box)
+            made = drake.Box(*(2.0 * half for half in shape.half_extents))
+        if self.settings["boxes"] == "hydroelastic" and not isinstance(shape, Sphere):
+            if free:
+                drake.AddCompliantHydroelasticProperties(shape.smallest_size, self.settings["modulus"], held)
+            elif isinstance(shape, HalfSpace):
+                drake.AddRigidHydroelasticProperties(held)
+            else:
+                drake.AddRigidHydroelasticProperties(shape.smallest_size, held)
+        geometry = self.plant.RegisterCollisionGeometry(body, place, made, f"shape {index}", held)
+        self.owner[geometry] = index
+        return body
+
+    def _load(self) -> None:
+        """Forces and torques of the scene, for good."""
+        drake, loads = self.drake, []
+        for body, asked in zip(self.bodies, self.scene.bodies, strict=True):
+            if asked.motion == "free" and (any(asked.force) or any(asked.torque)):
+                load = drake.ExternallyAppliedSpatialForce()
+                load.body_index = body.index()
+                load.p_BoBq_B = [0.0, 0.0, 0.0]
+                load.F_Bq_W = drake.SpatialForce(list(asked.torque), list(asked.force))
+                loads.append(load)
+        if loads:
+            port = self.plant.get_applied_spatial_force_input_port()
+            port.FixValue(self.context, drake.Value(loads))
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`."""
+        for _ in range(steps):
+            self.steps += 1
+            self.simulator.AdvanceTo(self.steps * self.dt)
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`."""
+        rows = []
+        for body, asked in zip(self.bodies, self.scene.bodies, strict=True):
+            if asked.motion != "free":
+                rows.append(asked.pose)
+                continue
+            place = self.plant.EvalBodyPoseInWorld(self.context, body)
+            rows.append((*place.translation(), *place.rotation().ToQuaternion().wxyz()))
+        return np.array(rows, float)
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`."""
+        rows = []
+        for body in self.bodies:
+            velocity = self.plant.EvalBodySpatialVelocityInWorld(self.context, body)
+            rows.append((*velocity.translational(), *velocity.rotational()))
+        return np.array(rows, float)
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step: of a pair with a ball its point, of others the centroid of their surface."""
+        if self.steps == 0:
+            return Contacts.from_rows([], 3)
+        found = self.plant.get_contact_results_output_port().Eval(self.context)
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for k in range(found.num_point_pair_contacts()):
+            info = found.point_pair_contact_info(k)
+            pair = info.point_pair()
+            # The normal points from B to A, and the force is on B.
+            impulse = np.multiply(self.dt, info.contact_force())
+            rows.append(
+                (
+                    self.owner[pair.id_A],
+                    self.owner[pair.id_B],
+                    info.contact_point(),
+                    -pair.nhat_BA_W,
+                    impulse,
+                    -pair.depth,
+                )
+            )
+        for k in range(found.num_hydroelastic_contacts()):
+            info = found.hydroelastic_contact_info(k)
+            surface = info.contact_surface()
+            first, second = self.owner[surface.id_M()], self.owner[surface.id_N()]
+            force = info.F_Ac_W()
+            # The force is on M; faces look out of N, into M.
+            normal = np.sum([surface.area(f) * surface.face_normal(f) for f in range(surface.num_faces())], axis=0)
+            normal = normal / np.linalg.norm(normal)
+            impulse = np.multiply(self.dt, force.translational())
+            rows.append((second, first, surface.centroid(), normal, impulse, np.nan))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 3)
+
+    def readback(self) -> dict[str, Any]:
+        """What the plant, its bodies and their shapes hold."""
+        plant = self.plant
+        held = {index: self.inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
+        own = [
+            float(held[index].GetProperty("material", "coulomb_friction").dynamic_friction())
+            for index in range(len(held))
+        ]
+        inertias = {
+            asked.name: body.CalcSpatialInertiaInBodyFrame(self.context)
+            for body, asked in zip(self.bodies, self.scene.bodies, strict=True)
+            if asked.motion == "free"
+        }
+        return {
+            "dt": float(plant.time_step()),
+            "gravity": [float(g) for g in plant.gravity_field().gravity_vector()],
+            "approximation": plant.get_discrete_contact_approximation().name,
+            "contact_model": plant.get_contact_model().name,
+            "bodies": {
+                name: {
+                    "mass": float(inertia.get_mass()),
+                    "inertia": [float(x) for x in inertia.CalcRotationalInertia().get_moments()],
+                }
+                for name, inertia in inertias.items()
+            },
+            "pairs": {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {"friction": pair_of(own[i], own[j])}
+                for i, j, _ in self.scene.contact_pairs()
+            },
+        }

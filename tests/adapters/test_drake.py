@@ -1,0 +1,155 @@
+"""The Drake adapter, on small scenes with known answers."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("pydrake", reason="Drake is set apart: pip install 'contact-crosscheck[drake]'")
+
+from adapters.conformance import items
+from adapters.drake import DrakeEngine
+from adapters.drake.landing import landing_law
+from adapters.drake.laws import DEVIATIONS, FALLING
+from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
+from adapters.drake.translation import frictions, pair_of
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.stepping import run
+from adapters.trajectory import Sampling
+from validation.catalogue import CATALOGUE
+
+ENGINE = DrakeEngine()
+DT = 1.0 / 240.0
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
+
+
+def settings(scene, profile="default", **changes):
+    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
+
+
+def drive(scene, profile="default", dt=DT, **changes):
+    return run(ENGINE, scene, dt, settings(scene, profile, **changes), Sampling(1, 0.0))
+
+
+def resting(mu=0.5, **changes):
+    return Scene("rest", 1, 3, (FLOOR, replace(BOX, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.25)
+
+
+@pytest.mark.parametrize("item", items(ENGINE), ids=str)
+def test_conformance(item):
+    item.hold()
+
+
+def test_numbers_that_are_called_shipped_are_the_engine_s_own():
+    from pydrake.geometry import SceneGraphConfig
+    from pydrake.multibody.plant import MultibodyPlantConfig
+
+    given, plant = SceneGraphConfig().default_proximity_properties, MultibodyPlantConfig()
+    assert (given.point_stiffness, given.hydroelastic_modulus) == (POINT_STIFFNESS, MODULUS)
+    assert (given.hunt_crossley_dissipation, given.relaxation_time) == (DISSIPATION, RELAXATION)
+    assert plant.stiction_tolerance == STICTION and plant.contact_model == "hydroelastic_with_fallback"
+    assert plant.discrete_contact_approximation == settings(resting())["approximation"] == "lagged"
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize(
+    ("name", "params"), [("impact", {"e": 0.0}), ("impact", {"e": 0.0, "v": 50.0}), ("bounce", {"e": 0.0})], ids=str
+)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_springs_throw_back_is_what_the_law_says(name, params, dimension, profile):
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(dimension, params)
+    found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), canonical.sampling(scene)))
+    seen = 0
+    for metric in FALLING[name]:
+        laws = [d for d in DEVIATIONS if d.covers("drake", "1.51.1", profile, name, metric)]
+        told = [each for each in (d.law(scene, DT, canonical.measure) for d in laws) if each is not None]
+        value = found[metric][0]
+        if value is None:
+            assert not told
+            continue
+        ((said, band),) = told
+        assert abs(value - said) <= band, metric
+        seen += 1
+        if metric == "rebound_speed":
+            assert abs(value * 1.01 - said) > band
+            assert profile == "sap" or value == pytest.approx(1.0 / DISSIPATION, rel=1e-6)
+    assert seen >= 3
+
+
+def test_a_point_of_contact_lies_half_way_into_the_overlap():
+    """SAP's regularisation knows the arm of the point: at the surface it would be 1.2e-3 of the rebound off."""
+    impact = CATALOGUE["impact"]
+    scene = impact.scene(3, {"e": 0.0})
+    value = impact.measure(scene, drive(scene, "sap"))["rebound_speed"][0]
+    floor, ball = scene.bodies
+    farther = replace(scene, bodies=(floor, replace(ball, inertia=tuple(0.98 * x for x in ball.inertia))))
+    told, others = (landing_law("rebound_speed", "sap")(each, DT, impact.measure) for each in (scene, farther))
+    assert abs(value - told[0]) < 1e-9 < 1e-4 < abs(value - others[0])
+
+
+def test_a_ball_that_rebounds_or_spins_has_no_law_here():
+    impact = CATALOGUE["impact"]
+    law = landing_law("rebound_speed", "default")
+    scene = impact.scene(3, {"e": 0.0})
+    floor, ball = scene.bodies
+    assert law(scene, DT, impact.measure) is not None
+    assert law(impact.scene(3, {"e": 0.5}), DT, impact.measure) is None
+    spun = replace(ball, twist=(*ball.twist[:5], 1.0))
+    assert law(replace(scene, bodies=(floor, spun)), DT, impact.measure) is None
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi / 8.0, math.pi / 4.0])
+def test_friction_of_tamsi_is_a_cone(heading):
+    slid = resting(0.3, twist=(3.0 * math.cos(heading), 3.0 * math.sin(heading), 0.0, 0.0, 0.0, 0.0))
+    speed = math.hypot(*drive(slid, "tamsi").twist[-1, 1, :2])
+    # What the first step falls, without an overlap yet, the second one takes back with its friction.
+    assert (3.0 - speed) / (0.3 * 9.81 * 0.25) == pytest.approx(1.0, rel=2e-3)
+
+
+def test_a_box_slides_on_its_face_by_a_surface_and_tips_on_a_point():
+    slid = resting(0.3, twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    level = abs(drive(slid, "tamsi").twist[-20:, 1, 3:]).max()
+    tipped = abs(drive(slid, "tamsi", boxes="point").twist[-20:, 1, 3:]).max()
+    assert level < 1e-5 and tipped > 1e-2
+
+
+def test_loads_act_in_every_step_and_contacts_carry_the_weight():
+    pushed = replace(resting(0.0, force=(3.0, 0.0, 0.0)), pairs=(Pair(),))
+    found = drive(pushed, "tamsi")
+    assert found.twist[-1, 1, 0] == pytest.approx(0.25, rel=1e-6)
+    assert found.contacts.impulse_between(0, 1)[-20:, 2].mean() / DT == pytest.approx(3.0 * 9.81, rel=1e-5)
+
+
+def test_friction_of_a_pair_is_a_harmonic_mean():
+    assert pair_of(0.1, 0.3) == pytest.approx(0.15) and pair_of(0.0, 0.0) == 0.0 == pair_of(0.0, 1.0)
+    three = [Body(n, Sphere(0.5), 1.0, (0.1,) * 3, (2.0 * k, 0, 0, 1.0, 0, 0, 0), (1.0,)) for k, n in enumerate("abc")]
+    three = [replace(body, twist=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)) for body in three]
+    smooth = (Pair("a", "b", 0.0, 0.5), Pair("b", "c", 0.0, 0.0), Pair("a", "c", 0.0, 0.0))
+    scene = Scene("three", 1, 3, tuple(three), smooth, (0.0, 0.0, 0.0), 9.0)
+    assert frictions(scene) == [0.5, 0.5, 0.0]
+    odd = replace(scene, pairs=(Pair("a", "b", 0.0, 0.9), Pair("b", "c", 0.0, 0.9), Pair("a", "c", 0.0, 0.1)))
+    assert "harmonic" in ENGINE.refuses(odd, "default")
+
+
+def test_what_has_no_place_here_is_refused_in_one_line():
+    bouncing = replace(resting(), pairs=(Pair(restitution=0.5),))
+    assert ENGINE.refuses(bouncing, "default").startswith("pairs: ")
+    moved = replace(resting(), bodies=(FLOOR, replace(BOX, motion="prescribed")))
+    assert ENGINE.refuses(moved, "default").startswith("box.motion: ")
+    with pytest.raises(EngineError, match=r"^pairs: "):
+        ENGINE.build(bouncing, DT, settings(resting()))
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [({"approximation": "lemke"}, "approximation"), ({"modulus": 0.0}, "modulus"), ({"boxes": "mesh"}, "boxes"),
+     ({"stiction_tolerance": math.nan}, "stiction_tolerance"), ({"iterations": 5}, "iterations")],
+)  # fmt: skip
+def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+        ENGINE.build(resting(), DT, settings(resting(), **changes))
+    assert "\n" not in str(caught.value)

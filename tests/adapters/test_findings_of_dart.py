@@ -1,0 +1,147 @@
+"""Reasons of DART: laws of blows that are shared or rub, and second choices, against the engine."""
+
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("dartpy", reason="DART is set apart: pip install 'contact-crosscheck[dart]'")
+
+from adapters.dart import DartEngine
+from adapters.dart.balls import balls_law
+from adapters.dart.laws import DEVIATIONS
+from adapters.dart.profiles import CONES, MOST_BOXES, SWEEPERS, checked
+from adapters.dart.rubbing import rubbing_law
+from adapters.engine import EngineError
+from adapters.needs import needs
+from adapters.stepping import run
+from validation.catalogue import CATALOGUE
+from validation.findings.files import findings_of
+
+ENGINE = DartEngine()
+DT = 1.0 / 240.0
+
+
+def settings(scene, profile, **changes):
+    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
+
+
+def measured(name, profile, dimension=2, params=None, **changes):
+    scene = CATALOGUE[name].scene(dimension, params or {})
+    found = run(ENGINE, scene, DT, settings(scene, profile, **changes), CATALOGUE[name].sampling(scene))
+    return {metric: value for metric, (value, _) in CATALOGUE[name].measure(scene, found).items()}
+
+
+def told(name, profile, metric, dimension=2, params=None):
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(dimension, params or {})
+    laws = [d for d in DEVIATIONS if d.covers("dart", "6.20.0", profile, name, metric)]
+    said = [each for each in (d.law(scene, DT, canonical.measure) for d in laws) if each is not None]
+    assert len(said) == 1, (name, profile, metric)
+    return said[0]
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize(
+    ("name", "params"), [("rod_gas", {}), ("rod_gas", {"n": 3.0}), ("rack", {}), ("rack", {"apart": 0.01})], ids=str
+)
+def test_balls_that_meet_lose_what_compliance_takes_of_every_blow(name, params, profile):
+    found, metrics = measured(name, profile, params=params), ("energy_defect", "wrong_speed", "penetration")
+    seen = {metric: (found[metric], *told(name, profile, metric, 2, params)) for metric in metrics if metric in found}
+    assert len(seen) == 2
+    for metric, (value, said, band) in seen.items():
+        assert abs(value - said) <= band < 1e-7, metric
+        assert value * 1e-3 > band and (abs(value * 1.001 - said) > band), metric
+
+
+def test_balls_that_rub_spin_or_fall_have_no_law_of_meeting():
+    canonical = CATALOGUE["rack"]
+    scene = canonical.scene(2, {"rows": 2.0})
+    law = balls_law("energy_defect")
+    assert law(scene, DT, canonical.measure) is not None
+    assert law(replace(scene, gravity=(0.0, -1.0)), DT, canonical.measure) is None
+    assert law(replace(scene, pairs=(replace(scene.pairs[0], friction=0.1),)), DT, canonical.measure) is None
+    cue, *others = scene.bodies
+    turning = replace(cue, twist=(*cue.twist[:2], 1.0))
+    assert law(replace(scene, bodies=(turning, *others)), DT, canonical.measure) is None
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}, {"along": -0.3, "mu": 0.2}], ids=str)
+def test_a_sliding_edge_rubs_at_the_middle_of_its_overlap_as_its_law_says(profile, params):
+    """Far from the textbook's answer, and for pivoting and for splitting a hundred times nearer than that is."""
+    found = measured("kane", profile, params=params)
+    truth = CATALOGUE["kane"].exact(CATALOGUE["kane"].scene(2, params))
+    for metric in ("rise", "ahead", "spin", "gain"):
+        said, band = told("kane", profile, metric, 2, params)
+        assert abs(found[metric] - said) <= band < 1e-4, metric
+        assert profile in SWEEPERS or abs(said - truth[metric]) > 50.0 * band, metric
+
+
+def test_friction_of_pivoting_is_limited_by_the_load_without_friction_and_of_all_others_by_the_load():
+    params = {"along": -0.3, "mu": 0.2}
+    scene, measure = CATALOGUE["kane"].scene(2, params), CATALOGUE["kane"].measure
+    once, followed = (rubbing_law("rise", profile)(scene, DT, measure) for profile in ("default", "fbf"))
+    assert abs(once[0] - followed[0]) > 0.02
+    assert abs(measured("kane", "default", params=params)["rise"] - once[0]) <= once[1]
+    assert abs(measured("kane", "fbf", params=params)["rise"] - followed[0]) <= followed[1]
+
+
+def test_a_box_that_turns_or_falls_has_no_law_of_rubbing():
+    scene, measure = CATALOGUE["kane"].scene(2, {}), CATALOGUE["kane"].measure
+    floor, rod = scene.bodies
+    law = rubbing_law("rise", "default")
+    assert law(scene, DT, measure) is not None
+    assert law(replace(scene, gravity=(0.0, -1.0)), DT, measure) is None
+    assert law(replace(scene, bodies=(floor, replace(rod, twist=(*rod.twist[:2], 1.0)))), DT, measure) is None
+    assert law(replace(scene, pairs=(replace(scene.pairs[0], restitution=0.0),)), DT, measure) is None
+
+
+@pytest.mark.parametrize("profile", SWEEPERS)
+@pytest.mark.parametrize("params", [{}, {"e": 1.0}, {"aspect": 4.0, "e": 0.8}], ids=str)
+def test_corners_of_a_flat_box_give_way_between_not_at_all_and_twice_as_much(profile, params):
+    found = measured("flat_box", profile, 3, params)
+    for metric in ("rebound_ratio", "impulse"):
+        said, band = told("flat_box", profile, metric, 3, params)
+        assert abs(found[metric] - said) <= band < 1e-4, metric
+
+
+def test_sweeps_that_are_asked_for_are_the_sweeps_that_answer():
+    """As shipped the second choice's 30 sweeps answered for 200 and for 2000 alike: bit for bit."""
+    params = {"ratio": 100.0}
+    few, many = (measured("heavy_on_light", "pgs", 2, params, iterations=count)["penetration"] for count in (30, 2000))
+    assert few > 0.1 and many < 2e-4
+
+
+def test_a_second_choice_that_sweeps_to_the_end_finds_what_pivoting_does_not():
+    params = {"n": 3.0, "apart": 0.0}
+    shipped = measured("cradle", "default", 2, params)["energy_defect"]
+    ended = measured("cradle", "default", 2, params, second_sweeps=5000, second_tolerance=1e-12)["energy_defect"]
+    said, band = told("cradle", "pgs", "energy_defect", 2, params)
+    assert abs(ended - said) <= band < 1e-8 and shipped > 4.0 * ended
+
+
+@pytest.mark.parametrize("profile", CONES)
+def test_piles_are_refused_by_solvers_that_take_minutes_for_them(profile):
+    for count, refused in ((float(MOST_BOXES), False), (MOST_BOXES + 1.0, True)):
+        scene = CATALOGUE["stack"].scene(3, {"n": count})
+        said = ENGINE.refuses(scene, profile)
+        assert (said is not None) is refused and (said is None or said.startswith("bodies: 2 boxes"))
+        assert ENGINE.refuses(scene, "default") is None
+
+
+def test_a_solver_that_is_asked_for_alone_brings_its_sweeps_and_leaves_those_of_a_second_choice():
+    shipped = {"solver": "dantzig", "detector": "fcl", "second_sweeps": 30, "second_tolerance": 1e-3}
+    assert set(checked({**shipped, "solver": "pgs"})) == {"solver", "detector", "iterations", "tolerance"}
+    assert checked({**shipped, "solver": "fbf"})["second_sweeps"] == 30
+    with pytest.raises(EngineError, match=r"^second_sweeps"):
+        checked({**shipped, "second_sweeps": 0})
+
+
+def test_every_family_has_an_experiment_that_is_about_its_rows():
+    from adapters.dart.experiments import EXPERIMENTS
+
+    families = findings_of("dart").families
+    assert {each.family for each in EXPERIMENTS} == set(families)
+    for each in EXPERIMENTS:
+        family = families[each.family]
+        assert each.scene == family.scene and each.profile in family.profiles and each.metric in family.metrics
