@@ -150,6 +150,14 @@ def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
 BASE = {"speed": (2.0, ""), "count": (0.0, ""), "absent": (None, "why")}
 
 
+def test_digits_that_places_have_lost_far_away_are_not_asked_of_an_answer():
+    change = {"speed": (2.0 + 1e-11, ""), "count": (0.0, "")}
+    floors = dict.fromkeys(BASE, 0.0)
+    assert not judged("moved", BASE, change, floors).holds
+    assert judged("moved", BASE, change, floors, coarser=1024.0).holds
+    assert not judged("moved", BASE, {"speed": (2.0 + 1e-10, ""), "count": (0.0, "")}, floors, coarser=1024.0).holds
+
+
 def test_an_answer_is_json_whatever_numbers_a_measure_gives():
     base = {"load": (np.float64(2.0), "")}
     found = judged("mirrored", base, {"load": (np.float64(2.0), "")}, {"load": 0.0}, {"load": np.float64(1.0)})

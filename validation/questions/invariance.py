@@ -410,7 +410,8 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
                 base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
             )
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
-        found.append(judged(relation.name, base, answer, floors[unit], tolerances))
+        coarser = unit / unit_of(scene, 0.0)
+        found.append(judged(relation.name, base, answer, floors[unit], tolerances, coarser))
     return found
 
 
@@ -431,8 +432,13 @@ def judged(
     answer: Metrics | str,
     floors: Mapping[str, float],
     tolerances: Mapping[str, float] = MappingProxyType({}),
+    coarser: float = 1.0,
 ) -> Change:
-    """The metric that changed most for what it may; ``tolerances`` are those of its check, where there is one."""
+    """The metric that changed most for what it may.
+
+    ``tolerances`` are those of its check, where there is one; ``coarser``, how much coarser places are rounded by the
+    map: an arm is a difference of places, and has fewer digits where they are large, which no moved start shows.
+    """
     if isinstance(answer, str):
         return Change(relation, refused=answer, lost=True)
     worst = Change(relation)
@@ -440,7 +446,7 @@ def judged(
         other = answer.get(name, (None, ""))[0]
         if value is None:
             continue
-        allowed = FACTOR * floors[name] + LAST_DIGITS * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
+        allowed = FACTOR * floors[name] + LAST_DIGITS * coarser * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
         change = math.inf if other is None else abs(other - value)
         if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
             # Plain numbers: a metric, or the bound of a check, may be one of numpy's, and no comparison of it is JSON.
