@@ -146,3 +146,33 @@ def kept_law(metric: str) -> Law:
         return 0.0, ROUNDINGS * UNIT * 3.0 * len(scene.bodies)
 
     return law
+
+
+def booked_law(metric: str) -> Law:
+    """What two free bodies keep between them where one of them spins: one loses what the other receives.
+
+    For metrics that are 0 in exact numbers and grow with what is lost: each coordinate of a velocity is off by the
+    roundings of a single number of the size of the fastest, as the scene's own measure tells it.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        free = len(scene.bodies) == 2 and all(body.motion == "free" for body in scene.bodies)
+        loads = any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies)
+        spins = any(any(body.twist[scene.dimension :]) for body in scene.bodies)  # else `rounded_law` knows more
+        if not free or not spins or loads or any(friction > 0.0 for _, friction in scene.materials()):
+            return None
+        d, pose = scene.dimension, np.array([body.pose for body in scene.bodies])
+        twist = np.array([body.twist for body in scene.bodies])
+        fastest = float(np.linalg.norm(twist[:, :d], axis=1).max())
+        times, band = np.array([0.0, step_count(scene.duration, dt) * dt]), 0.0
+        for body, axis in np.ndindex(2, d):
+            end = twist.copy()
+            end[body, axis] += ROUNDINGS * UNIT * fastest
+            found = Trajectory(times, np.array([pose, pose]), np.array([twist, end]), None, dt, "completed")
+            value = measure(scene, found)[metric][0]
+            if value is None:
+                return None
+            band += abs(value)
+        return 0.0, band
+
+    return law

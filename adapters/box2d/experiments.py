@@ -156,6 +156,34 @@ EXPERIMENTS += (
     ),
     *(
         Experiment(
+            "off-centre-skin",
+            "without a skin the blow is found within a step; more sweeps or none swept do not help",
+            "default",
+            "off_centre",
+            metric,
+            _BARE,
+            {"whirl": -2.0},
+            idle=({"iterations": 1000}, {"continuous": False}),
+            dt=1.0 / 960.0,
+        )
+        for metric in ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost", "sideways")
+    ),
+    *(
+        Experiment(
+            "starved-load-few-sweeps",
+            "a hundred sweeps hand all of the press on; without a skin, or with more for positions, eight do not",
+            "default",
+            "starved",
+            "load_error",
+            {"iterations": 100},
+            {"n": 30.0},
+            idle=(_BARE, {"position_iterations": 30}),
+            dt=dt,
+        )
+        for dt in (1.0 / 60.0, 1.0 / 240.0)
+    ),
+    *(
+        Experiment(
             "bounce-gravity-in-rebound",
             "with restitution of the velocity before gravity, no sweeping and a finer unit it passes; without the "
             "first it does not",

@@ -178,7 +178,33 @@ EXPERIMENTS += (
             metric,
             _STIFF,
             idle=(_MORE_STEPS, {"units_per_metre": 64.0}),
+            dt=dt,
         )
-        for metric in ("displacement", "penetration")
+        for metric, dt in (("displacement", None), ("penetration", None), ("kinetic_energy", 1.0 / 960.0))
+    ),
+    *(
+        Experiment(
+            "off-centre-seen-ahead",
+            "at a finer unit, where 2 cm are .3 mm, the blow is found within a step; stiffer contacts do not help",
+            "default",
+            "off_centre",
+            metric,
+            {"units_per_metre": 64.0},
+            {"whirl": -2.0},
+            idle=({"hertz": 480.0}, {"continuous": False}),
+            dt=1.0 / 480.0,
+        )
+        for metric in ("ball_speed", "bar_speed", "spin", "energy_lost", "sideways")
+    ),
+    Experiment(
+        "starved-few-small-steps",
+        "with 64 small steps no ball overlaps; a finer unit or a faster push do not help, one small step is worse",
+        "tuned",
+        "starved",
+        "penetration",
+        {"substeps": 64},
+        {"n": 30.0},
+        idle=({"units_per_metre": 64.0}, {"push_speed": 30.0}, {"substeps": 1}),
+        dt=1.0 / 960.0,
     ),
 )

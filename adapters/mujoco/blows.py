@@ -24,6 +24,27 @@ from adapters.stepping import step_count
 
 
 @dataclass(frozen=True)
+class Turning:
+    """A bar that spins under a ball: its spin [rad/s], where the ball is over its centre [m], how fast it comes [m/s].
+
+    ``moment`` [kg m^2] is the bar's, ``lightness`` [1/kg] the sum of both inverse masses.
+    """
+
+    spin: float
+    arm: float
+    height: float
+    coming: float
+    moment: float
+    lightness: float
+
+    def found(self, late: float) -> tuple[float, float]:
+        """Closing speed along the bar's normal [m/s] and inverse mass there [1/kg], ``late`` [s] after they touch."""
+        c, s = math.cos(self.spin * late), math.sin(self.spin * late)
+        lever = self.arm * c + (self.height - self.coming * late) * s
+        return self.coming * c + self.spin * lever, self.lightness + lever * lever / self.moment
+
+
+@dataclass(frozen=True)
 class Blow:
     """What a blow is, read off a scene.
 
@@ -35,6 +56,8 @@ class Blow:
         A and D of the module's text [1/kg].
     contacts
         How many contacts share it.
+    turning
+        What is struck turns meanwhile; None if it does not.
     """
 
     gap: float
@@ -42,6 +65,20 @@ class Blow:
     inverse_mass: float
     estimate: float
     contacts: int
+    turning: Turning | None = None
+
+    def as_found(self, dt: float) -> Blow:
+        """The blow at the first step that begins in it: what turns has another arm and normal there."""
+        if self.turning is None:
+            return self
+        reached = self.gap / self.closing / dt
+        struck, inverse_mass = self.turning.found((math.ceil(reached) - reached) * dt)
+        return replace(self, gap=self.gap / self.closing * struck, closing=struck, inverse_mass=inverse_mass)
+
+    @property
+    def energy(self) -> float:
+        """Energy of the closing speed, u^2/2A [J]: all that a blow can take."""
+        return 0.5 * self.closing**2 / self.inverse_mass
 
     def after(self, law: ContactLaw, steps: int, moved: float = 0.0) -> float:
         """Speed with which the bodies part [m/s], for a gap that is ``moved`` [m] larger."""
@@ -72,7 +109,11 @@ def blow_of(scene: Scene) -> Blow | None:
     if isinstance(second.shape, Disc | Sphere) and isinstance(first.shape, Box):
         gap = second.pose[d - 1] - first.pose[d - 1] - first.shape.half_extents[-1] - second.shape.radius
         arm = second.pose[0] - first.pose[0]
-        return Blow(gap, first.twist[d - 1] - second.twist[d - 1], both + arm * arm / _moment(first), both, 1)
+        coming, spin = first.twist[d - 1] - second.twist[d - 1], first.twist[2] if d == 2 else -first.twist[4]
+        height = first.shape.half_extents[-1] + second.shape.radius
+        bar = Turning(spin, arm, height, coming, _moment(first), both)
+        struck, inverse_mass = bar.found(0.0)
+        return Blow(gap / coming * struck, struck, inverse_mass, both, 1, bar if spin else None)
     return None
 
 
@@ -105,7 +146,9 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
             "energy_lost": 1.0 - (after / blow.closing) ** 2,
         },
     }
-    return made[scene.name]() if scene.name in made else {}
+    found = made[scene.name]() if scene.name in made else {}
+    # Where a body turns, all but the share that is lost depends on when within a step the two are found.
+    return {"energy_lost": found["energy_lost"]} if blow.turning and found else found
 
 
 def _moment(body: Body) -> float:

@@ -99,6 +99,17 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             _REFLECT,
             idle=({"tolerance": 0.0},),
         ),
+        Experiment(
+            "off-centre-soft-contact",
+            "with the velocity reflected a spinning bar is struck within a step; solving further does nothing",
+            "default",
+            "off_centre",
+            "sideways",
+            _REFLECT,
+            {"whirl": -2.0},
+            idle=({"tolerance": 0.0},),
+            dt=1.0 / 480.0,
+        ),
         *(
             Experiment(
                 family,

@@ -266,11 +266,14 @@ def blow_law(profile: str, metric: str) -> Law:
     """A blow between two bodies: how fast they part fixes the impulse, and that everything."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        blow = blow_of(scene)
-        if blow is None:
+        touch = blow_of(scene)
+        if touch is None:
             return None
+        blow = touch.as_found(dt)
         contact, steps = law_of(profile, scene, dt), steps_of(scene, dt)
         runs = [metrics_of(scene, blow, blow.after(contact, steps, k * GAP_ROUND_OFF)) for k in (0.0, *PERTURBATIONS)]
+        if metric not in runs[0]:
+            return None
         value, *others = (run[metric] for run in runs)
         scale = 1.0 / blow.inverse_mass * blow.closing if metric == "impulse" else max(1.0, blow.closing)
         band = SPREAD_FACTOR * max(abs(other - value) for other in others) + SUM_ROUND_OFF * scale
@@ -278,6 +281,8 @@ def blow_law(profile: str, metric: str) -> Law:
         band += solver_error(profile, scene, dt) * (scale if metric == "impulse" else 1.0)
         if metric == "impulse":
             band += _force_round_off(contact) * scale
-        return value, band
+        # What is lost is told as a share of what a blow has that is found when the bodies touch.
+        found = blow.energy / touch.energy if metric == "energy_lost" else 1.0
+        return value * found, band * found
 
     return law

@@ -118,6 +118,22 @@ EXPERIMENTS += (
         ("pgs", 3, "spin", {}),
         within=_SPINS,
     ),
+    *_each(
+        "off-centre-spins-damped",
+        "where spins are kept the spinning bar passes; one step does not help",
+        _KEPT,
+        (_WHOLE,),
+        *(("default", 2, metric, {"whirl": -2.0}) for metric in ("spin", "energy_lost", "angular_defect")),
+        ("pgs", 3, "angular_defect", {"whirl": -2.0}),
+    ),
+    *_each(
+        "off-centre-gap-in-rebound",
+        "seen when they touch, and spins kept, it passes; kept spins or more sweeps alone do not help",
+        {**_UNSEEN, **_KEPT},
+        (_KEPT, _SWEPT),
+        *(("pgs", 2, metric, {"whirl": -2.0}) for metric in ("ball_speed", "bar_speed", "impulse")),
+        dt=1.0 / 480.0,
+    ),
     # ---- slow approaches do not rebound
     *_each(
         "bounce-no-slow-rebound",
@@ -405,6 +421,14 @@ EXPERIMENTS += (
         ("tuned", 3, "spin", {}),
         ("tuned", 2, "energy_lost", {"e": 1.0, "offset": 0.3}),
         within=_SPINS,
+    ),
+    *_each(
+        "off-centre-small-steps",
+        "in one step what the bar and the ball have of angular momentum is kept; other manifolds do not help",
+        _WHOLE,
+        (_ANEW,),
+        ("tuned", 2, "angular_defect", {"whirl": -2.0}),
+        dt=1.0 / 960.0,
     ),
     *_each(
         "overhang-small-steps",

@@ -236,6 +236,46 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ("default", 2, "displacement", {}),
         ("default", 2, "penetration", {}),
     ),
+    *(
+        Experiment(
+            "off-centre-seen-ahead",
+            "seen when they touch the blow is found within a step; small steps or contacts found anew do not help",
+            "default",
+            "off_centre",
+            metric,
+            _UNSEEN,
+            {"whirl": -2.0},
+            idle=(_MORE_STEPS, {"recycling": False}),
+            dt=1.0 / 480.0,
+        )
+        for metric in ("ball_speed", "bar_speed", "impulse", "sideways")
+    ),
+    Experiment(
+        "off-centre-seen-ahead",
+        "seen when they touch, and in one small step, angular momentum is kept; neither alone does it",
+        "default",
+        "off_centre",
+        "angular_defect",
+        {**_UNSEEN, **_ONE_STEP},
+        {"whirl": -2.0},
+        3,
+        idle=(_UNSEEN, _ONE_STEP),
+        dt=1.0 / 960.0,
+    ),
+    *(
+        Experiment(
+            "starved-soft-contact",
+            "stiff and damped 200 times as much the row rests; stiff alone, or with more small steps or sweeps, not",
+            "default",
+            "starved",
+            "kinetic_energy",
+            {**_STIFF, "damping_ratio": 2000.0},
+            params,
+            idle=(_STIFF, _MORE_STEPS, {"iterations": 30}),
+            dt=1.0 / 480.0,
+        )
+        for params in ({}, {"n": 30.0})
+    ),
     *_each(
         "starved-singles-in-stiff-contact",
         "damped 200 times as much the row rests; more small steps do not help",

@@ -83,5 +83,20 @@ def test_the_law_of_a_belt_is_measured_in_the_room():
     assert seen[0].twist[-1, 1, :3] == pytest.approx(run, abs=1e-3)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("whirl", [-4.0, -2.0, 2.0])
+@pytest.mark.parametrize("delay", [0.0511, 0.0518, 0.0525])
+def test_what_a_blow_takes_of_a_spinning_bar_s_energy_is_told_by_the_step_that_finds_it(delay, whirl, dimension):
+    canonical, dt = CATALOGUE["off_centre"], 1 / 960
+    params = {"whirl": whirl, "delay": delay}
+    scene = canonical.scene(dimension, params)
+    (law,) = covering("mujoco", "4.0.1", "tuned", "off_centre", "energy_lost")
+    found = execute(Slot("off_centre", params, dimension, "mujoco", "tuned", dt)).metrics["energy_lost"][0]
+    value, band = law.law(scene, dt, canonical.measure)
+    assert abs(found - value) <= band < 0.1 * abs(found - canonical.exact(scene)["energy_lost"])
+    (spin,) = covering("mujoco", "4.0.1", "tuned", "off_centre", "spin")
+    assert spin.law(scene, dt, canonical.measure) is None
+
+
 def test_a_bar_that_turns_under_a_soft_contact_is_not_predicted():
     assert not list(covering("mujoco", "4.0.1", "default", "off_centre", "spin"))

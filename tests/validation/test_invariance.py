@@ -1,5 +1,6 @@
 """What must not matter: maps that come back as they went, and engines of which each kind of dependence is seen."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -11,7 +12,17 @@ from adapters.scene import Body, Box, HalfSpace, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.questions.invariance import RELATIONS, Change, compare, floor, judged, measured, size_of, unit_of
+from validation.questions.invariance import (
+    RELATIONS,
+    Change,
+    _nudged,
+    compare,
+    floor,
+    judged,
+    measured,
+    size_of,
+    unit_of,
+)
 
 BY_NAME = {relation.name: relation for relation in RELATIONS}
 LINES = [(name, d) for name, scene in CATALOGUE.items() for d in scene.dimensions]
@@ -139,6 +150,20 @@ def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
 BASE = {"speed": (2.0, ""), "count": (0.0, ""), "absent": (None, "why")}
 
 
+def test_digits_that_places_have_lost_far_away_are_not_asked_of_an_answer():
+    change = {"speed": (2.0 + 1e-11, ""), "count": (0.0, "")}
+    floors = dict.fromkeys(BASE, 0.0)
+    assert not judged("moved", BASE, change, floors).holds
+    assert judged("moved", BASE, change, floors, coarser=1024.0).holds
+    assert not judged("moved", BASE, {"speed": (2.0 + 1e-10, ""), "count": (0.0, "")}, floors, coarser=1024.0).holds
+
+
+def test_an_answer_is_json_whatever_numbers_a_measure_gives():
+    base = {"load": (np.float64(2.0), "")}
+    found = judged("mirrored", base, {"load": (np.float64(2.0), "")}, {"load": 0.0}, {"load": np.float64(1.0)})
+    assert json.dumps([found.holds, found.change, found.allowed]) == "[true, 0.0, 0.0010000000000284217]"
+
+
 def test_a_change_is_judged_by_what_moved_starts_change():
     floors = floor(BASE, [{"speed": (2.0 + 1e-9, ""), "count": (0.0, "")}, {"speed": (2.0, ""), "count": (0.0, "")}])
     assert floors == {"speed": pytest.approx(1e-9), "count": 0.0, "absent": 0.0}
@@ -169,6 +194,16 @@ def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
     scene = CATALOGUE["bounce"].scene(2)
     posed = BY_NAME["moved"].pose(scene)
     assert unit_of(scene, posed.shift) == np.spacing(posed.shift) > 100.0 * unit_of(scene, 0.0)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_moved_start_changes_what_lies_between_bodies_along_every_axis(dimension):
+    """Raised together they would be as far apart as before: scenes along the floor would have no floor."""
+    scene = CATALOGUE["cradle"].scene(dimension, {})
+    moved = _nudged(scene, 1e-3)
+    places, others = (np.array([b.pose[:dimension] for b in s.bodies if b.motion == "free"]) for s in (scene, moved))
+    assert np.abs(np.diff(others - places, axis=0)) == pytest.approx(2e-3)
+    assert _nudged(scene, 0.0) is scene
 
 
 def test_a_dependence_on_order_and_on_the_side_is_found(monkeypatch):

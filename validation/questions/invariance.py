@@ -341,7 +341,7 @@ def _mapped(
 def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
     """Metrics of a cell posed as ``relation`` says, or why there are none; runs in this process.
 
-    ``moves`` [m] is added to the height of every free body.
+    ``moves`` [m] is how far each free body is moved along all axes, one up and the next down.
     """
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
@@ -356,7 +356,7 @@ def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
             return refusal
         # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
-        found = run(engine, _raised(posed.scene, moves), slot.dt, settings, canonical.sampling(scene))
+        found = run(engine, _nudged(posed.scene, moves), slot.dt, settings, canonical.sampling(scene))
         if found.finish == "diverged":
             return found.reason
         return dict(canonical.measure(scene, posed.back(found)))
@@ -364,17 +364,17 @@ def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
         return said_by(error)
 
 
-def _raised(scene: Scene, by: float) -> Scene:
-    up = scene.dimension - 1
-
-    def pose(values: tuple[float, ...]) -> tuple[float, ...]:
-        return (*values[:up], values[up] + by, *values[up + 1 :])
-
+def _nudged(scene: Scene, by: float) -> Scene:
+    """Every free body moved along all axes, each against the one before: what lies between any two is changed."""
     if by == 0.0:
         return scene
-    return replace(
-        scene, bodies=tuple(replace(b, pose=pose(b.pose)) if b.motion == "free" else b for b in scene.bodies)
-    )
+    bodies, sign = [], 1.0
+    for body in scene.bodies:
+        if body.motion == "free":
+            place = tuple(x + sign * by for x in body.pose[: scene.dimension])
+            body, sign = replace(body, pose=(*place, *body.pose[scene.dimension :])), -sign
+        bodies.append(body)
+    return replace(scene, bodies=tuple(bodies))
 
 
 def unit_of(scene: Scene, shift: float) -> float:
@@ -410,7 +410,8 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
                 base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
             )
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
-        found.append(judged(relation.name, base, answer, floors[unit], tolerances))
+        coarser = unit / unit_of(scene, 0.0)
+        found.append(judged(relation.name, base, answer, floors[unit], tolerances, coarser))
     return found
 
 
@@ -431,8 +432,13 @@ def judged(
     answer: Metrics | str,
     floors: Mapping[str, float],
     tolerances: Mapping[str, float] = MappingProxyType({}),
+    coarser: float = 1.0,
 ) -> Change:
-    """The metric that changed most for what it may; ``tolerances`` are those of its check, where there is one."""
+    """The metric that changed most for what it may.
+
+    ``tolerances`` are those of its check, where there is one; ``coarser``, how much coarser places are rounded by the
+    map: an arm is a difference of places, and has fewer digits where they are large, which no moved start shows.
+    """
     if isinstance(answer, str):
         return Change(relation, refused=answer, lost=True)
     worst = Change(relation)
@@ -440,10 +446,11 @@ def judged(
         other = answer.get(name, (None, ""))[0]
         if value is None:
             continue
-        allowed = FACTOR * floors[name] + LAST_DIGITS * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
+        allowed = FACTOR * floors[name] + LAST_DIGITS * coarser * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
         change = math.inf if other is None else abs(other - value)
         if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
-            worst = Change(relation, name, change, allowed)
+            # Plain numbers: a metric, or the bound of a check, may be one of numpy's, and no comparison of it is JSON.
+            worst = Change(relation, name, float(change), float(allowed))
     return worst
 
 

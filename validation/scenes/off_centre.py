@@ -10,18 +10,23 @@
 The face is smooth, so that nothing acts along it, and the bar may move towards the ball. With d = 0 the law of two
 balls is left; far out the bar gives way, as if it were lighter.
 
+A bar that spins already with w gives way at d, or comes to meet the ball: they close with u = v - V - d w in place of
+v - V, and the spin is w + d J/I. The bar is level when it is struck.
+
 A bar that turns with w comes back at the ball: seen along its normal the ball, H above the bar's centre, closes with
-H w^2 and is met again after 2 e (v - V)/(H w^2). A scene in which that is within its time has another answer, and is
-refused; with e = 0 they do not part at all.
+H w^2 and is met again after some 2 e u/(H w^2). A scene in which that is within its time has another answer, and is
+refused, as is one in which a spinning bar would have met the ball before; with e = 0 they do not part at all.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adapters.engine import Array
 from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
@@ -37,6 +42,7 @@ from validation.scenes.parts import (
     mass_of,
     phases,
     states_and_impulses,
+    tilted,
 )
 
 RADIUS, WIDTH, HEIGHT = 0.25, 2.0, 0.5
@@ -50,22 +56,56 @@ def _moment(params: Params) -> float:
     return params["ratio"] * params["mass"] * (WIDTH**2 + HEIGHT**2) / 12.0
 
 
-def _met_again(params: Params) -> float:
-    """Time after the blow at which the turning bar meets the ball again [s]; infinite if it does not turn.
+@dataclass(frozen=True)
+class Blow:
+    """What a blow leaves: velocities up and sideways [m/s], spin of the bar [rad/s], impulse [N s]."""
 
-    Both move freely: along the bar's normal they are ``d sin(w t) + (H + u t) cos(w t)`` apart, with
-    ``u + d w = e (v - V)``; this is its root to second order in t.
+    ball_speed: float
+    bar_speed: float
+    spin: float
+    impulse: float
+    sideways: float
+    #: Energy of the closing speed at the point that is struck, k u^2/2 [J].
+    available: float
+
+
+def _blow(p: Params, late: float = 0.0) -> Blow:
+    """The blow ``late`` seconds after the bar is level and the two touch: bar turned by w t, ball gone on by (v - V) t.
+
+    Seen from the bar's centre the ball is at (-d, H - (v - V) t), the bar's normal is (-sin(w t), cos(w t)).
     """
-    p = params
-    spin = p["offset"] / _moment(p) * (1.0 + p["e"]) * (p["v"] + p["rise"]) * _reduced(p)
-    if spin == 0.0:
-        return math.inf
-    return 2.0 * p["e"] * (p["v"] + p["rise"]) / ((0.5 * HEIGHT + RADIUS) * spin * spin)
+    m, big, moment, closing = p["mass"], p["ratio"] * p["mass"], _moment(p), p["v"] + p["rise"]
+    c, s = math.cos(p["whirl"] * late), math.sin(p["whirl"] * late)
+    lever = -p["offset"] * c + (0.5 * HEIGHT + RADIUS - closing * late) * s
+    reduced = 1.0 / (1.0 / m + 1.0 / big + lever**2 / moment)
+    struck = closing * c + p["whirl"] * lever
+    impulse = (1.0 + p["e"]) * reduced * struck
+    return Blow(
+        impulse * c / m - p["v"],
+        p["rise"] - impulse * c / big,
+        p["whirl"] - lever * impulse / moment,
+        impulse,
+        abs(s) * impulse / min(m, big),
+        0.5 * reduced * struck**2,
+    )
 
 
-def _reduced(p: Params) -> float:
-    """Mass that the blow feels [kg]."""
-    return 1.0 / (1.0 / p["mass"] + 1.0 / (p["ratio"] * p["mass"]) + p["offset"] ** 2 / _moment(p))
+def _struck(p: Params) -> float:
+    """Speed [m/s] with which the two close at the point that is struck."""
+    return p["v"] + p["rise"] - p["whirl"] * p["offset"]
+
+
+def _meets(p: Params, until: float, closing: float, spin: float) -> float | None:
+    """First time of 256 up to ``until`` [s] at which ball and bar overlap but for the blow at 0; None if they do not.
+
+    Both move freely from there: along the bar's normal they are ``d sin(w t) + (H - c t) cos(w t) - H`` apart, where c
+    is the speed with which their centres close in.
+    """
+    height = 0.5 * HEIGHT + RADIUS
+    t = until * np.arange(1, 257) / 256.0
+    gap = p["offset"] * np.sin(spin * t) + (height - closing * t) * np.cos(spin * t) - height
+    inside = t[gap < -bounds.ROUND_OFF]
+    return float(inside[0]) if inside.size else None
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -74,18 +114,30 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the bar turns back at the ball within the scene's time.
+        If the bar turns back at the ball within the scene's time, or away from it before they have met.
     """
-    p = params
-    if _met_again(p) < 1.5 * AFTERMATH:  # half as much again for the terms beyond the second order
-        again = f"{_met_again(p):.3g} s after the blow"
-        raise SceneError(f"off_centre.e: with {p['e']:g} the turning bar meets the ball again {again}")
-    bar = at(
+    p, struck = params, _struck(params)
+    if struck <= 0.0:
+        raise SceneError(f"off_centre.whirl: with {p['whirl']:g} rad/s the bar gives way faster than the ball comes")
+    before = _meets(p, -p["delay"], p["v"] + p["rise"], p["whirl"])
+    if before is not None:
+        raise SceneError(
+            f"off_centre.whirl: with {p['whirl']:g} rad/s the bar meets the ball {-before:.3g} s too early"
+        )
+    blow = _blow(p)
+    again = _meets(p, AFTERMATH, blow.bar_speed - blow.ball_speed, blow.spin)
+    if again is not None:
+        late = f"{again:.3g} s after the blow"
+        raise SceneError(f"off_centre.e: with {p['e']:g} the turning bar meets the ball again {late}")
+    bar = tilted(
         block("bar", dimension, p["ratio"] * p["mass"], WIDTH, HEIGHT),
         dimension,
-        along(dimension, 0.0, -0.5 * HEIGHT - p["rise"] * p["delay"]),
-        along(dimension, 0.0, p["rise"]),
+        (0.0, -0.5 * HEIGHT - p["rise"] * p["delay"]),
+        -p["whirl"] * p["delay"],
     )
+    # Counter-clockwise is about +z in the plane, about -y in space.
+    spin = (p["whirl"],) if dimension == 2 else (0.0, -p["whirl"], 0.0)
+    bar = replace(bar, twist=(*along(dimension, 0.0, p["rise"]), *spin))
     striker = at(
         ball("ball", dimension, p["mass"], RADIUS, 0.0),
         dimension,
@@ -99,64 +151,116 @@ def make(dimension: int, params: Params) -> Scene:
 def exact(scene: Scene) -> dict[str, float]:
     """Newton's law at the point that is struck, with the bar's own mass there."""
     p = scene.params
-    m, big, moment, d, e = p["mass"], p["ratio"] * p["mass"], _moment(p), p["offset"], p["e"]
-    impulse = (1.0 + e) * _reduced(p) * (p["v"] + p["rise"])
-    return {
-        "ball_speed": impulse / m - p["v"],
-        "bar_speed": p["rise"] - impulse / big,
-        "spin": impulse * d / moment,
-        "impulse": impulse,
-        "energy_lost": 1.0 - e * e,
+    blow = _blow(p)
+    truth = {
+        "ball_speed": blow.ball_speed,
+        "bar_speed": blow.bar_speed,
+        "spin": blow.spin,
+        "impulse": blow.impulse,
+        "energy_lost": 1.0 - p["e"] ** 2,
         "momentum_defect": 0.0,
     }
-
-
-def _energy(params: Params, ball_speed: float, bar_speed: float, spin: float) -> float:
-    m, big = params["mass"], params["ratio"] * params["mass"]
-    return 0.5 * (m * ball_speed**2 + big * bar_speed**2 + _moment(params) * spin**2)
+    return truth | {"angular_defect": 0.0, "sideways": 0.0} if p["whirl"] else truth
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Velocities at the end; energy in units of what the closing speed has at the point that is struck."""
+    """Velocities at the end; energy in units of what the closing speed has at the point that is struck.
+
+    Sideways nothing may move where the bar is level whenever it is struck; where it spins already the two together may
+    not, and angular momentum tells whether each was pushed at the same place.
+    """
     p, d = scene.params, scene.dimension
+    m, big = p["mass"], p["ratio"] * p["mass"]
     bar, striker = (float(v) for v in trajectory.twist[-1, :, d - 1])
-    # A blow down on the left turns the bar counter-clockwise: about +z in the plane, about -y in space.
-    spin = float(trajectory.twist[-1, 0, 2] if d == 2 else -trajectory.twist[-1, 0, 4])
+    spin = _turning(trajectory.twist[-1, 0], d)
     impulse = metrics.total_impulse(trajectory, 0, 1)
-    change = p["mass"] * (striker + p["v"]) + p["ratio"] * p["mass"] * (bar - p["rise"])
-    lost = _energy(p, p["v"], p["rise"], 0.0) - _energy(p, striker, bar, spin)
-    sideways = float(np.abs(trajectory.twist[-1, :, : d - 1]).max())
-    return {
+    change = m * (striker + p["v"]) + big * (bar - p["rise"])
+    start = np.array([body.twist for body in scene.bodies])
+    lost = _energy(scene, start) - _energy(scene, trajectory.twist[-1])
+    aside = trajectory.twist[-1, :, : d - 1]
+    sideways = float(np.abs(aside).max())
+    pushed = float(np.abs(big * aside[0] + m * aside[1]).max()) / m if p["whirl"] else sideways
+    measured: dict[str, Measured] = {
         "ball_speed": (striker, ""),
         "bar_speed": (bar, ""),
         "spin": (spin, ""),
         "impulse": (None, impulse[1]) if impulse[0] is None else (float(impulse[0][-1]), ""),
-        "energy_lost": (lost / _available(p), ""),
-        "momentum_defect": (math.hypot(change / (p["mass"] * (p["v"] + p["rise"])), sideways / p["v"]), ""),
+        "energy_lost": (lost / _blow(p).available, ""),
+        "momentum_defect": (math.hypot(change / (m * (p["v"] + p["rise"])), pushed / p["v"]), ""),
     }
+    if not p["whirl"]:
+        return measured
+    place = np.array([body.pose for body in scene.bodies])
+    gained = _angular(scene, trajectory.pose[-1], trajectory.twist[-1]) - _angular(scene, place, start)
+    return measured | {"angular_defect": (abs(gained) / _swing(p), ""), "sideways": (sideways, "")}
 
 
-def _available(p: Params) -> float:
-    """Energy of the closing speed at the point that is struck, k (v - V)^2/2 [J]."""
-    return 0.5 * _reduced(p) * (p["v"] + p["rise"]) ** 2
+def _turning(twist: Array, dimension: int) -> float:
+    """Spin of one body counter-clockwise [rad/s]: about +z in the plane, about -y in space."""
+    return float(twist[2] if dimension == 2 else -twist[4])
+
+
+def _energy(scene: Scene, twist: Array) -> float:
+    """Kinetic energy [J] of all, ``twist`` of (2, 3) or (2, 6), without what the ball's own spin has."""
+    p, d = scene.params, scene.dimension
+    moving = float(p["ratio"] * p["mass"] * (twist[0, :d] ** 2).sum() + p["mass"] * (twist[1, :d] ** 2).sum())
+    return 0.5 * (moving + _moment(p) * _turning(twist[0], d) ** 2)
+
+
+def _angular(scene: Scene, pose: Array, twist: Array) -> float:
+    """Angular momentum of all in the plane of motion [kg m^2/s], counter-clockwise about the foot of the ball's way.
+
+    ``pose`` and ``twist`` are those of bar and ball, rows of a record.
+    """
+    p, d = scene.params, scene.dimension
+    x, v = pose[:, [0, d - 1]], twist[:, [0, d - 1]]
+    x = x + np.array([p["offset"], 0.0])
+    orbit = np.array([p["ratio"] * p["mass"], p["mass"]]) @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
+    return float(orbit) + _moment(p) * _turning(twist[0], d)
+
+
+def _swing(p: Params) -> float:
+    """Angular momentum that there is [kg m^2/s]: the bar's own, and what the ball brings at its distance."""
+    return _moment(p) * abs(p["whirl"]) + p["mass"] * (p["v"] + p["rise"]) * p["offset"]
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The face is level and smooth until the blow: exact at every step, whenever within it the blow is found."""
-    p = scene.params
-    closing = p["v"] + p["rise"]
+    """The face is smooth, and level until the blow unless the bar spins: exact whenever within a step it is found."""
+    p, blow = scene.params, _blow(scene.params)
+    closing = p["v"] + p["rise"] + abs(p["whirl"]) * p["offset"]
     source = "Newton's law of restitution at the point that is struck; conservation of momentum and angular momentum"
+    # A difference of energies: round-off of all of them, in units of what there is to lose.
+    there = 0.5 * p["mass"] * (p["v"] ** 2 + p["ratio"] * p["rise"] ** 2) + 0.5 * _moment(p) * p["whirl"] ** 2
     scales = {
         "ball_speed": ("m/s", closing),
         "bar_speed": ("m/s", closing),
         "spin": ("rad/s", closing * max(1.0, p["offset"] * p["mass"] / _moment(p))),
         "impulse": ("N s", p["mass"] * closing),
-        # A difference of energies: round-off of all of them, in units of what there is to lose.
-        "energy_lost": ("1", _energy(p, p["v"], p["rise"], 0.0) / _available(p)),
+        "energy_lost": ("1", there / blow.available),
     }
-    found = bounds.exact_laws(scales, truth, source)
     defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
-    return [*found, defect]
+    if not p["whirl"]:
+        return [*bounds.exact_laws(scales, truth, source), defect]
+    because = "the blow is found up to a step late, or ahead by as much, when the bar is turned by w dt: the law there"
+    off = dict.fromkeys((*scales, "sideways"), 0.0)
+    for turned in (_blow(p, -dt), _blow(p, dt)):
+        taken = (1.0 - p["e"] ** 2) * turned.available / blow.available
+        told = {name: getattr(turned, name) for name in off if name != "energy_lost"} | {"energy_lost": taken}
+        off = {name: max(off[name], abs(told[name] - truth[name])) for name in off}
+    scales["sideways"] = ("m/s", closing)
+    found = [
+        bounds.Bound(off[name] + bounds.ROUND_OFF * scale, because).check(name, unit, truth[name], source)
+        for name, (unit, scale) in scales.items()
+    ]
+    # Two arms that are a step's way apart across the normal; what is added are momenta times places.
+    apart = blow.impulse * closing * dt * abs(math.sin(p["whirl"] * dt))
+    sizes = p["mass"] * closing * (WIDTH + closing * scene.duration)
+    swung = bounds.Bound(
+        (apart + bounds.ROUND_OFF * sizes) / _swing(p),
+        "what a step finds acts where they are within it: their way in a step, across a normal that turns by w dt",
+    )
+    turning = swung.check("angular_defect", "1", truth["angular_defect"], "conservation of angular momentum")
+    return [*found, defect, turning]
 
 
 def track(scene: Scene) -> Track:
@@ -184,7 +288,7 @@ SCENE = CanonicalScene(
     title="Ball strikes a free bar beside its centre",
     family="rebound",
     figure=__doc__ or "",
-    law="J = (1 + e) (v - V)/(1/m + 1/M + d^2/I),  spin' = d J/I",
+    law="J = (1 + e) (v - V - d w)/(1/m + 1/M + d^2/I),  spin' = w + d J/I",
     dimensions=(2, 3),
     parameters=(
         Parameter("offset", 0.6, "m", "distance of the blow from the centre of mass, at most 0.7 m", 0.0, 0.7),
@@ -192,6 +296,9 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
         Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
+        Parameter(
+            "whirl", 0.0, "rad/s", "spin of the bar before; above 0 it gives way where it is struck", -10.0, 10.0
+        ),
         delay(),
         mass_of("the ball", 0.5),
     ),
@@ -201,14 +308,17 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states_and_impulses,
     track=track,
-    quick=(Variation({}), Variation({"offset": 0.3, "e": 1.0})),
-    full=tuple(
-        Variation({"offset": d, "e": e, "ratio": r})
-        for d in (0.0, 0.3, 0.6)
-        for e in (0.5, 0.8, 1.0)
-        for r in (0.5, 2.0, 100.0)
+    quick=(Variation({}), Variation({"offset": 0.3, "e": 1.0}), Variation({"whirl": -2.0})),
+    full=(
+        *(
+            Variation({"offset": d, "e": e, "ratio": r})
+            for d in (0.0, 0.3, 0.6)
+            for e in (0.5, 0.8, 1.0)
+            for r in (0.5, 2.0, 100.0)
+        ),
+        Variation({"whirl": -2.0}),
     ),
-    planted=({},),
+    planted=({}, {"whirl": -2.0}),
     primary=Primary(
         "velocity error",
         "1",
@@ -223,5 +333,7 @@ SCENE = CanonicalScene(
         "bar_speed": "leaves the bar with {value}",
         "spin": "turns the bar with {value}",
         "energy_lost": "takes {value} of the energy that the blow has",
+        "angular_defect": "changes the angular momentum by {value} of it",
+        "sideways": "throws ball or bar aside with {value}",
     },
 )

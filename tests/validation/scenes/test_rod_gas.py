@@ -159,6 +159,49 @@ def test_lost_energy_other_masses_places_and_speeds_fail(size):
     assert failing(canonical, scene, off) == {"astray"}
 
 
+def rounded(scene, off, seed):
+    """Discs in the plane, not rods: every normal is turned by up to ``off``; how far off the line one gets [m]."""
+    draw = np.random.default_rng(seed)
+    x, v, _, length = bodies(scene)
+    r, n, now, farthest = rod_gas.RADIUS, len(x), 0.0, 0.0
+    x, v = np.stack([x, np.zeros(n)], axis=1), np.stack([v, np.zeros(n)], axis=1)
+    while now < scene.duration:
+        wait, met = scene.duration - now, ()
+        for k in range(n - 1):
+            apart, along = x[k + 1] - x[k], v[k + 1] - v[k]
+            a, b, c = along @ along, apart @ along, apart @ apart - 4.0 * r * r
+            if b < 0.0 and b * b > a * c and c / (-b + math.sqrt(b * b - a * c)) < wait:
+                wait, met = c / (-b + math.sqrt(b * b - a * c)), (k, k + 1)
+        for k, wall in ((0, r), (n - 1, length - r)):
+            if (v[k, 0] > 0.0) == (k > 0) and (wall - x[k, 0]) / v[k, 0] < wait:
+                wait, met = (wall - x[k, 0]) / v[k, 0], (k,)
+        x, now = x + v * wait, now + wait
+        farthest = max(farthest, float(np.abs(x[:, 1]).max()))
+        if not met:
+            break
+        normal = np.array([1.0, 0.0]) if len(met) == 1 else (x[met[1]] - x[met[0]]) / (2.0 * r)
+        turn = draw.choice((-off, off))
+        normal = np.array([normal[0] - turn * normal[1], normal[1] + turn * normal[0]])
+        if len(met) == 1:
+            v[met[0]] -= 2.0 * (v[met[0]] @ normal) * normal
+        else:
+            swapped = ((v[met[0]] - v[met[1]]) @ normal) * normal
+            v[met[0]] -= swapped
+            v[met[1]] += swapped
+    return farthest
+
+
+@pytest.mark.parametrize("params", [{}, {"room": 10.0, "duration": 7.5}, {"n": 10.0, "room": 20.0, "duration": 2.5}])
+def test_round_ends_spread_what_normals_are_rounded_by_and_no_farther_than_allowed(params, monkeypatch):
+    """With roundings a million times as coarse, so that nothing else is as large."""
+    _, scene = made(**params)
+    p = scene.params
+    monkeypatch.setattr(rod_gas, "NORMAL", 1e6 * rod_gas.NORMAL)
+    allowed = rod_gas.strayed(p, [m for m in rod_gas.meetings(p) if m.time < p["delay"] + p["duration"]])
+    found = [rounded(scene, rod_gas.NORMAL, seed) for seed in range(40)]
+    assert 0.1 * allowed < max(found) <= allowed * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize("missed", [1, 5, 13])
 def test_a_meeting_that_is_missed_fails_though_it_keeps_the_energy(missed):
     canonical, scene = made()
