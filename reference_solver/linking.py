@@ -12,6 +12,7 @@ numba has no public way to say so: this rests on its lowering pass and its code 
 from __future__ import annotations
 
 import copy
+import gc
 from typing import Any
 
 from numba.core.codegen import JITCodeLibrary
@@ -121,8 +122,23 @@ class Carried(CompilerBase):
         return [with_lowering(self.state, ModuleLowering)]
 
 
+#: Objects made between two searches for garbage while a kernel compiles: with Python's own 700 a fifth of the time went
+#: into searches through all that is being compiled (87 s of CPU for the planar located step, 69 s now, 67 s without
+#: any), for .66 GB of memory instead of .55.
+BETWEEN_COLLECTIONS = 1_000_000
+
+
 class Whole(CompilerBase):
     """Compiles kernels."""
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile, and all that is called, with few searches for garbage."""
+        thresholds = gc.get_threshold()
+        gc.set_threshold(max(thresholds[0], BETWEEN_COLLECTIONS) if thresholds[0] else 0, *thresholds[1:])
+        try:
+            return super().compile_extra(func)
+        finally:
+            gc.set_threshold(*thresholds)
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes, the lowering apart."""

@@ -1,5 +1,7 @@
 """Kernels carry all code they call, and nothing that only kernels call can be called from Python."""
 
+import gc
+
 import pytest
 
 from reference_solver.compilation import config, inner_kernel, kernel
@@ -44,3 +46,20 @@ def test_what_only_kernels_call_refuses_python():
     trunk(1.0)
     with pytest.raises(TypeError):
         leaf(1.0)
+
+
+def test_a_kernel_that_compiles_leaves_the_garbage_collector_as_it_was():
+    before = gc.get_threshold()
+
+    @kernel
+    def fresh(x):
+        return x + 2.0
+
+    assert fresh(1.0) == 3.0 and gc.get_threshold() == before
+    try:
+        gc.set_threshold(0)
+        assert fresh(1) == 3.0 and gc.get_threshold() == (0, *before[1:])
+        gc.set_threshold(5_000_000, 3, 4)
+        assert fresh(True) == 3.0 and gc.get_threshold() == (5_000_000, 3, 4)
+    finally:
+        gc.set_threshold(*before)
