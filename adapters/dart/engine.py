@@ -108,7 +108,7 @@ class DartEngine(Engine):
             For a scene that `refuses` names, a bad step or setting.
         """
         dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
+        reason = self.refuses(scene, str(chosen["solver"]))  # the profiles of cones are named after theirs
         if reason:
             raise EngineError(reason)
         return DartSimulation(scene, dt, chosen)
