@@ -12,7 +12,7 @@ CANDIDATES: dict[str, tuple[Any, ...]] = {
     "detector": ("fcl", "dart", "ode", "bullet"),
     "iterations": (30, 2000, 50000),
     "second_sweeps": (200, 5000),
-    "second_tolerance": (1e-12,),
+    "second_tolerance": (1e-12, 1e-9),
 }
 
 _Settings = Mapping[str, Any]
