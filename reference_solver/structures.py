@@ -8,8 +8,9 @@ out in memory once, where it is made, and is one pointer from there on; what it 
 what is a structure in it is a pointer into it. Nothing writes to it, as nothing writes to a tuple.
 
 Memory is that of the function that makes a structure, one place for each expression that makes one: another turn of a
-loop writes over what the turn before made, and what is returned is copied to who called. All of this is numba's public
-way to extend it, but for the convention of calls; with ``NUMBA_DISABLE_JIT=1`` a structure is a tuple.
+loop writes over what the turn before made, and what is returned is copied to who called. numba is told by its own means
+of extension, of which data models and the convention of calls are not public: as `linking.py` this rests on the release
+that `constraints.txt` names. With ``NUMBA_DISABLE_JIT=1`` a structure is a tuple.
 
 Here is what names a structure, and asks for no compiler: records and models are read without one. `structure_types.py`
 tells numba.
