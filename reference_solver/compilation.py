@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import config as numba_config
+from numba.core.caching import UserProvidedCacheLocator
 
 from reference_solver.linking import Carried, Whole
 
@@ -74,10 +75,26 @@ INNER_OPTIONS = {
 }
 
 
+class PerModule(UserProvidedCacheLocator):
+    """Keeps a kernel below its module's name: checkouts and installations of the same sources share machine code.
+
+    numba keeps it below a hash of where the source lies. What decides here is what the source says, and the folder's
+    name covers all of that.
+    """
+
+    def __init__(self, function: Callable[..., object], file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(Path(config.CACHE_DIR) / function.__module__)
+
+
+#: How numba is told of `PerModule`, by its setting ``CACHE_LOCATOR_CLASSES``.
+LOCATOR = f"{PerModule.__module__}.{PerModule.__qualname__}"
+
+
 def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
-    before = config.CACHE_DIR
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     if CACHE_FOLDER is not None:
-        config.CACHE_DIR = str(CACHE_FOLDER)
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(CACHE_FOLDER), LOCATOR
     try:
         result: F = njit(
             function,
@@ -88,7 +105,7 @@ def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
         )
         return result
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
 def kernel(function: F) -> F:

@@ -1,17 +1,24 @@
 """Machine code is kept per state of the sources, and a missing cache costs time only."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from reference_solver import compilation
 
 
-def run(code, **environment):
+def run(code, folder=None, **environment):
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | environment, check=True
+        [sys.executable, "-c", code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+        check=True,
     ).stdout.strip()
 
 
@@ -36,10 +43,29 @@ def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):
     assert run(code, NUMBA_CACHE_DIR=str(blocked)) == "None"
 
 
+def test_another_checkout_of_the_same_sources_finds_the_machine_code(tmp_path):
+    code = (
+        "import reference_solver.cone as c; print(c.__file__);"
+        "print(c.into_cone(1.0, 2.0, 0.5), sum(c.into_cone.stats.cache_hits.values()))"
+    )
+    answers = []
+    for name in ("one", "two"):
+        shutil.copytree(
+            Path(compilation.__file__).parent,
+            tmp_path / name / "reference_solver",
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+        said = run(code, tmp_path / name, NUMBA_CACHE_DIR=str(tmp_path / "kernels")).split("\n")
+        assert str(tmp_path / name) in said[0]
+        answers.append(said[1])
+    assert [answer.rpartition(" ")[2] for answer in answers] == ["0", "1"]
+    assert answers[0][:-1] == answers[1][:-1]
+
+
 def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
     code = (
-        "from numba.core import config; before = config.CACHE_DIR; import reference_solver.planar;"
-        "print(config.CACHE_DIR == before)"
+        "from numba.core import config; kept = lambda: (config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES);"
+        "before = kept(); import reference_solver.planar; print(kept() == before)"
     )
     assert run(code, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1") == "True"
 
