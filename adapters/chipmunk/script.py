@@ -23,14 +23,14 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     lines += [f"space.{name} = {chosen[name]!r}" for name in _SPACE]
     lines += ["bodies = {}", *(f"# start: {change}" for change in built.initial_change)]
     for asked, body, shape in zip(scene.bodies, built.bodies, built.shapes, strict=True):
-        lines += ["", *_made(asked, body, shape)]
+        lines += ["", *_made(scene, asked, body, shape)]
     lines += ["", "", "def state():", "    return {"]
     lines.append("        name: ((*body.position, body.angle), (*body.velocity, body.angular_velocity))")
     lines += ["        for name, body in bodies.items()", "    }"]
     return text(lines + stepped([*_loads(scene), "space.step(DT)"]))
 
 
-def _made(asked: Body, body: Any, shape: Any) -> list[str]:
+def _made(scene: Scene, asked: Body, body: Any, shape: Any) -> list[str]:
     """Lines that make a body with its shape, as ``body`` and ``shape`` are placed."""
     kind = {"fixed": "STATIC", "prescribed": "KINEMATIC"}.get(asked.motion)
     given = f"body_type=pymunk.Body.{kind}" if kind else f"{asked.mass!r}, {moment(asked)!r}"
@@ -44,7 +44,7 @@ def _made(asked: Body, body: Any, shape: Any) -> list[str]:
         x = asked.shape.half_length
         lines.append(f"shape = pymunk.Segment(body, ({-x!r}, 0.0), ({x!r}, 0.0), {asked.shape.radius!r})")
     else:
-        lines.append(f"shape = pymunk.Poly(body, {corners(asked.shape)!r})")
+        lines.append(f"shape = pymunk.Poly(body, {corners(scene, asked)!r})")
     if any(asked.surface_velocity):
         lines.append(f"shape.surface_velocity = {literal(asked.surface_velocity)}")
     lines.append(f"shape.elasticity, shape.friction = {shape.elasticity!r}, {shape.friction!r}")

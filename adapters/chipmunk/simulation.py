@@ -34,7 +34,7 @@ class ChipmunkSimulation(Simulation):
         self.space.collision_bias = settings["collision_bias"]
         self.space.collision_persistence = settings["collision_persistence"]
         self.bodies = [made_body(body) for body in scene.bodies]
-        self.shapes = [made_shape(a.shape, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
+        self.shapes = [made_shape(scene, a, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
         for asked, shape in zip(scene.bodies, self.shapes, strict=True):
             if any(asked.surface_velocity):
                 shape.surface_velocity = asked.surface_velocity

@@ -27,7 +27,7 @@ def touching_pairs(scene: Scene) -> list[tuple[int, int, Array, float]]:
     shapes = []
     for asked in scene.bodies:
         body = made_body(asked)
-        shapes.append(made_shape(asked.shape, body, 0.5 * skin))
+        shapes.append(made_shape(scene, asked, body, 0.5 * skin))
         space.add(body, shapes[-1])
     found = []
     index = {id(shape): i for i, shape in enumerate(shapes)}

@@ -93,34 +93,49 @@ def made_body(asked: Body) -> Any:
     return body
 
 
-def made_shape(shape: Any, body: Any, skin: float) -> Any:
-    """Shape grown by ``skin`` [m] on all sides."""
+def made_shape(scene: Scene, asked: Body, body: Any, skin: float) -> Any:
+    """Shape of ``asked``, a body of ``scene``, grown by ``skin`` [m] on all sides."""
     import pymunk
 
+    shape = asked.shape
     if isinstance(shape, Disc):
         return pymunk.Circle(body, shape.radius + skin)
     if isinstance(shape, Capsule):
         ends = ((-shape.half_length, 0.0), (shape.half_length, 0.0))
         return pymunk.Segment(body, *ends, shape.radius + skin)
-    return pymunk.Poly(body, corners(shape), radius=skin)
+    return pymunk.Poly(body, corners(scene, asked), radius=skin)
 
 
-def corners(shape: Any) -> list[tuple[float, float]]:
+def corners(scene: Scene, asked: Body) -> list[tuple[float, float]]:
     """Corners of the polygon that a shape with corners becomes, in body axes."""
+    shape = asked.shape
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
         return [(-hx, -hy), (hx, -hy), (hx, hy), (-hx, hy)]
     if isinstance(shape, Polygon):
         return list(shape.vertices)
     assert isinstance(shape, HalfSpace)
-    return _ground(shape)
+    return _ground(shape, _middle(scene, asked, shape))
 
 
-def _ground(shape: HalfSpace) -> list[tuple[float, float]]:
-    """Corners of a thick slab whose upper face is the half-space's."""
+def _middle(scene: Scene, asked: Body, shape: HalfSpace) -> float:
+    """Where along a half-space's face the bodies are, to a half width of the slab [m]: 0 unless they are far away."""
+    x, y, theta = asked.pose
+    nx, ny = shape.normal
+    c, s = math.cos(theta), math.sin(theta)
+    along = [
+        (c * dx + s * dy) * ny - (c * dy - s * dx) * nx
+        for dx, dy in ((body.pose[0] - x, body.pose[1] - y) for body in scene.bodies if body.motion == "free")
+    ]
+    # The middle one: a body far from all others does not draw the slab away from them.
+    return GROUND_HALF_WIDTH * round(sorted(along)[len(along) // 2] / GROUND_HALF_WIDTH) if along else 0.0
+
+
+def _ground(shape: HalfSpace, middle: float) -> list[tuple[float, float]]:
+    """Corners of a thick slab whose upper face is the half-space's, about ``middle`` along it."""
     nx, ny = shape.normal
     corners = []
     for along, depth in ((-1.0, GROUND_DEPTH), (-1.0, 0.0), (1.0, 0.0), (1.0, GROUND_DEPTH)):
-        height, side = shape.offset - depth, along * GROUND_HALF_WIDTH
+        height, side = shape.offset - depth, middle + along * GROUND_HALF_WIDTH
         corners.append((height * nx + side * ny, height * ny - side * nx))
     return corners

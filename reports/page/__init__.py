@@ -49,6 +49,7 @@ def render(source: Source) -> str:
     wrong = answers(source.rows)
     first = first_answers(source, wrong)
     choices = choosing.choices(source)
+    shown = replay.replays(source)
     return small_html(
         _environment()
         .get_template("page.html.j2")
@@ -70,13 +71,15 @@ def render(source: Source) -> str:
             timed=[choice for choice in choices if choice.timed],
             untimed=[choice for choice in choices if not choice.timed],
             scenes=scene_sections(source),
-            replays=replay.replays(source),
+            replays=shown,
+            replay_heads=replay.heads(shown),
             people=replay.people(source),
             explorer=explorer.explorer(source),
             speed=cost.speed(source),
             sheet=fairness.fairness(source),
             take=takeaway.takeaway(source),
             said=verdicts.SAID,
+            grounds=verdicts.GROUNDS,
             meanings=verdicts.MEANINGS,
             marks_used=_marks_used(source),
         )

@@ -178,7 +178,10 @@ def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
 
 @dataclass(frozen=True)
 class Cure:
-    """An engine as shipped on one scene, and the profile that does better, with what it changes."""
+    """An engine as shipped on one scene, and the profile that does better, with what it changes.
+
+    ``like`` is the scene beside which the same changes stand already, where there is one.
+    """
 
     scene: str
     dimension: int
@@ -193,6 +196,7 @@ class Cure:
     changes: list[Change]
     paste: str
     measured: str
+    like: str = ""
 
 
 def cures(source: Source) -> list[Cure]:

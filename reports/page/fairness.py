@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters import registry
 from adapters.conformance.faults import FAULTS
 from adapters.engine import EngineFacts
 from adapters.engine_folder import laws_of
-from reports.cures import setting_text
+from reports.cures import Change, setting_text
 from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
 from reports.page.source import Source
@@ -121,10 +121,13 @@ def _planted() -> dict[str, str]:
 
 
 def _once(every: Iterable[Cure]) -> list[Cure]:
-    """One cure per engine and scene: what cures the plane cures space."""
+    """One cure per engine and scene: what cures the plane cures space. The same settings are said once."""
     first: dict[tuple[str, str], Cure] = {}
+    said: dict[tuple[str, tuple[Change, ...], str], str] = {}
     for cure in every:
-        first.setdefault((cure.engine, cure.scene), cure)
+        if (cure.engine, cure.scene) not in first:
+            where = said.setdefault((cure.engine, tuple(cure.changes), cure.paste), cure.scene)
+            first[cure.engine, cure.scene] = cure if where == cure.scene else replace(cure, like=where)
     return list(first.values())
 
 

@@ -1,8 +1,9 @@
 """Replays: recordings of all engines on one scene, packed for the page's player, with the truth as a ghost.
 
-    header (JSON): bodies, series      16-bit integers: times in steps, then one quantity after the other, each as
-                                       changes along time; low bytes first, deflated
-    who (JSON, once for all scenes)    name, colour and dash of each engine and profile
+    heads (JSON, deflated, of all scenes at once)     bodies, series, what a level is
+    levels of one scene, deflated    16-bit integers: times in steps, then one quantity after the other, each as
+                                     changes along time; low bytes first
+    who (JSON, once for all scenes)  name, colour and dash of each engine and profile
 
 The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
 `validation.running.tracks` were computed from the full trajectory when the cell ran.
@@ -11,6 +12,7 @@ The player draws what is here and computes nothing; the moments at which an engi
 from __future__ import annotations
 
 import base64
+import json
 import math
 import zlib
 from collections import defaultdict
@@ -60,7 +62,8 @@ class Replay:
     id: str
     title: str
     settings: str
-    data: dict[str, Any]
+    head: dict[str, Any]
+    levels: str
     figure: Figure | None
     command: str
     departures: list[tuple[str, str, float | None, str]]
@@ -77,6 +80,16 @@ class Replay:
         return f"{', '.join(said)}" + (
             f"; the other {stay} never" if stay > 1 else "; the other one never" if stay else ""
         )
+
+
+def heads(shown: Sequence[Replay]) -> str:
+    """What the player knows of each scene, by its id: they are much alike, and deflate to a tenth together."""
+    text = json.dumps({replay.id: replay.head for replay in shown}, separators=(",", ":"), allow_nan=False)
+    return _deflated(text.encode())
+
+
+def _deflated(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content, 9)).decode()
 
 
 def replays(source: Source) -> list[Replay]:
@@ -104,21 +117,22 @@ def _replay(
         slug("replay", name, dimension),
         title,
         f"{params_text(scene.params)}, dt = {format_dt(slot.dt)} s",
-        _data(source, scene, members, t, exact, tracked),
+        *_packed(source, scene, members, t, exact, tracked),
         _figure(title, scene, members, exact, tracked) if drawn else None,
         reproduce(slot.as_dict() | {"engine": "ENGINE", "profile": "PROFILE"}),
         [(s.engine, s.profile, r.departure, r.finish) for s, r in members],
     )  # fmt: skip
 
 
-def _data(
+def _packed(
     source: Source,
     scene: Scene,
     members: Sequence[tuple[Slot, Recording]],
     t: NDArray[np.float64],
     exact: NDArray[np.float64] | None,
     tracked: int | None,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], str]:
+    """Head and levels."""
     d, places = scene.dimension, {column: k for k, column in enumerate(source.columns)}
     free = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
     low, high = _view(scene, members, exact, tracked, free)
@@ -140,14 +154,15 @@ def _data(
     # Low bytes, then high ones: of small steps the high bytes are nearly all alike, which deflates to nothing.
     levels = np.concatenate([block.ravel() for block in blocks]).astype("<i2")
     raw = levels.view(np.uint8).reshape(-1, 2).T.tobytes()
-    return {
+    head = {
         "dimension": d, "dt": dt, "count": len(t), "bodies": [_body(scene, i) for i in free],
         "fixed": [_body(scene, i) for i in range(len(scene.bodies)) if i not in free],
         "tracked": None if tracked is None else free.index(tracked), "low": _plain(low), "high": _plain(high),
-        "unit": unit, "angle": 1.0 / ANGLES, "arrow": strongest / ARROWS, "gravity": list(scene.gravity),
+        "unit": unit, "angle": 1.0 / ANGLES, "place": _coarse(unit), "arrow": 1.0 / ARROWS,
+        "gravity": list(scene.gravity),
         "static": exact is not None and bool(np.ptp(exact, axis=0).max() == 0.0), "series": series,
-        "packed": base64.b64encode(zlib.compress(raw, 9)).decode(),
     }  # fmt: skip
+    return head, _deflated(raw)
 
 
 def _plain(values: NDArray[np.float64]) -> list[float]:
@@ -224,12 +239,17 @@ def _by_quantity(levels: NDArray[Any]) -> NDArray[np.int16]:
 
 def _arrow_levels(recording: Recording, unit: float, strongest: float) -> list[NDArray[np.int16]]:
     """Frames (differenced), points and impulses of all contacts."""
-    coarse = unit * LENGTHS / ARROWS
+    coarse = _coarse(unit)
     return [
         np.diff(recording.frame, prepend=0).astype(np.int16),
         _by_quantity(np.clip(np.round(recording.point / coarse), -32000, 32000)),
         _by_quantity(np.round(recording.impulse / strongest * ARROWS)),
     ]
+
+
+def _coarse(unit: float) -> float:
+    """What a level of a contact's place is [m]."""
+    return unit * LENGTHS / ARROWS
 
 
 def _figure(

@@ -34,7 +34,12 @@ _HUNDREDTHS = re.compile(r"-?\d+\.\d\d+")
 #: What vl-convert says of axes, which have titles of their own.
 AXES = ("X-axis", "Y-axis")
 _TRANSLATED = re.compile(r"translate\((-?[\d.]+),(-?[\d.]+)\)")
-_POLYLINE = re.compile(r"M[-\d.,e]+(?:L[-\d.,e]+)+")
+_NUMBER = re.compile(r"-?(?:\d+\.?\d*|\.\d+)(?:e-?\d+)?")
+_COMMAND = re.compile(r"([MLHVlhvZ])([^MLHVlhvZ]*)")
+#: A path that begins with a place and has straight lines only.
+_STRAIGHT = re.compile(r"M[-\d.,eMLHVlhvZ ]+")
+#: A circle about its own centre, as vl-convert draws one.
+_CIRCLE = re.compile(r"M([\d.]+),0A\1,\1,0,1,1,-\1,0A\1,\1,0,1,1,\1,0")
 #: The ground of a view, which has no colour of its own.
 _GROUND = re.compile(r"M0,0h[\d.]+v[\d.]+h-[\d.]+Z")
 _NAMESPACE = re.compile(r' xmlns(?::xlink)?="[^"]*"')
@@ -43,9 +48,22 @@ _NAMESPACE = re.compile(r' xmlns(?::xlink)?="[^"]*"')
 def small_svg(text: str) -> str:
     """An SVG drawing that looks the same: one value once, straight runs of points as one line, no empty group."""
     root = ElementTree.fromstring(_NAMESPACE.sub("", text))
+    _see_through(root, "black", "none")
     _clean(root)
     _granted(root, frozenset())
+    _place(root)
     return ElementTree.tostring(root, encoding="unicode", short_empty_elements=True).replace(" />", "/>")
+
+
+def _see_through(node: ElementTree.Element, fill: str, stroke: str) -> None:
+    """Say how far one sees through a part that is only filled, or only a line, in a way that groups hand on."""
+    fill, stroke = node.get("fill", fill), node.get("stroke", stroke)
+    for part in node:
+        _see_through(part, fill, stroke)
+    painted = [name for name, colour in (("fill", fill), ("stroke", stroke)) if colour not in ("none", "transparent")]
+    alone = node.tag in ("path", "line") and len(painted) == 1 and f"{painted[0]}-opacity" not in node.attrib
+    if alone and (seen := node.attrib.pop("opacity", None)) is not None:
+        node.set(f"{painted[0]}-opacity", seen)
 
 
 def _clean(node: ElementTree.Element) -> None:
@@ -60,7 +78,7 @@ def _clean(node: ElementTree.Element) -> None:
     if node.get("transform") == "translate(0,0)":
         del node.attrib["transform"]
     if node.tag == "path":
-        node.set("d", small_path(node.get("d", "")))
+        _move_path(node)
         if node.get("stroke") is None:
             node.attrib.pop("stroke-width", None)
     node[:] = list(_kept(node))
@@ -68,6 +86,45 @@ def _clean(node: ElementTree.Element) -> None:
         _hand_up(node, list(node))
         node[:] = list(_kept(node))  # a group that has handed up all it said says nothing any more
         _join_rules(node)
+
+
+def _move_path(node: ElementTree.Element) -> None:
+    """A path where it lies, instead of about the origin with a way to go; a circle as one."""
+    drawn, place = node.get("d", ""), _translated(node)
+    if place is not None and (circle := _CIRCLE.fullmatch(drawn)):
+        node.tag = "circle"
+        for name, value in zip(("cx", "cy", "r"), (*place, float(circle[1])), strict=True):
+            node.set(name, _tenths(round(10.0 * value)))
+        del node.attrib["d"]
+    elif place is not None and _outlines(drawn) is not None:
+        node.set("d", small_path(drawn, place))
+    else:
+        node.set("d", small_path(drawn))
+        return
+    node.attrib.pop("transform", None)
+
+
+def _place(node: ElementTree.Element) -> None:
+    """Lines as paths, and words at their place."""
+    place = _translated(node)
+    if place is not None and node.tag == "line":
+        ends = [float(node.attrib.pop(name, 0.0)) for name in ("x2", "y2")]
+        node.tag = "path"
+        node.set("d", small_path(f"M0,0L{ends[0]},{ends[1]}", place))
+        node.attrib.pop("transform", None)
+    elif place is not None and node.tag == "text" and not len(node):
+        node.attrib.pop("transform", None)
+        for name, value in zip("xy", place, strict=True):
+            if value:
+                node.set(name, _tenths(round(10.0 * value)))
+    for part in node:
+        _place(part)
+
+
+def _translated(node: ElementTree.Element) -> tuple[float, float] | None:
+    """Where a part is moved to; None if it is turned as well."""
+    found = _TRANSLATED.fullmatch(node.get("transform", "translate(0,0)"))
+    return None if found is None else (float(found[1]), float(found[2]))
 
 
 def _granted(node: ElementTree.Element, around: frozenset[str]) -> None:
@@ -94,6 +151,8 @@ def _kept(node: ElementTree.Element) -> Iterator[ElementTree.Element]:
             part.tag == "path" and set(part.attrib) <= {"d"} and _GROUND.fullmatch(part.get("d", ""))
         ):  # drawn by nothing
             continue
+        if part.tag == "path" and not part.get("d"):  # a line of one point
+            continue
         if part.tag == "text" and part.get("opacity") == "0":  # a label that would overlap the next one
             continue
         if part.tag == "g" and not part.attrib:
@@ -116,32 +175,89 @@ def _join_rules(node: ElementTree.Element) -> None:
     parts = list(node)
     if len(parts) < 2 or any(part.tag != "line" or set(part.attrib) - {"transform", "x2", "y2"} for part in parts):
         return
-    places = [_TRANSLATED.fullmatch(part.get("transform", "translate(0,0)")) for part in parts]
+    places = [_translated(part) for part in parts]
     if None in places:
         return
     drawn = "".join(
-        f"M{place[1]},{place[2]}l{part.get('x2')},{part.get('y2')}"
+        f"M{place[0]},{place[1]}l{part.get('x2', '0')},{part.get('y2', '0')}"
         for place, part in zip(places, parts, strict=True) if place is not None
     )  # fmt: skip
-    node[:] = [ElementTree.Element("path", {"d": drawn})]
+    node[:] = [ElementTree.Element("path", {"d": small_path(drawn)})]
 
 
-def small_path(drawn: str) -> str:
-    """A path's ``d``; a polyline without the points that lie on it, its steps relative and in tenths."""
-    if _POLYLINE.fullmatch(drawn) is None:
+def small_path(drawn: str, moved: tuple[float, float] = (0.0, 0.0)) -> str:
+    """A path's ``d`` after ``moved``, its steps relative and in tenths, a polyline without the points that lie on it.
+
+    Empty where nothing is drawn but points. A path with curves stays as it is, and where it is.
+    """
+    found = _outlines(drawn)
+    if found is None:
         return drawn
-    points = [(float(x), float(y)) for x, y in (pair.split(",") for pair in re.split("[ML]", drawn)[1:])]
-    kept = simplified(points, FLAT)
-    (x0, y0), *rest = [(round(10.0 * x), round(10.0 * y)) for x, y in kept]
-    words, at = [f"M{_tenths(x0)},{_tenths(y0)}"], (x0, y0)
-    for x, y in rest:
-        words.append(f"l{_tenths(x - at[0])},{_tenths(y - at[1])}")
-        at = x, y
-    return "".join(words)
+    words: list[str] = []
+    at = (0, 0)
+    for points, closed in found:
+        shifted = [(x + moved[0], y + moved[1]) for x, y in points]
+        if len(set(shifted)) == 1:
+            continue
+        kept = shifted if closed else simplified(shifted, FLAT)
+        (x0, y0), *rest = [(round(10.0 * x), round(10.0 * y)) for x, y in kept]
+        words += [_step("M", x0, y0)]
+        at = x0, y0
+        for x, y in rest:
+            dx, dy = x - at[0], y - at[1]
+            words += [_step("h", dx) if dy == 0 else _step("v", dy) if dx == 0 else _step("l", dx, dy)]
+            at = x, y
+        words += ["Z"] if closed else []
+    return _without_repeats(words)
+
+
+def _outlines(drawn: str) -> list[tuple[list[tuple[float, float]], bool]] | None:
+    """Corners of each part of a path of straight lines, and whether it closes; None if there are others."""
+    if not _STRAIGHT.fullmatch(drawn):
+        return None
+    parts: list[tuple[list[tuple[float, float]], bool]] = []
+    x = y = 0.0
+    for command, numbers in _COMMAND.findall(drawn):
+        values = [float(value) for value in _NUMBER.findall(numbers)]
+        if command == "Z":
+            points, _ = parts[-1]
+            parts[-1] = (points, True)
+            x, y = points[0]
+            continue
+        steps = (
+            zip(values[::2], values[1::2], strict=True) if command in "MLl" else ((value, value) for value in values)
+        )
+        for k, (first, second) in enumerate(steps):
+            x = x if command in "Vv" else first + (x if command in "lh" else 0.0)
+            y = y if command in "Hh" else second + (y if command in "lv" else 0.0)
+            if command == "M" and k == 0:
+                parts.append(([], False))
+            elif parts[-1][1]:  # what follows an outline that is closed begins where it began
+                parts.append(([parts[-1][0][0]], False))
+            parts[-1][0].append((x, y))
+    return parts
+
+
+def _step(command: str, *tenths: int) -> str:
+    return command + ",".join(_tenths(value) for value in tenths).replace(",-", "-")
+
+
+def _without_repeats(words: Sequence[str]) -> str:
+    """Steps one after the other; a letter is said once for all that follow it [SVG 1.1, 8.3.1]."""
+    said, last = [], ""
+    for word in words:
+        command, numbers = word[0], word[1:]
+        if command == last and command != "M":
+            said.append(numbers if numbers.startswith("-") else "," + numbers)
+        else:
+            said.append(word)
+        last = command
+    return "".join(said)
 
 
 def _tenths(value: int) -> str:
-    return f"{value / 10.0:g}" if abs(value) < 1_000_000 else f"{value / 10.0:.1f}"
+    whole = f"{value / 10.0:.1f}".removesuffix(".0")
+    return whole.replace("0.", ".", 1) if whole.lstrip("-").startswith("0.") else whole
 
 
 def simplified(points: Sequence[tuple[float, float]], flat: float) -> list[tuple[float, float]]:
@@ -171,7 +287,9 @@ def _distance(point: tuple[float, float], a: tuple[float, float], b: tuple[float
 _VERBATIM = re.compile(r"(<(?:script|style|pre)\b.*?</(?:script|style|pre)>)", re.DOTALL)
 #: End tags that the next tag makes superfluous, inside our tables and lists.
 _CLOSED_BY_THE_NEXT = re.compile(r"\s*</(?:td|th|tr|thead|tbody|li|dt|dd|option)>")
-_QUOTED = re.compile(r' (class|scope|id|colspan|rowspan|role|type|value)="([\w-]+)"(?=[ >])')
+_TAG = re.compile(r"<[a-zA-Z][^<>]*>")
+#: A value that ends where the next blank does [HTML standard, 13.1.2.3], and what follows it.
+_QUOTED = re.compile(r"""="([^\s"'=<>`]+)"(/?)""")
 _INDENTED = re.compile(r"\s*\n\s*")
 
 
@@ -201,4 +319,9 @@ def small_html(text: str) -> str:
 def _small_markup(text: str) -> str:
     text = _TABLE.sub(_heads_by_place, text)
     text = _INDENTED.sub("\n", _CLOSED_BY_THE_NEXT.sub("", text))
-    return _QUOTED.sub(r" \1=\2", text)
+    return _TAG.sub(lambda tag: _QUOTED.sub(_unquoted, tag[0]), text)
+
+
+def _unquoted(found: re.Match[str]) -> str:
+    """A slash that closes a part stands apart from a value without quotes."""
+    return f"={found[1]}" + (" /" if found[2] else "")

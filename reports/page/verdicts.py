@@ -35,6 +35,8 @@ SAID = {
     "none": ("–", "no value"),
 }
 ALARMS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
+#: Mark -> class of the ground a value stands on: a letter, because tables of every value say it thousands of times.
+GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.fromkeys(ALARMS, "a")
 #: What the words mean, for the legend.
 MEANINGS = {
     "pass": "within the stated tolerance of the truth",

@@ -449,3 +449,20 @@ def test_the_stick_threshold_is_as_sharp_as_the_fact_sheet_says() -> None:
         gravity = (9.81 * math.sin(theta), -9.81 * math.cos(theta))
         trajectory = drive(make(FLOOR, unit_box("box", 0.0, 0.5), mu=0.5, gravity=gravity, T=1.0), "tuned")
         assert (trajectory.twist[-1, 1, 0] > 1e-6) == slides
+
+
+# ---- far away --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3])
+@pytest.mark.parametrize("away", [1e4, -2.5e4, 1e6])
+def test_a_half_space_has_no_end(lean: float, away: float) -> None:
+    """Its slab lies under the bodies, wherever they are: a box at rest on its face falls nowhere."""
+    normal, along = (-math.sin(lean), math.cos(lean)), (math.cos(lean), math.sin(lean))
+    face = Body("face", HalfSpace(normal, 0.0), motion="fixed")
+    places = [(away + x) * along[k] + 0.5 * normal[k] for x in (0.0, 3.0) for k in (0, 1)]
+    boxes = [unit_box("a", *places[:2], lean), unit_box("b", *places[2:], lean)]
+    gravity = (-9.81 * normal[0], -9.81 * normal[1])
+    found = drive(make(face, *boxes, mu=1.0, gravity=gravity, T=1.0), "tuned")
+    # It falls 4.9 m where there is no ground; a places' last digits are 1e-10 m here.
+    assert np.abs(found.pose[-1, 1:, :2] - found.pose[0, 1:, :2]).max() < 0.01

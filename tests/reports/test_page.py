@@ -350,8 +350,8 @@ def test_the_explorer_holds_measured_heights_and_says_who_rebounds_wrongly(page_
 
 def test_a_packed_replay_gives_back_every_pose_to_half_a_level(page_source):
     found = next(r for r in replays(page_source) if r.id == "replay-bounce-2")
-    data = found.data
-    planes = np.frombuffer(zlib.decompress(base64.b64decode(data["packed"])), np.uint8).reshape(2, -1)
+    data = found.head
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(found.levels)), np.uint8).reshape(2, -1)
     levels = np.ascontiguousarray(planes.T).view("<i2").ravel()
     times = np.cumsum(levels[: data["count"]]) * data["dt"]
     at, bodies = data["count"], len(data["bodies"])
@@ -478,4 +478,4 @@ def test_the_guides_of_a_chart_have_the_slopes_they_claim_also_where_the_picture
     ],
 )  # fmt: skip
 def test_who_leaves_the_tolerance_is_told_in_a_line_the_first_on_top(departures, said):
-    assert Replay("i", "t", "s", {}, None, "c", departures).departures_text == said
+    assert Replay("i", "t", "s", {}, "", None, "c", departures).departures_text == said

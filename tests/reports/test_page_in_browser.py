@@ -232,7 +232,7 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
 
 def test_a_chart_point_says_what_it_is(browser, page_file):
     with opened(browser, page_file, "#scene-impact") as page:
-        point = page.locator("#fig-work-impact-2 path[data-is*='per simulated second']").first
+        point = page.locator("#fig-work-impact-2 [data-is*='per simulated second']").first
         point.hover()
         hint = page.locator("#hint")
         assert hint.is_visible()

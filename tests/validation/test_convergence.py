@@ -140,7 +140,7 @@ def said(errors, dts=None, **options):
 
 def test_what_has_too_few_errors_says_so():
     assert limit_of([], []) == (None, Limit.NOISY, "no step has a measured error")
-    assert limit_of(DTS[:2], [0.1, 0.05]) == (None, Limit.NOISY, "2 steps are too few: an order needs three")
+    assert limit_of(DTS[:2], [0.1, 0.05]) == (None, Limit.NOISY, "too few steps: 2 of 3")
     exact = (None, Limit.TRUTH, "exact to round-off at every step")
     assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:1], [0.25], 0.25) == exact
 

@@ -120,7 +120,7 @@ def limit_of(
     if max(errors) <= floor:
         return None, Limit.TRUTH, "exact to round-off at every step"
     if len(errors) < 3:
-        return None, Limit.NOISY, f"{len(errors)} steps are too few: an order needs three"
+        return None, Limit.NOISY, f"too few steps: {len(errors)} of 3"
     above = [(dt, error) for dt, error in zip(dts, errors, strict=True) if error > floor]
     if errors[-1] <= floor:
         return None, *_round_off_limit(dts, errors, floor)

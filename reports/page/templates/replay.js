@@ -5,6 +5,7 @@
   const $ = (id) => document.getElementById("replay-" + id);
   const canvas = $("canvas"), pen = canvas.getContext("2d"), slider = $("time");
   const loaded = new Map(), people = JSON.parse($("who").textContent);
+  const heads = inflate($("heads").textContent, "deflate").then((buffer) => JSON.parse(new TextDecoder().decode(buffer)));
   let show = null, playing = false, last = 0, clock = 0;
 
   /* One quantity after the other becomes frame by frame; sums along time undo the changes, and 16-bit integers wrap
@@ -18,8 +19,8 @@
   }
   async function load(id) {
     if (loaded.has(id)) return loaded.get(id);
-    const data = JSON.parse(document.querySelector(`.replay-data[data-id="${CSS.escape(id)}"]`).textContent);
-    const bytes = new Uint8Array(await inflate(data.packed, "deflate")), half = bytes.length / 2;
+    const data = (await heads)[id], levelsOf = document.querySelector(`[data-replay="${CSS.escape(id)}"]`);
+    const bytes = new Uint8Array(await inflate(levelsOf.textContent, "deflate")), half = bytes.length / 2;
     const levels = new Int16Array(half).map((_, i) => bytes[i] | (bytes[half + i] << 8));
     const d = data.dimension, parts = d === 2 ? 3 : 7, bodies = data.bodies.length;
     let at = 0, steps = 0;
@@ -216,13 +217,13 @@
   }
   /* Impulses of this frame, and fading ones of the frames before for pairs that have let go since. */
   function drawArrows(data, one, k, plane, to, longest) {
-    const d = data.dimension, coarse = (data.unit * 16000) / 250, fade = 8;
+    const d = data.dimension, fade = 8;
     pen.strokeStyle = pen.fillStyle = one.colour;
     for (let j = Math.min(k, one.frames - 1); j >= Math.max(0, k - fade); j--) {
       const from = one.first[j], until = one.first[j + 1];
       for (let c = from; c < until; c++) {
-        const [x, y] = to(plane.map((axis) => one.point[c * d + axis] * coarse));
-        const vector = uprightOf(data, plane)(plane.map((axis) => one.impulse[c * d + axis] / 250));
+        const [x, y] = to(plane.map((axis) => one.point[c * d + axis] * data.place));
+        const vector = uprightOf(data, plane)(plane.map((axis) => one.impulse[c * d + axis] * data.arrow));
         const length = Math.hypot(...vector);
         if (length * longest < 3) continue;
         const ex = x + vector[0] * longest, ey = y - vector[1] * longest, turn = Math.atan2(ey - y, ex - x);

@@ -1,0 +1,14 @@
+"""What is published is one file that a phone can load."""
+
+from pathlib import Path
+
+PUBLISHED = Path(__file__).parents[2] / "reports" / "published"
+#: One file under 3 MB, as the report promises.
+LIMIT = 3_000_000
+
+
+def test_the_published_report_is_one_small_file():
+    page = (PUBLISHED / "report.html").read_bytes()
+    assert len(page) < LIMIT
+    # All of it, not a page that is small because something is missing: scenes, replay and tables are inside.
+    assert all(part in page for part in (b'id="replay-heads"', b"rows.json.gz", b"bench.zip", b"class=scene"))
