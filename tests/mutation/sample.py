@@ -5,8 +5,7 @@
 `SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
 likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
 its function (`reach`) run from the cheapest on, until one fails or what a mutant may cost is spent. It *survived* if
-none failed, for whatever reason: spent, no test reaches it, or a test that is not found any more because what it was
-made of has changed. So the share that is killed is a lower bound. A kill counts only if the test that failed passes in
+none failed, for whatever reason: what it may cost was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the test that failed passes in
 the copy without a mutant.
 """
 
@@ -31,6 +30,10 @@ from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, import_common, run
 from reach import PLUGIN, by_function, dotted, environment, record
 from subjects import PACKAGES, ROOT
+
+
+#: Exit status of pytest where a test that is named is not there.
+NOT_FOUND = 4
 
 
 def modules() -> list[str]:
@@ -118,7 +121,7 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
         spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
         assert isinstance(spoilt, Module)
         verdict, tests, failed = judged(copy, module, spoilt.code, reach.get(function, {}))
-        if failed and asked(copy, [failed], 60.0)[0] != 0:
+        if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
         if k in found:
             found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
@@ -153,12 +156,15 @@ def judged(copy: Path, module: str, source: str, tests: dict[str, float]) -> tup
     try:
         path.write_text(source, encoding="utf-8")
         code, failed = asked(copy, chosen, 60.0 + 4.0 * spent)
+        if code == NOT_FOUND:  # a file that cannot be imported, or tests that are made of what has changed
+            files = dict.fromkeys(test.partition("::")[0] for test in chosen)
+            code, failed = asked(copy, list(files), 60.0 + 4.0 * spent)
     finally:
         path.write_bytes(before)
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     if code == OUT_OF_TIME:
         return TIMED, len(chosen), ""
-    return (SURVIVED if code in (0, 4, 5) else KILLED), len(chosen), failed
+    return (SURVIVED if code in (0, NOT_FOUND, 5) else KILLED), len(chosen), failed
 
 
 def asked(copy: Path, tests: Sequence[str], cpu_seconds: float) -> tuple[int, str]:
