@@ -5,8 +5,8 @@
 `SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
 likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
 its function (`reach`) run from the cheapest on, until one fails or what a mutant may cost is spent. It *survived* if
-none failed, for whatever reason: what it may cost was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the test that failed passes in
-the copy without a mutant.
+none failed, for whatever reason: what it may cost was spent, or no test is known to reach it. So the share that is
+killed is a lower bound. A kill counts only if the test that failed passes in the copy without a mutant.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, import_common, run
 from reach import PLUGIN, by_function, dotted, environment, record
 from subjects import PACKAGES, ROOT
-
 
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4

@@ -224,3 +224,21 @@ def test_of_a_large_sweep_no_null_is_asked(monkeypatch):
 def test_a_value_that_is_no_number_is_none(monkeypatch, value):
     monkeypatch.setattr(nulls, "_measured", lambda *asked: {"did nothing": {"rebound_ratio": (value, "divided by 0")}})
     assert nulls_of("impact", 2, {}, DT, "rebound_ratio", 0.8) == [Null("did nothing", None, None, "divided by 0")]
+
+
+def test_the_row_of_a_null_is_that_of_the_engine_with_its_own_answer_and_nothing_of_a_run():
+    """Everything of the check and the cell stays; what belongs to the engine's run is empty."""
+    pytest.importorskip("pymunk")
+    row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT, 7)) if r.metric == "rebound_ratio")
+    asked = replace(row, engine_version="9", state_hash="0a", steps=3, wall_time_s=2.0, log="said", floor=0.5,
+                    initial_change=["moved"], certificate="holds", standing="new", reason="off")  # fmt: skip
+    found = {guess.profile: guess for guess in null_rows([asked])}
+    own = {"engine": NO_ENGINE, "engine_version": "", "state_hash": "", "steps": 0, "wall_time_s": 0.0, "log": "",
+           "floor": None, "initial_change": [], "certificate": "", "standing": None, "outcome": "ok", "cells": [],
+           "iterations": None, "physics": "fail", "reason": ""}  # fmt: skip
+    for name, value in (("did nothing", 0.0), ("free flight", -1.0)):
+        slot = {**asked.slot, "engine": NO_ENGINE, "profile": name, "iterations": None}
+        worth = 1.0 - abs(value - 0.8) / 0.8
+        wanted = replace(asked, profile=name, value=value, error=value - 0.8, slot=slot, skill=pytest.approx(worth),
+                         null="did nothing", **own)  # fmt: skip
+        assert found[name].as_dict() == wanted.as_dict()
