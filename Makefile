@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake
 
-.PHONY: run test recipe extras soak lint setup publish releases tune cures mutants mutants-check detection clean
+.PHONY: run test recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
 
 setup: $(STAMP)
 
@@ -102,6 +102,14 @@ mutants: $(STAMP)
 mutants-check: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
 	$(BIN)/python tests/mutation/run.py --check 40
+
+# N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 20 min of CPU at first, to
+# see which tests reach which functions, then ten seconds a mutant.
+N ?= 150
+SEED ?= 1
+mutants-sample: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
+	$(BIN)/python tests/mutation/run.py --sample $(N) --seed $(SEED)
 
 # What every check and receipt can see, from faults planted in our solver, which passes them all; two minutes of CPU.
 detection: $(STAMP)

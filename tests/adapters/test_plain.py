@@ -143,6 +143,14 @@ def test_levels_are_counted_one_by_one_from_the_outermost(nest):
     for _ in range(LEVELS - 1):
         bottom = bottom["a"] if isinstance(bottom, dict) else bottom[0]
     assert bottom == [1.5]
+    array = np.array([1.5, 2.5])
+    text, nested = str(array), array
+    for _ in range(LEVELS):
+        nested = nest(nested)
+    bottom = plain(nested)
+    for _ in range(LEVELS):
+        bottom = bottom["a"] if isinstance(bottom, dict) else bottom[0]
+    assert bottom == text == "[1.5 2.5]"  # below the last level its text, as of anything else
 
 
 def test_of_what_is_too_large_the_beginning_is_kept_to_the_last_item_that_begins_within_it():
@@ -155,6 +163,10 @@ def test_of_what_is_too_large_the_beginning_is_kept_to_the_last_item_that_begins
     assert len(plain([*exactly[1:], "x" * 62, "one more"])) == len(exactly) + 1
     table = plain({f"{k:063d}"[-63:]: "y" * 63 for k in range(SIZE)})
     assert len(table) == SIZE // 128
+    words = {f"{k:063d}": "y" * 63 for k in range(SIZE // 128)}
+    assert list(plain({**words, "one": "more"})) == list(words)
+    short = {**words, f"{SIZE // 128 - 1:063d}": "y" * 62}
+    assert list(plain({**short, "one": "more", "two": "more"})) == [*short, "one"]
     both = plain({"first": many, "second": [1.0]})
     assert list(both) == ["first"]
 
@@ -168,3 +180,14 @@ def test_text_of_the_longest_length_is_whole_and_keys_are_names():
     assert one_line("x" * REASON) == "x" * REASON
     assert one_line("x" * (REASON + 1)) == "x" * (REASON - 4) + " ..."
     assert list(plain({"k" * (NAME + 1): 1})) == ["k" * (NAME - 4) + " ..."]
+
+
+class Liar(str):
+    """A text that says another one when it is asked for its text."""
+
+    def __str__(self):
+        return "something else"
+
+
+def test_a_text_is_what_it_holds_whatever_it_says():
+    assert one_line(Liar("what it holds")) == "what it holds"

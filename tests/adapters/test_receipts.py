@@ -10,7 +10,7 @@ from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
-from adapters.receipts import QUANTITIES, receipts
+from adapters.receipts import QUANTITIES, _receipt, receipts
 
 DT = 1 / 60
 IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
@@ -297,6 +297,8 @@ def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
 def test_drag_of_one_kind_widens_nothing_that_the_other_kind_slows():
     slips = by_quantity(receipts(declaring(angular_damping=Declared(0.2, 0.0)), "default", IMPACT, DT))
     assert slips["gravity"].band == slips["linear_damping"].band == 1e-12 < slips["inertia"].band
+    slips = by_quantity(receipts(declaring(linear_damping=Declared(0.04, 0.01)), "default", IMPACT, DT))
+    assert slips["inertia"].band == slips["angular_damping"].band == 1e-12 < slips["gravity"].band
 
 
 def test_drag_that_stops_everything_is_taken_for_a_loss_of_99_in_100():
@@ -471,3 +473,13 @@ def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):
     given = [1, {"a": 2}]
     with pytest.raises(EngineError, match=r"^settings: a setting is a number, a word or a list of them, not a table$"):
         receipts(Listing(), "default", SMOOTH, DT)
+
+
+@pytest.mark.parametrize(
+    ("samples", "counts"),
+    [((1.05, 0.7), 0.7), ((0.7, 1.05), 0.7), ((0.95, 1.35), 1.35), ((1.05, math.nan), None), ((math.nan, 0.0), None)],
+)
+def test_the_sample_farthest_from_what_is_declared_counts_and_none_at_all_most(samples, counts):
+    found = _receipt("mass", 1.0, Declared(1.0, 0.1), samples, None)
+    assert not found.holds
+    assert math.isnan(found.measured) if counts is None else found.measured == counts

@@ -241,3 +241,15 @@ def test_a_name_that_cannot_be_one_is_cut_to_what_a_name_may_be():
     with pytest.raises(SceneError, match="cannot be the name of a body") as caught:
         scene(FLOOR, replace(BALL, name="b" * 500))
     assert len(str(caught.value)) < 300
+
+
+def test_a_quaternion_that_is_none_is_shown_whole():
+    with pytest.raises(SceneError, match=re.escape("the quaternion (1.0, 0.25, 0.0, 0.0) must have length 1")):
+        spatial(Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 1.0, 1.0, 0.25, 0.0, 0.0)))
+
+
+def test_restitution_above_one_is_for_a_scene_that_means_it():
+    gains = (Pair(restitution=1.5, friction=0.0),)
+    assert scene(pairs=gains, gaining=True).material("ball", "floor").restitution == 1.5
+    with pytest.raises(SceneError, match="restitution"):
+        scene(pairs=gains)

@@ -238,3 +238,30 @@ def test_a_shape_is_refused_by_the_name_of_its_field(shape, said):
 def test_how_far_a_shape_reaches():
     for shape, far in ((Disc(0.4), 0.4), (Sphere(0.3), 0.3), (Box((0.3, 0.4)), 0.5), (HalfSpace((0.0, 1.0)), 0.0)):
         assert reach(shape) == pytest.approx(far)
+
+
+def test_a_polygon_has_no_corner_on_an_edge_and_does_not_go_back():
+    middle = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (0.0, -1.0), (1.0, -1.0))
+    with pytest.raises(SceneError, match=r"counter-clockwise at number 3, \(0\.0, -1\.0\)"):
+        Polygon(middle).validate("b")
+    with pytest.raises(SceneError, match=r"counter-clockwise at number 0, \(-1\.0, 0\.0\)"):
+        Polygon(((-1.0, 0.0), (1.0, 0.0), (0.0, 0.0))).validate("b")
+    with pytest.raises(SceneError, match="enclose an area"):
+        area_and_centroid(((0.0, 0.0), (1.0, 0.0), (2.0, 0.0)))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_what_is_flat_or_off_its_centre_is_so_at_any_size(size):
+    """A part in a million of the size beside the centre is no round-off; so little thickness is nearly none."""
+
+    def plate(thickness):
+        corners = ((1.0, 0.0), (-0.5, 0.75), (-0.5, -0.75))
+        return Hull(tuple((size * x, size * y, size * z) for x, y in corners for z in (-thickness, thickness)))
+
+    plate(1e-5).validate("b")
+    with pytest.raises(SceneError, match="in one plane"):
+        plate(1e-7).validate("b")
+    square = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
+    Polygon(tuple((size * x, size * y) for x, y in square)).validate("b")
+    with pytest.raises(SceneError, match="centroid"):
+        Polygon(tuple((size * (x + 1e-6), size * y) for x, y in square)).validate("b")

@@ -6,6 +6,7 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+import drawn
 from subjects import PACKAGES, ROOT, SUBJECTS, hash_of
 
 HERE = Path(__file__).resolve().parent
@@ -128,7 +129,7 @@ def write_table() -> None:
         lines.append(row(module, [score], sum(map(bool, own)), len(own) - sum(map(bool, own)), stale))
     ran = [scores[module] for module in SUBJECTS if module in scores]
     total, still_open = sum(why not in ("", TIMED) for why in reasons.values()), list(reasons.values()).count("")
-    lines += [row("**all of these**", ran, total, still_open, ""), "", *left_out()]
+    lines += [row("**all of these**", ran, total, still_open, ""), "", *left_out(), *drawn.table(drawn.stored())]
     TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -7,7 +7,7 @@ each is written down when it ends, so a run that was stopped goes on where it wa
 whatever they are; ``--survivors`` runs only those of their mutants that survived last time. ``--check N`` runs N
 mutants of one subject, both chosen by the commit, writes nothing, and fails on a survivor that is not listed. It
 chooses among the subjects that are as they were when they ran: survivors of another are nobody's yet. Which those are
-is said, and more than half of all is a failure.
+is said, and more than half of all is a failure. ``--sample N --seed S`` asks about all modules (`sample`).
 
 A survivor is listed by its function and its change, so that an edit elsewhere does not make it new. Its reason is
 written by hand, but for the few that `known_by_form` can tell; survivors without one are *open*. What only a time limit
@@ -19,16 +19,18 @@ from __future__ import annotations
 
 import argparse
 import ast
+import hashlib
 import json
 import os
 import random
-import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from checkout import copy_of_the_checkout
 from lists import Change, Score, is_current, listed, stored, write_score, write_survivors, write_table
+from sample import sample
 from subjects import ROOT, SUBJECTS, hash_of, tests_of
 
 CONFIG = """
@@ -53,14 +55,9 @@ class NothingRanError(RuntimeError):
     """The tests of a module fail without any mutant, or call nothing of it."""
 
 
-def copy_of_the_checkout(folder: Path, module: str) -> None:
-    """Everything that is tracked or new, and the configuration of one run."""
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout
-    for name in filter(None, names.decode().split("\0")):
-        if not name.startswith("reports/published/") and (ROOT / name).is_file():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
+def configured_copy(folder: Path, module: str) -> None:
+    """The checkout, and the configuration of one run."""
+    copy_of_the_checkout(folder)
     with (folder / "pyproject.toml").open("a", encoding="utf-8") as stream:
         stream.write(CONFIG.format(module=module, tests=json.dumps(tests_of(module))))
 
@@ -107,7 +104,7 @@ def run(module: str, sample: int | None, survivors_only: bool) -> tuple[Score, l
     spent, of = os.times(), hash_of(module)
     with tempfile.TemporaryDirectory(prefix="crosscheck-mutants-") as name:
         folder = Path(name)
-        copy_of_the_checkout(folder, module)
+        configured_copy(folder, module)
         chosen: list[str] = []
         if sample is not None or survivors_only:
             mutmut(folder, "no.such.mutant")  # makes them all and runs none
@@ -128,6 +125,14 @@ def run(module: str, sample: int | None, survivors_only: bool) -> tuple[Score, l
     return Score(module, len(codes), len(codes) - len(alive), round(seconds, 1), of), alive, timed
 
 
+def working_folder() -> Path:
+    """Where the sample's copy of the checkout and its records of tests lie: kept, since they cost minutes."""
+    of = hashlib.sha256(str(ROOT).encode()).hexdigest()[:8]
+    folder = Path(tempfile.gettempdir()) / f"crosscheck-mutants-{of}"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 def head() -> str:
     """Hash of the commit: the seed of what `--check` chooses."""
     return subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
@@ -139,10 +144,17 @@ def main() -> None:
     parser.add_argument("modules", nargs="*", help="modules to mutate; by default the subjects that changed")
     parser.add_argument("--survivors", action="store_true", help="only mutants that survived last time")
     parser.add_argument("--check", type=int, metavar="N", help="run N mutants of one subject, write nothing")
+    parser.add_argument("--sample", type=int, metavar="N", help="draw N mutants of all modules, and run them")
+    parser.add_argument("--seed", type=int, default=1, help="of what --sample draws")
+    parser.add_argument("--again", action="store_true", help="with --sample: what survived meets the tests of now")
     parser.add_argument("--table", action="store_true", help="only write the table, from the scores that are there")
     options = parser.parse_args()
     if unknown := [module for module in options.modules if module not in SUBJECTS]:
         raise SystemExit(f"{unknown[0]}: stands in SUBJECTS with no tests")
+    if options.sample:
+        sample(options.seed, options.sample, working_folder(), options.again)
+        write_table()
+        return
     stale = [module for module in SUBJECTS if not is_current(module)]
     if options.check:
         check(stale, options.check)

@@ -101,3 +101,17 @@ def test_an_envelope_is_told_of_numbers_as_text_holds_them():
 def test_two_points_give_no_exponent():
     assert power_law([1.0, 2.0], [1.0, 2.0]) is None
     assert power_law([3.0, 3.0, 3.0], [1.0, 2.0, 3.0]) is None
+
+
+def test_drift_is_of_halves():
+    """Medians of 2 and 6."""
+    assert drift([1.0, 3.0, 4.0, 8.0]) == 2.0
+    assert drift([1.0, 3.0, 9.0, 4.0, 8.0]) == 3.0  # the middle one belongs to the second half: 8 over 2
+
+
+def test_an_interval_leaves_a_fortieth_out_at_either_end():
+    """Ten of 400 resampled medians lie below it and ten above."""
+    samples = np.random.default_rng(6).random(2000)
+    found = spread(samples)
+    medians = np.sort(np.median(samples[np.random.default_rng(2000).integers(0, 2000, (400, 2000))], axis=1))
+    assert medians[9] < found.low < medians[10] < medians[389] < found.high < medians[390]

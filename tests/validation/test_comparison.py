@@ -188,6 +188,8 @@ def test_families_hold_rows_of_one_kind_direction_and_metric_the_largest_first()
     assert [family.changes for family in found if len(family.changes) > 1] == [(largest, first)]
     assert next(family for family in found if len(family.changes) > 1).first is largest
     assert len(found) == 8 and found[0].first.kind is Kind.FLIP
+    # Numbers that are no series are families of their own.
+    assert len(families([CHANGE, replace(CHANGE, metric="sink"), replace(CHANGE, metric="sink", params="n=3")])) == 2
 
 
 @pytest.mark.parametrize(

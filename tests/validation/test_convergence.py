@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
+from validation.questions import convergence as questions
 from validation.questions.convergence import Limit, convergence, extrapolations, limit_of, observed_order, richardson
 from validation.scenes.parts import PHASES
 
@@ -148,6 +150,7 @@ def test_what_has_too_few_errors_says_so():
 def test_a_level_is_three_errors_that_hardly_differ_over_a_factor_of_four():
     assert said([9.0, 0.54, 0.45, 0.4]) == (Limit.ELSEWHERE, "levels off at an error of 0.4")
     assert said([9.0, 0.541, 0.45, 0.4])[0] is not Limit.ELSEWHERE
+    assert said([0.1, 0.54, 0.45, 0.4])[0] is Limit.ELSEWHERE  # what came before the three is no part of the level
     assert said([0.5, 0.45, 0.4], [0.1, 0.05, 0.0251])[0] is not Limit.ELSEWHERE
     assert said([0.5, 0.45, 0.4], [0.1, 0.05, 0.025])[0] is Limit.ELSEWHERE
     assert said([9.0, 0.5, 0.45, 0.4], [0.2, 0.05, 0.04, 0.03])[0] is not Limit.ELSEWHERE  # .05 to .03 s
@@ -164,9 +167,9 @@ def test_an_order_is_told_with_its_error_and_judged_at_two_of_them():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("slope", "clear"), [(2.1, True), (1.9, False), (2.9, True)])
-def test_an_order_counts_from_two_standard_errors_on(sign, slope, clear):
+@pytest.mark.parametrize("a", [0.1, 0.5])
+def test_an_order_counts_from_two_standard_errors_on(a, sign, slope, clear):
     """Four steps whose logarithms scatter so that the standard error is known: of + - - + it is sqrt(2/5)/log 2 a."""
-    a = 0.1
     scatter = np.array([a, -a, -a, a])
     error = math.sqrt(float(scatter @ scatter) / 2.0 / (5.0 * math.log(2.0) ** 2))
     errors = np.exp(scatter + sign * slope * error * np.log(DTS[:4]))
@@ -196,6 +199,7 @@ def test_a_fall_to_round_off_is_told_with_its_step():
     assert said([1e-11, 1.34e-11, 1e-15])[0] is Limit.TRUTH
     assert said([1e-11, 1.36e-11, 1e-15])[0] is Limit.NOISY
     assert said([1e-3, 1e-12, 1e-15])[0] is Limit.TRUTH  # at the floor is round-off, two steps before the end
+    assert said([1e-3, 1e-15, 1e-12, 1e-15])[0] is Limit.TRUTH  # and a rise to it is none
 
 
 def test_two_positive_errors_have_a_slope_and_no_standard_error():
@@ -210,6 +214,9 @@ def test_differences_that_are_equal_or_steps_that_are_nearly_in_proportion():
     assert richardson(DTS[:3], [3.0, 2.0, 1.0]) is None  # they do not shrink
     assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-7)], [1.4, 1.2, 1.1]) is not None
     assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-5)], [1.4, 1.2, 1.1]) is None
+    # A part in a million of the ratio, however large that is.
+    assert richardson([16.0 * (1.0 + 0.5e-6), 4.0, 1.0], [1.4, 1.2, 1.1]) is not None
+    assert richardson([16.0 * (1.0 + 1.5e-6), 4.0, 1.0], [1.4, 1.2, 1.1]) is None
     order, limit, band = richardson([4.0, 2.0, 1.0], [9.0, 5.0, 3.0])
     assert (order, limit, band) == (1.0, 1.0, 2.5)  # the band is a quarter wider than the correction of 2
     assert richardson([4.0, 2.0, 1.0], [1e9, 1.0, 0.0])[0] == 6.0  # beyond, it is round-off's
@@ -248,6 +255,8 @@ def test_an_extrapolation_says_of_which_cell_and_number_it_is():
         ((0.6, 0.5, 0.3), Limit.NOISY, "differences do not shrink with one sign"),
         ((0.1, 0.4, 0.3), Limit.NOISY, "differences do not shrink with one sign"),
         ((9.0, 0.0, 0.1, 0.3), Limit.NOT, "differences grow"),
+        ((0.0, 0.3, -0.1), Limit.NOT, "differences grow"),  # further off than the first, though not than the second
+        ((0.5, 0.4, 0.2, 0.2, 0.2), Limit.ELSEWHERE, f"the same value at every step, {TRUTH + 0.2:.6g}"),
     ],
 )
 def test_values_that_cannot_be_extrapolated_have_a_reason(offsets, limit, because):
@@ -299,3 +308,44 @@ def test_cells_beside_the_declared_ones_and_moved_ones_have_no_part_in_an_error(
     wrong = [replace(cell, metrics={"rebound_ratio": (9.0, "")}) for cell in moved]
     (whole,) = convergence([*wrong, other, *cells])
     assert whole.errors == pytest.approx(DTS[:2], rel=1e-9)
+
+
+def test_an_order_of_nothing_over_few_steps_falls_nor_grows():
+    """Errors of exactly one have the order 0 with no scatter; the steps are too near each other for a level."""
+    assert said([1.0] * 3, [0.1, 0.06, 0.05]) == (Limit.NOISY, "order 0.00 +- 0.00: neither falling nor level")
+
+
+def test_differences_that_are_the_same_do_not_grow():
+    found = extrapolated(0.25, 0.5, 0.75)  # away from the truth, which is .43
+    assert (found.limit, found.because) == (Limit.NOISY, "differences do not shrink with one sign")
+
+
+def test_what_is_the_same_but_for_round_off_is_the_value_of_the_finest_step():
+    """Round-off of the values is 1e-12: the last one is within twice that of the truth, the one before it is not."""
+    found = extrapolated(TRUTH + 2.6e-12, TRUTH + 2.4e-12, TRUTH + 1.8e-12)
+    assert found.limit is Limit.TRUTH and found.value == TRUTH + 1.8e-12
+    found = extrapolated(9.0, 8.0, 3e-13, 2e-13, 1e-13)
+    assert (found.value, found.because) == (1e-13, "the same value at every step, 1e-13")
+
+
+def test_round_off_of_small_values_is_that_of_a_large_truth():
+    """A thousand times the gravity, a truth of some 40 m/s^2: values that differ by 3e-11 are the same."""
+
+    def cell(dt, value):
+        own = slide(dt, value)
+        return replace(own, slot=replace(own.slot, params=(("g", 1e3), ("ratio", 1.1))))
+
+    (found,) = extrapolations([cell(dt, value) for dt, value in zip(DTS, (0.0, 3e-11, 0.0), strict=False)])
+    assert found.truth == pytest.approx(TRUTH / 9.81 * 1e3) and found.because.startswith("the same value at every step")
+
+
+def test_a_truth_without_a_bound_and_a_bound_without_a_truth_are_shown_and_not_extrapolated(monkeypatch):
+    cells = [slide(dt, 1.0 + dt) for dt in DTS[:3]]
+    whole = CATALOGUE["incline"]
+    for changes in ({"truth": None}, {"bound": None}):
+
+        def rule(scene, dt, truth, changes=changes):
+            return [replace(check, **changes) for check in whole.rule(scene, dt, truth)]
+
+        monkeypatch.setattr(questions, "resolve", lambda name, rule=rule: replace(whole, rule=rule))
+        assert extrapolations(cells) == []

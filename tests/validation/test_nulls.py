@@ -95,6 +95,8 @@ def test_what_touches_at_the_start_is_one_from_the_start_however_large_the_scene
     assert perfectly_inelastic(scene_of(*near), DT).twist[0, :, 0] == pytest.approx([1.0, 1.0])
     apart = [disc("a", 0.0, 0.0, spin=3.0), disc("b", 1.0 + 4e-9, 0.0)]
     assert perfectly_inelastic(scene_of(*apart), DT).twist[-1, 0, 2] == 3.0  # two radii and 4e-9 m do not touch
+    nearly = [disc("a", 0.0, 0.0, spin=3.0), disc("b", 1.0 + 2.5e-9, 0.0)]
+    assert perfectly_inelastic(scene_of(*nearly), DT).twist[-1, 0, 2] == 3.0  # 2e-9 m is a share of 1e-9 of it
     far = disc("c", 1e3, 5.0)
     assert perfectly_inelastic(scene_of(*apart, far), DT).twist[-1, 0, 2] == 0.0  # of a scene of 1 km they do
 
@@ -216,3 +218,27 @@ def test_of_a_large_sweep_no_null_is_asked(monkeypatch):
     rows = judged(*(Slot("impact", (("e", e),), 2, "chipmunk", "tuned", DT) for e in (0.1, 0.2)))
     monkeypatch.setattr(nulls, "MOST_CELLS", 1)
     assert null_rows(rows) == [] and with_skill(rows) == rows
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_value_that_is_no_number_is_none(monkeypatch, value):
+    monkeypatch.setattr(nulls, "_measured", lambda *asked: {"did nothing": {"rebound_ratio": (value, "divided by 0")}})
+    assert nulls_of("impact", 2, {}, DT, "rebound_ratio", 0.8) == [Null("did nothing", None, None, "divided by 0")]
+
+
+def test_the_row_of_a_null_is_that_of_the_engine_with_its_own_answer_and_nothing_of_a_run():
+    """Everything of the check and the cell stays; what belongs to the engine's run is empty."""
+    pytest.importorskip("pymunk")
+    row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT, 7)) if r.metric == "rebound_ratio")
+    asked = replace(row, engine_version="9", state_hash="0a", steps=3, wall_time_s=2.0, log="said", floor=0.5,
+                    initial_change=["moved"], certificate="holds", standing="new", reason="off")  # fmt: skip
+    found = {guess.profile: guess for guess in null_rows([asked])}
+    own = {"engine": NO_ENGINE, "engine_version": "", "state_hash": "", "steps": 0, "wall_time_s": 0.0, "log": "",
+           "floor": None, "initial_change": [], "certificate": "", "standing": None, "outcome": "ok", "cells": [],
+           "iterations": None, "physics": "fail", "reason": ""}  # fmt: skip
+    for name, value in (("did nothing", 0.0), ("free flight", -1.0)):
+        slot = {**asked.slot, "engine": NO_ENGINE, "profile": name, "iterations": None}
+        worth = 1.0 - abs(value - 0.8) / 0.8
+        wanted = replace(asked, profile=name, value=value, error=value - 0.8, slot=slot, skill=pytest.approx(worth),
+                         null="did nothing", **own)  # fmt: skip
+        assert found[name].as_dict() == wanted.as_dict()

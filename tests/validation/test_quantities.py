@@ -8,7 +8,7 @@ import pytest
 from adapters.engine import Contacts
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import ContactRecord, Trajectory
-from validation.files.quantities import force_window, quantity, unit
+from validation.files.quantities import force_window, parts_of, quantity, unit
 from validation.metrics import UNAVAILABLE
 
 
@@ -148,3 +148,11 @@ def test_a_force_that_is_not_there_says_why():
     blank = pushed(2, [[(0, 1, (math.nan, math.nan))]] * 16)
     assert quantity(scene_of(2), blank, "ball.fy") == (None, UNAVAILABLE)
     assert quantity(scene_of(2), blank, "top.fy") == (0.0, "")
+
+
+def test_names_of_bodies_may_hold_dots_and_slashes():
+    """The quantity stands after the last dot; a slash parts two bodies where both sides are the name of one."""
+    assert parts_of("box.1.y") == (None, "box.1", "y")
+    names = {"a", "a/b", "c"}
+    assert parts_of("a/b/c.fy", names) == ("a/b", "c", "fy")  # there is no body b/c
+    assert parts_of("a/b/c.fy", {"a", "b/c", "c"}) == ("a", "b/c", "fy")

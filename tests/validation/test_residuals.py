@@ -2,15 +2,16 @@
 
 import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.cells import Slot
-from validation.questions.residuals import LAWS, ask, measured, residuals
+from validation.questions.residuals import LAWS, Residuals, ask, measured, residuals
 from validation.running.apart import Apart
 
 DT, MASS, G, MU = 0.01, 2.0, 10.0, 0.5
@@ -110,3 +111,83 @@ def test_real_engines_are_asked_in_a_process_of_their_own():
     assert found.contacts > 100 and found.values["cone"][0] < 1e-6
     assert lost == "no answer: BrokenProcessPool" and again == found
     assert measured(Slot("impact", (), 3, "chipmunk", "tuned", 1 / 240)).refused
+
+
+def touching(dimension, bodies, row, pairs, twists, gravity=None, dt=DT):
+    """Bodies of these twists before and after one step at whose end one contact is reported."""
+    scene = Scene("toy", 1, dimension, bodies, pairs, gravity or (0.0,) * dimension, dt)
+    pose = np.array([[body.pose for body in scene.bodies]] * 2, float)
+    record = ContactRecord(np.array([1]), np.array([0, 1]), Contacts.from_rows([row], dimension))
+    return scene, Trajectory(np.array([0.0, dt]), pose, np.array(twists, float), record, dt, "completed")
+
+
+def test_a_ball_in_space_slips_by_what_its_spin_leaves_of_its_speed():
+    """3 m/s, less half a metre times 2 rad/s, are 2 m/s; a quarter of the load pushes that way, over g dt = 8 m/s."""
+    flat, up = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    floor = Body("floor", HalfSpace(up), motion="fixed")
+    ball = Body(
+        "ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0), (3.0, 0.0, 0.0, 0.0, 2.0, 0.0)
+    )
+    twist = [[0.0] * 6, [3.0, 0.0, 0.0, 0.0, 2.0, 0.0]]
+    row = (0, 1, flat, up, (0.25, 0.0, 1.0), 0.0)
+    found = values(
+        residuals(*touching(3, (floor, ball), row, (Pair(friction=0.5),), [twist] * 2, (0.0, 0.0, -80.0), 0.1))
+    )
+    assert found["slip"] == pytest.approx(0.25 * 2.0 / 8.0) and found["cone"] == found["separation"] == 0.0
+
+
+def test_two_that_move_together_do_not_slip_and_have_the_friction_of_their_own_pair():
+    left, right = (Body(name, Disc(0.5), 1.0, 0.1, (x, 5.0, 0.0)) for name, x in (("left", 0.0), ("right", 1.0)))
+    floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+    pairs = (Pair("left", "right", 0.0, 0.25), Pair("floor", "*", 0.0, 0.0))
+    twist = [[0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0, 0.0]]
+    row = (1, 2, (0.5, 5.0), (1.0, 0.0), (1.0, 0.25), 0.0)
+    found = values(residuals(*touching(2, (floor, left, right), row, pairs, [twist] * 2, (0.0, -1.0))))
+    assert (found["slip"], found["cone"], found["separation"]) == (0.0, 0.0, 0.0)
+
+
+def test_what_rides_on_a_belt_does_not_slip_and_its_force_is_a_load():
+    """2 m/s on a belt of 2 m/s; a force of 4 N takes it to 2.02 m/s in the step."""
+    belt = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
+    rider = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0), force=(4.0, 0.0))
+    twists = [[[0.0] * 3, [2.0 - 0.01, 0.0, 0.0]], [[0.0] * 3, [2.0 + 0.01, 0.0, 0.0]]]
+    row = (0, 1, (0.0, 0.0), (0.0, 1.0), (0.0, WEIGHT), 0.0)
+    found = values(residuals(*touching(2, (belt, rider), row, (Pair(friction=MU),), twists, (0.0, -G))))
+    assert found["slip"] == pytest.approx(0.0, abs=1e-12) and found["momentum"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_momentum_that_is_missing_is_that_of_the_worst_step():
+    told = values(residuals(*sliding(impulse=(0.0, 0.25 * WEIGHT))))
+    assert told["momentum"] == pytest.approx(0.2)  # a quarter of the weight too much, over 5/4 of it, in every step
+
+
+def nothing(reason):
+    return dict.fromkeys(LAWS, (None, reason))
+
+
+def test_why_there_is_nothing_is_said_of_every_law():
+    scene, found = sliding()
+    assert residuals(scene, replace(found, contacts=None)) == (nothing("the engine reports no contacts"), 0)
+    empty = ContactRecord(np.array([1]), np.array([0, 0]), Contacts.from_rows([], 2))
+    assert residuals(scene, replace(found, contacts=empty)) == (nothing("nothing touched"), 0)
+    found.contacts.rows.impulse[:] = 0.0
+    assert residuals(scene, found) == (nothing("no contact carried anything"), 5)
+
+
+class Silent:
+    def ask(self, *asked):
+        return "no answer: killed"
+
+
+def test_a_cell_that_is_refused_breaks_or_is_lost_says_so_of_itself():
+    slot = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
+    assert ask(slot, Silent()) == Residuals(slot, nothing("no answer: killed"), 0, "no answer: killed")
+    unknown = Slot("impact", (), 2, "nobody", "tuned", 1 / 240)
+    lost = measured(unknown)
+    assert "nobody" in lost.refused and lost == Residuals(unknown, nothing(lost.refused), 0, lost.refused)
+    pytest.importorskip("pymunk")
+    spatial = Slot("impact", (), 3, "chipmunk", "tuned", 1 / 240)
+    refused = measured(spatial)
+    assert "planar" in refused.refused and refused == Residuals(spatial, nothing(refused.refused), 0, refused.refused)
+    two, three = (Slot("stack", (("n", n),), 2, "chipmunk", "tuned", 1 / 60) for n in (2.0, 3.0))
+    assert measured(two).slot == two and measured(three).contacts > measured(two).contacts > 0

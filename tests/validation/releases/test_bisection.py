@@ -153,3 +153,19 @@ def test_a_release_that_names_no_reason_has_that_of_its_rows():
 
     found = bisect(3, [SLOT], "rebound_ratio", Refusing([0.5, None, 0.4]))
     assert "no wheel" in found.silent[1]
+
+
+def test_a_value_that_moves_twice_is_told_with_what_it_was_in_the_two_releases_that_are_named():
+    """It fails everywhere, and is .35 in the end: the release that is found is where it first left .4."""
+    found = bisect(4, [SLOT], "rebound_ratio", Engine([0.4, 0.4, 0.37, 0.35], noise=1e-5))
+    assert (found.before, found.after) == (1, 2)
+    assert "0.4" in found.change.before and "0.37" in found.change.after
+
+
+def test_values_that_creep_within_their_floor_are_told_by_the_ends():
+    """No two neighbours differ by more than the floor, of either of two cells; first and last do."""
+    other = replace(SLOT, params=(("e", 0.6), ("v", 4.0)))
+    engine = Engine([0.4, 0.4 + 0.9e-3, 0.4 + 1.8e-3, 0.4 + 2.7e-3], noise=1e-3)
+    found = bisect(4, [SLOT, other], "rebound_ratio", engine)
+    assert isinstance(found, Found) and found.after == found.before + 1
+    assert "0.4" in found.change.before and "0.4027" in found.change.after

@@ -39,6 +39,9 @@ def test_a_ball_is_dropped_from_its_clearance(dimension):
 )
 def test_it_runs_past_rest_and_for_six_arcs_if_it_never_rests(e, end):
     assert scene(e=e).duration == pytest.approx(end, rel=1e-12)
+    # From four times the height everything takes twice as long, but for the quarter of a second.
+    late = 2.0 * end if e == 1.0 else 2.0 * end - 0.25
+    assert scene(e=e, height=4.0 * HEIGHT).duration == pytest.approx(late, rel=1e-12)
     assert bounce.rest_time(e, HEIGHT, G) == (math.inf if e == 1.0 else pytest.approx(0.5 * (1.0 + e) / (1.0 - e)))
 
 
@@ -168,3 +171,61 @@ def test_the_quick_suite_drops_from_sixteen_heights_and_at_four_restitutions():
     ]
     full = {(v.params["e"], round(v.params["height"], 2)) for v in CATALOGUE["bounce"].full}
     assert full == {(e, round(1.0 + 0.01 * k, 2)) for e in (0.5, 0.8, 0.95, 1.0) for k in range(16)}
+
+
+def test_a_ball_from_four_metres_falls_for_a_second():
+    """It leaves the floor with 4 m/s, is up at 1 m half a second later and down again after a whole one."""
+    for t, height in ((0.5, 3.0), (1.0, 0.0), (1.5, 1.0), (2.0, 0.0), (2.25, 0.25), (3.5, 0.0)):
+        assert bounce.clearance(0.5, 4.0, G, t) == pytest.approx(height, abs=1e-9)
+
+
+def test_all_five_apexes_count_where_all_are_resolved():
+    """The fifth arc starts with 4/32 m/s, above twenty steps of gravity at 1/2048 s, .078 m/s."""
+    exact = tuple(0.25**n for n in range(1, 6))
+    assert bounce.apex_error(scene(), 1 / 2048, apexes(*exact)) == (0.0, "")
+    last = (*exact[:4], exact[4] + 0.5)
+    assert bounce.apex_error(scene(), 1 / 2048, apexes(*last)) == (0.5, "")
+
+
+def test_what_is_resolved_goes_by_the_speed_of_the_whole_fall():
+    """From 2 m it lands with sqrt(32) = 5.66 m/s; half of that is above twenty steps of 8 m/s^2/80, 2 m/s."""
+    assert bounce.apex_error(scene(height=2.0), 1 / 80, apexes(0.5, 9.0, 9.0, 9.0, 9.0)) == (0.0, "")
+
+
+@pytest.mark.parametrize(("speed", "counts"), [(0.24, False), (0.26, True), (0.36, True)])
+def test_motion_counts_from_two_steps_of_gravity_on(speed, counts):
+    """At 1/64 s that is .25 m/s: for the end of motion, and for an arc to be one."""
+    made = scene()
+    found = sampled(made)
+    found.twist[:, 1, 1] = 0.0
+    found.twist[70, 1, 1], found.twist[71, 1, 1] = speed, -speed
+    found.pose[:, 1, 1] = 0.5
+    found.pose[70:72, 1, 1] = 0.5 + 0.125
+    measured = bounce.measure(made, found)
+    assert measured["rest_time"] == (72 / 64 if counts else 0.0, "")
+    assert measured["apex[1]"][0] == pytest.approx(0.140625 if counts else 0.0)  # of 0, 1/8, 1/8, 0 m
+
+
+def test_an_interval_that_its_own_errors_may_swallow_has_no_bound():
+    """Intervals of 3/8 and 3/16 s after arcs of 2, 1 and .5 m/s; the errors of the speeds take up to 3/8 s or more."""
+    for errors in ([1.0, 1.0, 0.0], [9.0, 0.0, 0.0]):
+        assert bounce._interval_check(0.5, HEIGHT, G, 1 / 8, errors, 0.5).bound == np.inf
+    # The first interval may be shorter by 1/4 s + 1/8 s less a hair: what is left of it is that hair.
+    hair = 2.0**-20
+    tight = bounce._interval_check(0.5, HEIGHT, G, 1 / 8, [1.0, 1.0 - 8.0 * hair, 0.0], 0.5)
+    assert tight.bound == pytest.approx((0.25 - hair + 0.5 * (0.375 - hair)) / hair)
+    # An error of the third arc alone is one of the second interval alone, 9/8 s of it.
+    late = bounce._interval_check(0.5, HEIGHT, G, 1 / 8, [0.0, 0.0, 8.0], 0.5)
+    assert late.bound == pytest.approx((1.125 + 0.5 * 0.125) / 0.25)
+
+
+def test_rest_at_a_step_that_tells_one_bounce():
+    """The ball lands with 4 m/s, twice g dt at 1/4 s: one bounce, a tail of 8 dt, four times its scatter, one step."""
+    found = {check.metric: check.bound for check in bounce.checks(scene(), 1 / 4, bounce.exact(scene()))}
+    scatter = 4.0 * (1.0 - 0.25) / 0.5 * 0.289 * 2.0 / (1.0 - 0.5)
+    assert found["rest_time"] == pytest.approx((1.0 + 8.0 + scatter + 1.0) / 4)
+
+
+def test_every_restitution_is_dropped_from_every_height():
+    made = [dict(variation.params) for variation in bounce._from_all_heights(0.25, 0.75)]
+    assert made == [{"e": e, "height": pytest.approx(1.0 + 0.01 * k)} for e in (0.25, 0.75) for k in range(16)]

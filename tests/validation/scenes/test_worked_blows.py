@@ -221,3 +221,11 @@ def test_speeds_are_told_halfway_to_the_wall_and_at_the_end_of_what_ended_early(
     assert {metric: found[metric] for metric in ("speed[1]", "speed[2]", "speed[3]")} == {
         "speed[1]": (3.0 * 64, ""), "speed[2]": (330.0, ""), "speed[3]": (330.0, ""),
     }  # fmt: skip
+
+
+def test_the_ways_that_meet_are_those_of_the_two_samples_around_the_blow():
+    """What the ball did two samples before is no part of it: it was faster then, and somewhere else."""
+    canonical, scene = made("closing_wall", **CLOSING)
+    record = thrown_once(scene, (6.0, 6.0 - 0.5 / 64), (1.0, -1.0))
+    record.twist[127, 2, 0], record.pose[127, 2, 0] = 2.0, 5.0
+    assert canonical.measure(scene, record)["time[1]"] == (pytest.approx(2.0 + 0.25 / 64, abs=1e-12), "")

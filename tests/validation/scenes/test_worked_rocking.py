@@ -88,6 +88,10 @@ def test_friction_that_a_rocking_board_needs_is_asked_for():
     made("rocker", **{**BOARD, "mu": 1.01 * needed})
     with pytest.raises(SceneError, match=r"rocker\.mu"):
         made("rocker", **{**BOARD, "mu": 0.99 * needed})
+    # Friction and load both go with gravity: a twentieth of it changes nothing.
+    made("rocker", **{**BOARD, "g": 0.4, "mu": 1.01 * needed})
+    with pytest.raises(SceneError, match=r"rocker\.mu"):
+        made("rocker", **{**BOARD, "g": 0.4, "mu": 0.99 * needed})
 
 
 def test_what_a_rocking_board_forgives():
@@ -155,7 +159,10 @@ def test_boards_at_their_limits_are_refused(params, named):
 
 
 def test_what_is_measured_of_a_rocking_board():
-    """Half a turn of a cosine a swing, in two fifths of its angle, rolling but for 1/50 m; a yaw of 0.5 once."""
+    """Half a turn of a cosine a swing, in two fifths of its angle, rolling but for 1/50 m; a yaw of 0.5, twice.
+
+    It begins a tenth of a metre off where it should be, and a hundredth more in the next sample: no slip from there on.
+    """
     canonical, scene = made("rocker", 3, **BOARD)
     swing = canonical.exact(scene)["swing_time"]
     t = np.arange(round(scene.duration / DT) + 1) * DT
@@ -164,13 +171,13 @@ def test_what_is_measured_of_a_rocking_board():
     spin = -0.4 * THETA * np.pi / own * np.sin(np.pi * t / own)
     pose = np.array([[body.pose for body in scene.bodies]] * len(t))
     twist = np.zeros((len(t), 2, 6))
-    slipped = 0.02 * (np.arange(len(t)) == 7)
+    slipped = 0.1 + 0.02 * (np.arange(len(t)) == 7) - 0.01 * (np.arange(len(t)) == 1)
     rolled = R * phi + slipped
     pose[:, 1, 0] = -(R + H) * np.sin(phi) + rolled * np.cos(phi)
     pose[:, 1, 2] = (R + H) * np.cos(phi) + rolled * np.sin(phi)
     pose[:, 1, 3:] = np.column_stack([np.cos(phi / 2), 0 * phi, -np.sin(phi / 2), 0 * phi])
     twist[:, 1, 4] = -spin
-    twist[9, 1, [3, 5]] = (0.3, 0.4)
+    twist[9, 1, [3, 5]] = twist[11, 1, [3, 5]] = (0.3, 0.4)
     found = canonical.measure(scene, Trajectory(t, pose, twist, None, DT, "completed"))
     assert found == {
         "swing_time": (pytest.approx(own, rel=1e-5), ""),
@@ -183,3 +190,28 @@ def test_what_is_measured_of_a_rocking_board():
     stopped.pose[t > 0.8 * swing] = stopped.pose[np.argmax(t > 0.8 * swing)]
     stopped.twist[t > 0.8 * swing] = 0.0
     assert canonical.measure(scene, stopped)["swing_time"] == (None, "it never gets there")
+
+
+def swinging(scene, period, share):
+    """A board that swings in ``period`` [s] from side to side, by ``share`` (of times) of its first tilt."""
+    t = np.arange(round(scene.duration / DT) + 1) * DT
+    phi = share(t) * THETA * np.cos(np.pi * t / period)
+    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
+    twist = np.zeros((len(t), 2, 3))
+    pose[:, 1, 2], twist[:, 1, 2] = phi, -share(t) * THETA * np.pi / period * np.sin(np.pi * t / period)
+    return Trajectory(t, pose, twist, None, DT, "completed")
+
+
+def test_the_amplitude_is_that_of_the_last_side():
+    """It loses a quarter of its tilt after two swings and a quarter."""
+    canonical, scene = made("rocker", **BOARD)
+    swing = canonical.exact(scene)["swing_time"]
+    found = canonical.measure(scene, swinging(scene, swing, lambda t: np.where(t < 2.25 * swing, 1.0, 0.75)))
+    assert found["amplitude"] == (pytest.approx(0.75, rel=1e-3), "")
+
+
+def test_a_board_that_is_level_at_the_wrong_time_has_no_swings():
+    """In three quarters of its time it is level the third time before the last swing has begun; then no more."""
+    canonical, scene = made("rocker", **BOARD)
+    fast = swinging(scene, 0.75 * canonical.exact(scene)["swing_time"], np.ones_like)
+    assert canonical.measure(scene, fast)["swing_time"] == (None, "it never gets there")

@@ -1,0 +1,88 @@
+"""The sample of all mutants as it is kept: sample.csv, and its part of score.md."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+from scipy.stats import binomtest
+from subjects import PACKAGES
+
+DRAWN = Path(__file__).resolve().parent / "sample.csv"
+#: Engines that are set apart: their tests are skipped where they are not installed.
+APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx"))
+#: Seconds of CPU of a test file that are recorded, and of tests that are run against one mutant.
+RECORDED, SPENT = 4.0, 15.0
+KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
+#: Verdicts that count as noticed: what only time ended is noticed as well.
+NOTICED = (KILLED, TIMED)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A mutant that was drawn, and what became of it.
+
+    ``of`` is the hash of everything that could be drawn, ``now`` what became of a survivor since, with tests that were
+    written for it: the estimate is made of ``verdict`` alone, for what is mended because it was drawn says nothing of
+    the others.
+    """
+
+    seed: int
+    number: int
+    of: str
+    module: str
+    function: str
+    change: str
+    verdict: str
+    tests: int
+    failed: str
+    now: str = ""
+    reason: str = ""
+
+
+def stored() -> list[Drawn]:
+    """What was drawn before."""
+    if not DRAWN.exists():
+        return []
+    with DRAWN.open(newline="", encoding="utf-8") as stream:
+        return [Drawn(**{**row, **{key: int(row[key]) for key in ("seed", "number", "tests")}})
+                for row in csv.DictReader(stream)]  # fmt: skip
+
+
+def write(rows: list[Drawn]) -> None:
+    """Write what was drawn, in place of the sample before."""
+    with DRAWN.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(field.name for field in fields(Drawn))
+        writer.writerows(astuple(row) for row in sorted(rows, key=lambda row: row.number))
+
+
+def table(rows: list[Drawn]) -> list[str]:
+    """Lines for score.md: share that is noticed with its exact (Clopper-Pearson) 95 % interval, and the survivors."""
+    if not rows:
+        return []
+    noticed = [row for row in rows if row.verdict in NOTICED]
+    interval = binomtest(len(noticed), len(rows)).proportion_ci(0.95, method="exact")
+    lines = [
+        "", "## A sample of all modules", "",
+        f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {rows[0].seed} from all of the "
+        f"three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
+        f"A mutant met the tests that reach its function, from the cheapest on, for up to {SPENT:g} s of CPU, of those "
+        f"that a test file begins within {RECORDED:g} s; a survivor may be one that other tests notice.", "",
+        f"**{len(noticed)} of {len(rows)} are noticed, {100.0 * len(noticed) / len(rows):.1f} % (95 %: "
+        f"{100.0 * interval.low:.1f} to {100.0 * interval.high:.1f} %).**", "",
+        "| package | drawn | killed | ended by time | survived | no test reaches it | test fails without it |",
+        "|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for package in PACKAGES:
+        own = [row.verdict for row in rows if row.module.startswith(f"{package}/")]
+        each = (own.count(verdict) for verdict in (KILLED, TIMED, SURVIVED, UNREACHED, UNSHOWN))
+        lines.append(f"| {package} | {len(own)} | {' | '.join(map(str, each))} |")
+    lines += ["", "Those that are not noticed; *since* is what tests that were written for them make of them:", "",
+              "| function | change | verdict | since | reason |", "|---|---|---|---|---|"]  # fmt: skip
+    for row in rows:
+        if row.verdict not in NOTICED:
+            change = row.change.replace("|", "\\|")
+            lines.append(f"| {row.function} | `{change}` | {row.verdict} | {row.now} | {row.reason} |")
+    return lines

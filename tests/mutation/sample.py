@@ -1,0 +1,177 @@
+"""A sample of the mutants of all modules: how many of them do the tests notice?
+
+    every mutant of the three packages -> N of them, drawn by a seed -> the tests that reach each -> sample.csv
+
+`SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
+likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
+its function (`reach`) run from the cheapest on, until one fails or what a mutant may cost is spent. It *survived* if
+none failed, for whatever reason: what it may cost was spent, or no test is known to reach it. So the share that is
+killed is a lower bound. A kill counts only if the test that failed passes in the copy without a mutant.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import tempfile
+from collections.abc import Sequence
+from contextlib import chdir
+from dataclasses import replace
+from pathlib import Path
+
+from checkout import copy_of_the_checkout
+from drawn import APART, KILLED, NOTICED, RECORDED, SPENT, SURVIVED, TIMED, UNREACHED, UNSHOWN, Drawn, stored, write
+from libcst import FunctionDef, Module
+from mutmut.configuration import config
+from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
+from mutmut.mutation.trampoline_templates import mangle_function_name
+from pytest_apart import OUT_OF_TIME, import_common, run
+from reach import PLUGIN, by_function, dotted, environment, record
+from subjects import PACKAGES, ROOT
+
+#: Exit status of pytest where a test that is named is not there.
+NOT_FOUND = 4
+
+
+def modules() -> list[str]:
+    """Modules that mutants are drawn from."""
+    found = sorted(str(path.relative_to(ROOT)) for name in PACKAGES for path in (ROOT / name).rglob("*.py"))
+    return [name for name in found if not name.startswith(APART)]
+
+
+def mutations_of(module: str) -> tuple[Module, list[tuple[str, Mutation]]]:
+    """Every mutation of a module's functions and methods, each with mutmut's name for its function."""
+    tree, mutations, _, _ = create_mutations(module, (ROOT / module).read_text(encoding="utf-8"))
+    owner = {
+        method: node.name.value
+        for node in tree.body
+        if hasattr(node, "name") and not isinstance(node, FunctionDef)
+        for method in getattr(node.body, "body", ())
+    }
+    named = []
+    for mutation in mutations:
+        function = mutation.contained_by_top_level_function
+        if isinstance(function, FunctionDef):
+            name = mangle_function_name(name=function.name.value, class_name=owner.get(function))
+            named.append((f"{dotted(module)}.{name}", mutation))
+    return tree, named
+
+
+def counts(cache: Path) -> dict[str, int]:
+    """Number of mutants of every module; what was counted of the same text is remembered."""
+    known: dict[str, int] = json.loads(cache.read_text(encoding="utf-8")) if cache.exists() else {}
+    found = {}
+    for module in modules():
+        text = hashlib.sha256((ROOT / module).read_bytes()).hexdigest()
+        if text not in known:
+            known[text] = len(mutations_of(module)[1])
+        found[module] = known[text]
+    cache.write_text(json.dumps(known), encoding="utf-8")
+    return found
+
+
+def draw(seed: int, number: int, total: int) -> list[int]:
+    """Draw so many different mutants of ``total``; more of them begin with the same ones."""
+    source, chosen = random.Random(seed), dict[int, None]()
+    while len(chosen) < min(number, total):
+        chosen.setdefault(source.randrange(total))
+    return list(chosen)
+
+
+def change_of(tree: Module, mutation: Mutation) -> str:
+    """``old -> new``: the lines of the function in which the mutant differs."""
+    function = mutation.contained_by_top_level_function
+    assert function is not None
+    spoilt = deep_replace(function, mutation.original_node, mutation.mutated_node)
+    old, new = ([line.strip() for line in tree.code_for_node(node).strip().splitlines()]
+                for node in (function, spoilt))  # type: ignore[arg-type] # fmt: skip
+    while old and new and old[0] == new[0]:
+        del old[0], new[0]
+    while old and new and old[-1] == new[-1]:
+        del old[-1], new[-1]
+    return f"{' '.join(old)} -> {' '.join(new)}"
+
+
+def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
+    """Draw, run and write down; what is written already of this seed and these sources is not run again."""
+    copy, records = folder / "copy", folder / "records"
+    copy_of_the_checkout(copy)
+    record(copy, records, RECORDED)
+    reach = by_function(records)
+    import_common()
+    (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
+    with chdir(folder):
+        config()  # read where it stands, and then remembered
+    each = counts(folder / "counts.json")
+    total = sum(each.values())
+    of = hashlib.sha256(b"".join((ROOT / module).read_bytes() for module in each)).hexdigest()[:12]
+    found = {row.number: row for row in stored() if (row.seed, row.of) == (seed, of)}
+    last = ""
+    for k, index in enumerate(draw(seed, number, total)):
+        if k in found and not (again and found[k].verdict not in NOTICED and found[k].now != KILLED):
+            continue
+        module, place = located(each, index)
+        if module != last:
+            tree, mutations = mutations_of(module)
+            last = module
+        function, mutation = mutations[place]
+        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
+        assert isinstance(spoilt, Module)
+        verdict, tests, failed = judged(copy, module, spoilt.code, reach.get(function, {}))
+        if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
+            verdict = UNSHOWN  # it fails without the mutant as well
+        if k in found:
+            found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
+        else:
+            found[k] = Drawn(seed, k, of, module, function, change_of(tree, mutation), verdict, tests, failed)
+        print(f"{k + 1} of {number}: {verdict}, {found[k].function}: {found[k].change[:100]}", flush=True)
+        write(list(found.values()))
+    return list(found.values())
+
+
+def located(each: dict[str, int], index: int) -> tuple[str, int]:
+    """Module of a mutant by its number among all, and its place among those of the module."""
+    for module, number in each.items():
+        if index < number:
+            return module, index
+        index -= number
+    raise IndexError(index)
+
+
+def judged(copy: Path, module: str, source: str, tests: dict[str, float]) -> tuple[str, int, str]:
+    """Verdict over one mutant, how many tests were asked, and the one that failed."""
+    chosen, spent = list[str](), 0.0
+    for test, seconds in sorted(tests.items(), key=lambda item: (item[1], item[0])):
+        if chosen and spent + seconds > SPENT:
+            break
+        chosen.append(test)
+        spent += seconds
+    if not chosen:
+        return UNREACHED, 0, ""
+    path = copy / module
+    before, times = path.read_bytes(), path.stat()
+    try:
+        path.write_text(source, encoding="utf-8")
+        code, failed = asked(copy, chosen, 60.0 + 4.0 * spent)
+        if code == NOT_FOUND:  # a file that cannot be imported, or tests that are made of what has changed
+            files = dict.fromkeys(test.partition("::")[0] for test in chosen)
+            code, failed = asked(copy, list(files), 60.0 + 4.0 * spent)
+    finally:
+        path.write_bytes(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    if code == OUT_OF_TIME:
+        return TIMED, len(chosen), ""
+    return (SURVIVED if code in (0, NOT_FOUND, 5) else KILLED), len(chosen), failed
+
+
+def asked(copy: Path, tests: Sequence[str], cpu_seconds: float) -> tuple[int, str]:
+    """Exit status of these tests in the copy as it is, and the first that failed."""
+    with tempfile.TemporaryDirectory(prefix="crosscheck-sample-") as text:
+        folder = Path(text)
+        (folder / "tests").write_text("\n".join(tests), encoding="utf-8")
+        arguments = ["-p", PLUGIN, f"@{folder / 'tests'}"]
+        code = run(copy, arguments, environment(copy, folder, float("inf")), cpu_seconds)
+        said = (folder / "failed").read_text(encoding="utf-8") if (folder / "failed").exists() else ""
+        return code, next(iter(said.splitlines()), "")
