@@ -17,11 +17,17 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.means import means
 from adapters.needs import Needs
-from adapters.newton.profiles import PROFILES, checked
+from adapters.newton.profiles import PROFILES, TUNED_ITERATIONS, checked
+from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
 from adapters.newton.simulation import NewtonSimulation, imported
+from adapters.probes import GRAVITY, SLIDE_TIME
+from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
 from adapters.settings import checked_step
 from adapters.single_precision import without_a_place
+
+#: Most that the mass of a box is above what its corner feels, on any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 + c^2).
+LEAST_SHARE = 7.0
 
 
 @final
@@ -116,8 +122,28 @@ class NewtonEngine(Engine):
         return NewtonSimulation(scene, dt, chosen)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing yet that differs from what is asked."""
-        return {}
+        """What two sweeps leave of an approach, what stopping takes, and rebounds without friction."""
+        declared, sweeps = {}, TUNED_ITERATIONS if profile == "tuned" else ITERATIONS
+        left = (1.0 - RELAXATION) ** sweeps
+        if needs.regime == "impact" and needs.restitution == 0.0 and left > self.facts.epsilon:
+            # Two steps of a ball: the first leaves a share of its overlap, which the second pushes out.
+            most = left * (1.0 - 2.0 * left)
+            because = "what is left of an overlap is pushed out in the step after"
+            declared["restitution"] = Declared(0.5 * most, 0.5 * most + self.facts.round_off, because)
+        # Each sweep stops what is slow and tells its impulse all the same. What a sweep is asked for falls by the share
+        # of an overlap that it takes back, for a box on four corners a seventh of the relaxation or more.
+        stopped = STOPPED * min(sweeps, LEAST_SHARE / RELAXATION)
+        because = "impulses of sweeps that end below 0.1 mm/s are told, and are not kept"
+        band = stopped / (GRAVITY * dt) + self.facts.round_off
+        declared["impulse"] = Declared(1.0, band, because)
+        if needs.friction > 0.0 and needs.restitution > 0.0 and profile != "tuned":
+            # A corner that came in at over 2 g dt is thrown back, by an impulse of at most (1 + e) 3 g dt a mass.
+            most = (1.0 + needs.restitution) * (LEAST_APPROACH + 1.0) * dt / SLIDE_TIME
+            because = "rebounds of what rocks carry no friction"
+            declared["friction"] = Declared(
+                needs.friction * (1.0 - 0.5 * most), needs.friction * (0.5 * most + FRICTION_SHARE), because
+            )
+        return declared
 
     def kernels(self) -> Path | None:
         """Warp's folder of kernels, which it keeps for each of its releases."""

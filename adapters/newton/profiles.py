@@ -69,7 +69,11 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
 def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for what the scene needs."""
     changed = {
-        "iterations": (TUNED_ITERATIONS, "what two sweeps leave of an overlap is a speed, and of a slip creep", "derived"),
+        "iterations": (
+            TUNED_ITERATIONS,
+            "what two leave of an overlap is a speed, of a slip creep",
+            "derived",
+        ),
         "torsional": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_torsional"),
         "rolling": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_rolling"),
         "gap": (max(GAP, needs.top_speed * dt), "nothing crosses it unseen within a step", "derived"),

@@ -218,9 +218,14 @@ class NewtonSimulation(Simulation):
             return Contacts.from_rows([], 3)
         held, count = self.touching, int(self.touching.rigid_contact_count.numpy()[0])
         force = self.told.contact_f.numpy()[:count, :3].astype(float)
-        shapes = [part.numpy()[:count] for part in (held.rigid_contact_shape0, held.rigid_contact_shape1)]
-        local = [part.numpy()[:count].astype(float) for part in (held.rigid_contact_point0, held.rigid_contact_point1)]
-        offsets = [part.numpy()[:count].astype(float) for part in (held.rigid_contact_offset0, held.rigid_contact_offset1)]
+        shapes, local, offsets = (
+            [part.numpy()[:count] for part in parts]
+            for parts in (
+                (held.rigid_contact_shape0, held.rigid_contact_shape1),
+                (held.rigid_contact_point0, held.rigid_contact_point1),
+                (held.rigid_contact_offset0, held.rigid_contact_offset1),
+            )
+        )
         margins = held.rigid_contact_margin0.numpy()[:count] + held.rigid_contact_margin1.numpy()[:count]
         normals = held.rigid_contact_normal.numpy()[:count].astype(float)
         bodies = self.model.shape_body.numpy()
