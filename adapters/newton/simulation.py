@@ -6,7 +6,8 @@ graph, as it does on GPUs, and replays the same launches on the same arrays in 0
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -27,6 +28,7 @@ def imported() -> tuple[Any, Any]:
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
+    _without_a_word(warp.init)
     import newton
     from newton._src.geometry import narrow_phase
 
@@ -34,6 +36,18 @@ def imported() -> tuple[Any, Any]:
     for name in ("create_narrow_phase_kernel_gjk_mpr", "create_narrow_phase_primitive_kernel"):
         setattr(narrow_phase, name, cache(getattr(narrow_phase, name)))
     return warp, newton
+
+
+def _without_a_word(start: Callable[[], None]) -> None:
+    """Start Warp, which says on standard error, from C, that there is no GPU: that does not matter here."""
+    with open(os.devnull, "w") as nothing:
+        held = os.dup(2)
+        os.dup2(nothing.fileno(), 2)
+        try:
+            start()
+        finally:
+            os.dup2(held, 2)
+            os.close(held)
 
 
 def turned(quaternion: tuple[float, ...], spin: tuple[float, ...], time: float) -> Array:

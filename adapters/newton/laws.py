@@ -1,0 +1,59 @@
+"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.law import Deviation, exactly
+from adapters.newton.motion import motion_law
+from adapters.newton.profiles import PROFILES
+
+_SWEPT = "overlaps and slips are taken back by a share in each sweep, and what a sweep leaves or adds is a velocity"
+_REBOUNDS = "rebounds come after the sweeps, from approaches before them, without friction, and numbers are singles"
+_ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
+_PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
+
+#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook.
+MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect")),
+    "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),
+    "head_on": (_REBOUNDS, ("rebound_ratio", "first_speed", "second_speed", "momentum_defect", "impulse")),
+    "stacked_balls": (_REBOUNDS, ("small_speed", "large_speed", "energy_lost")),
+    "cradle": (_PAIRS, ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6)))),
+    "rack": (_PAIRS, ("momentum_defect", "energy_defect")),
+    "galperin": (_REBOUNDS, ("small_speed", "large_speed", "energy_defect")),
+    "flat_box": (_REBOUNDS, ("rebound_ratio", "edge_speed")),
+    "kane": (_REBOUNDS, ("rise", "ahead", "spin", "gain")),
+    "oblique": (_REBOUNDS, ("rebound_ratio", "forward_speed", "sideways", "spin_speed")),
+    "edge_drop": (_REBOUNDS, ("rise", "spin")),
+    "incline": (_SWEPT, ("creep", "acceleration")),
+    "slide": (_SWEPT, ("hop", "turned", "braking", "stopping_distance", "end_speed")),
+    "rolling_spin": (_ROLLS, ("astray", "speed", "spin")),
+    "roll_incline": (_ROLLS, ("acceleration", "turning")),
+    "masse": (_ROLLS, ("final_vx", "final_vy")),
+    "slide_to_roll": (_ROLLS, ("final_speed",)),
+    "rocking_block": (_SWEPT, ("amplitude", "landing", "slid")),
+    "tilt_table": (_SWEPT, ("edge_moved", "moved", "passing_spin", "passing_time", "turned")),
+    "pivot": (_SWEPT, ("edge_moved", "passing_time")),
+    "position_correction": (_SWEPT, ("launched",)),
+    "overlap": (_SWEPT, ("centre_moved", "thrown")),
+    "pressed_box": (_SWEPT, ("creep", "acceleration")),
+    "v_groove": (_SWEPT, ("load",)),
+    "rod_gas": (_REBOUNDS, ("astray", "energy_defect", "wrong_speed")),
+}
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "newton",
+        (profile,),
+        scene,
+        exactly(metric),
+        motion_law(metric, profile),
+        because,
+        "xpbd/kernels.py, xpbd/restitution_kernels.py; recurrence in adapters/newton/motion.py",
+        ("1.8.",),
+    )
+    for profile in PROFILES
+    for scene, (because, metrics) in MOTIONS.items()
+    for metric in metrics
+)
