@@ -28,7 +28,6 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "edge_drop": (_REBOUNDS, ("rise", "spin")),
     "incline": (_SWEPT, ("creep", "acceleration")),
     "slide": (_SWEPT, ("hop", "turned", "braking", "stopping_distance", "end_speed")),
-    "rolling_spin": (_ROLLS, ("astray", "speed", "spin")),
     "roll_incline": (_ROLLS, ("acceleration", "turning")),
     "masse": (_ROLLS, ("final_vx", "final_vy")),
     "slide_to_roll": (_ROLLS, ("final_speed",)),

@@ -110,7 +110,7 @@ class Contacts:
 
 
 class Motion:
-    """Free balls and boxes among fixed half-spaces, their state and its steps; the last row of an array is the world."""
+    """Free balls and boxes among fixed half-spaces, their state and steps; the last row of an array is the world."""
 
     def __init__(
         self, scene: Scene, dt: float, chosen: Mapping[str, Any], kind: type[np.floating[Any]], off: float
