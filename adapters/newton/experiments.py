@@ -36,3 +36,10 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
         ("tuned", "down", {}),
     )
 )
+EXPERIMENTS += tuple(
+    Experiment(
+        "rocker-rolling-friction", "where nothing resists rolling it passes", "default", "rocker", "amplitude",
+        {"rolling": 0.0}, params, idle=(_WHOLE, _AHEAD),
+    )
+    for params in ({}, {"tilt": 5.0})
+)  # fmt: skip
