@@ -40,9 +40,9 @@ from adapters.trajectory import ContactRecord, Trajectory
 
 #: Sweeps over the contacts of one pair in each sweep over rebounds. [_restitution_manifold_inner_iterations]
 INNER = 8
-#: How many times the difference between doubles and singles a metric may be off. The engine's order of the same operations
-#: is another draw of the same roundings; of two draws the larger is below a fifth of their scatter once in forty, and 32
-#: of it are six scatters.
+#: How many times the difference between doubles and singles a metric may be off. The engine's order of the same
+#: operations is another draw of the same roundings; of two draws the larger is below a fifth of their scatter once in
+#: forty, and 32 times that are six scatters.
 ROUNDINGS = 32.0
 #: Starts from which singles are asked, as shares of places: each has other roundings, of an overlap over dt first.
 STARTS = (0.0, 3.0 * 2.0**-23)
