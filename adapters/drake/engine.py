@@ -133,8 +133,8 @@ class DrakeEngine(Engine):
             because = APPROXIMATE[profile]
             # A convex step keeps to its cone whatever it lifts: friction is at most mu times the load. Lagged's is not.
             half = 0.5 * needs.friction
-            most = Declared(half, half + FRICTION_SHARE * needs.friction, f"{because}: less than asked, never more")
-            told = Declared(needs.friction, UNTOLD, because) if profile == "default" else most
+            capped = Declared(half, half + FRICTION_SHARE * needs.friction, f"{because}: less than asked, never more")
+            told = Declared(needs.friction, UNTOLD, because) if profile == "default" else capped
             declared |= {"friction": told, "friction_impulse": told}
             if (
                 profile == "sap"

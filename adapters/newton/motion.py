@@ -304,7 +304,7 @@ class Motion:
             gained_v, gained_w = np.zeros_like(self.v), np.zeros_like(self.w)
             fired = np.zeros(len(self.x), self.kind)
             for i, j in pairs:
-                rows = np.flatnonzero((a == i) & (b == j))
+                rows = [int(k) for k in np.flatnonzero((a == i) & (b == j))]
                 v, w = {i: self.v[i], j: self.v[j]}, {i: self.w[i], j: self.w[j]}
 
                 def parts(k: int, v: Any = v, w: Any = w, i: int = i, j: int = j) -> Any:
@@ -373,7 +373,7 @@ class _Key:
 
 
 @lru_cache(maxsize=16)  # the kinds and starts of two cells, whose rows follow each other
-def _moved(key: _Key, dt: float, profile: str, kind: type[np.floating[Any]], off: float) -> Trajectory | None:
+def _moved(key: _Key, dt: float, profile: str, single: bool, off: float) -> Trajectory | None:
     scene = key.scene
     spatial = scene if scene.dimension == 3 else lift(scene)
     steps = step_count(scene.duration, dt)
@@ -382,7 +382,7 @@ def _moved(key: _Key, dt: float, profile: str, kind: type[np.floating[Any]], off
     boxes = any(isinstance(body.shape, Box) for body in spatial.bodies)
     if not followed(spatial) or steps * (chosen["iterations"] if boxes else 2) > MOST_SWEEPS:
         return None
-    motion = Motion(spatial, dt, chosen, kind, off)
+    motion = Motion(spatial, dt, chosen, np.float32 if single else np.float64, off)
     pose = np.repeat(np.array([[each.pose for each in spatial.bodies]], float), steps + 1, axis=0)
     twist = np.repeat(np.array([[each.twist for each in spatial.bodies]], float), steps + 1, axis=0)
     rows: list[list[tuple[int, int, Any, Any, Any, float]]] = []
@@ -407,14 +407,12 @@ def _moved(key: _Key, dt: float, profile: str, kind: type[np.floating[Any]], off
     return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, told, dt, "completed")
 
 
-def moved(
-    scene: Scene, dt: float, profile: str, kind: type[np.floating[Any]] = np.float64, off: float = 0.0
-) -> Trajectory | None:
-    """The motion of a scene, every step, in numbers of this kind; None for a scene that is not `followed`.
+def moved(scene: Scene, dt: float, profile: str, single: bool = False, off: float = 0.0) -> Trajectory | None:
+    """The motion of a scene, every step, in doubles or singles; None for a scene that is not `followed`.
 
     ``off``: share of their places by which bodies start elsewhere.
     """
-    return _moved(_Key(scene), dt, profile, kind, off)
+    return _moved(_Key(scene), dt, profile, single, off)
 
 
 def motion_law(metric: str, profile: str) -> Law:
@@ -429,8 +427,8 @@ def motion_law(metric: str, profile: str) -> Law:
             return None
         apart = 2.0**-24 * abs(value)
         for off in STARTS:
-            single = moved(scene, dt, profile, np.float32, off)
-            other = None if single is None else measure(scene, single)[metric][0]
+            rounded = moved(scene, dt, profile, True, off)
+            other = None if rounded is None else measure(scene, rounded)[metric][0]
             if other is None:
                 return None
             apart = max(apart, abs(value - other))

@@ -189,7 +189,7 @@ def test_another_relaxation_would_be_another_motion(monkeypatch):
     motion._moved.cache_clear()
     other, _ = motion_law("rebound_ratio", "default")(scene, DT, impact.measure)
     motion._moved.cache_clear()
-    assert abs(other - said) > 100.0 * band
+    assert abs(other - said) > 10.0 * band
 
 
 def test_scenes_of_which_the_recurrence_knows_nothing_are_left_alone():
