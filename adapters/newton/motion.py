@@ -372,7 +372,7 @@ class _Key:
         return hash(self.told)
 
 
-@lru_cache(maxsize=16)  # the kinds and starts of two cells, whose rows follow each other
+@lru_cache(maxsize=512)  # a tenth of a megabyte each: rows of a cell need not follow each other
 def _moved(key: _Key, dt: float, profile: str, single: bool, off: float) -> Trajectory | None:
     scene = key.scene
     spatial = scene if scene.dimension == 3 else lift(scene)
