@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
-EXTRAS := box2d,box2d3,rapier,dart,physx,drake
+EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
 .PHONY: run test recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
 

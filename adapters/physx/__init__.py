@@ -2,7 +2,7 @@
 
 shipped        numbers of the engine
 profiles       settings with their reasons
-translation    materials of pairs as one number per body, poses of half-spaces
+translation    poses of half-spaces, and of what turns
 simulation     one world
 engine         the adapter
 laws           what it does by design

@@ -14,11 +14,11 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
+from adapters.means import means
 from adapters.needs import Needs
 from adapters.physx.profiles import PROFILES, checked
 from adapters.physx.shipped import ANGULAR_DAMPING, BOUNCE_THRESHOLD
 from adapters.physx.simulation import PhysxSimulation
-from adapters.physx.translation import means
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import ROUNDINGS
 from adapters.scene import Scene

@@ -14,7 +14,8 @@ import numpy as np
 from adapters.drives import place_after, velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.impulses import along_normal
-from adapters.physx.translation import means, turn_to, turned
+from adapters.means import means
+from adapters.physx.translation import turn_to, turned
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
 #: Worlds that live, and the size each was made for: the engine beneath them is one per process.

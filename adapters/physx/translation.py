@@ -1,7 +1,4 @@
-"""A scene in PhysX's terms: materials of pairs as one number per body, planes with their poses.
-
-PhysX takes the mean of two bodies' restitutions and of their frictions, as SAPIEN leaves it (PxCombineMode::eAVERAGE).
-"""
+"""A scene in PhysX's terms: poses of planes, and of what turns as prescribed."""
 
 from __future__ import annotations
 
@@ -11,11 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adapters.engine import Array
-from adapters.meeting import Meeting, representable
-from adapters.scene import Scene
 
-#: What a solution of linear equations in doubles may miss of a number of order 1.
-ROUNDING = 1e-12
 #: Turns that take the x axis, which a plane looks along, to each axis of the world; halves, so that singles hold them
 #: exactly (w, x, y, z).
 _ALONG = {
@@ -26,30 +19,6 @@ _ALONG = {
     (2, 1): (0.5, -0.5, -0.5, -0.5),
     (2, -1): (0.5, 0.5, 0.5, -0.5),
 }
-
-
-def means(scene: Scene, coefficient: str) -> list[float] | None:
-    """Numbers of bodies of which each pair's ``coefficient`` is the mean; None if there are none that are allowed.
-
-    A restitution lies in [0, 1], a friction is not negative: a number outside would be another material to the engine.
-    """
-    return representable(scene, lambda pairs: _means(scene, pairs, coefficient))
-
-
-def _means(scene: Scene, meetings: Sequence[Meeting], coefficient: str) -> list[float] | None:
-    pairs = [(i, j, float(getattr(material, coefficient))) for i, j, material in meetings]
-    values = {value for _, _, value in pairs}
-    if len(values) == 1:
-        return [values.pop()] * len(scene.bodies)
-    rows = np.zeros((len(pairs), len(scene.bodies)))
-    for row, (i, j, _) in enumerate(pairs):
-        rows[row, [i, j]] = 0.5
-    from scipy.optimize import lsq_linear
-
-    wanted = np.array([value for _, _, value in pairs])
-    most = 1.0 if coefficient == "restitution" else np.inf
-    found = lsq_linear(rows, wanted, (0.0, most), method="bvls", tol=1e-15).x
-    return None if np.abs(rows @ found - wanted).max(initial=0.0) > ROUNDING else [float(x) for x in found]
 
 
 def turn_to(normal: tuple[float, ...]) -> tuple[float, float, float, float]:

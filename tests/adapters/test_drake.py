@@ -110,6 +110,14 @@ def test_friction_of_tamsi_is_a_cone(heading):
     assert (3.0 - speed) / (0.3 * 9.81 * 0.25) == pytest.approx(1.0, rel=2e-3)
 
 
+@pytest.mark.parametrize(("profile", "told"), [("sap", True), ("similar", True), ("tamsi", True), ("default", False)])
+def test_a_receipt_sees_friction_that_is_more_than_was_asked_for(profile, told):
+    """Half as much again: what is declared of the two that glide has an end upwards, though none is known downwards."""
+    declared = ENGINE.declares(profile, needs(resting(0.5)), DT).get("friction")
+    found = 0.75
+    assert (declared is None or abs(found - declared.value) > declared.band) == told
+
+
 def test_a_box_slides_on_its_face_by_a_surface_and_tips_on_a_point():
     slid = resting(0.3, twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     level = abs(drive(slid, "tamsi").twist[-20:, 1, 3:]).max()

@@ -11,12 +11,13 @@ pytest.importorskip("sapien", reason="PhysX is set apart: pip install 'contact-c
 from adapters.conformance import items
 from adapters.drives import Harmonic
 from adapters.engine import EngineError
+from adapters.means import means
 from adapters.needs import needs
 from adapters.physx import PhysxEngine
 from adapters.physx.laws import DEVIATIONS
 from adapters.physx.shipped import FRICTION_GAP, TOLERANCE_LENGTH
 from adapters.physx.simulation import imported
-from adapters.physx.translation import means, turn_to
+from adapters.physx.translation import turn_to
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
 from adapters.stepping import run

@@ -1,0 +1,145 @@
+"""Newton's XPBD solver behind the plugin line: spatial, position-based contact, single precision.
+
+    step:  detect  ->  v += g dt, x += v dt  ->  n sweeps: each contact takes back its overlap, friction its slip, and
+           v with them  ->  rebounds, on velocities alone
+
+Overlaps of a step's end are taken back, all contacts at once; a body gets the mean of what its contacts ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from types import MappingProxyType
+from typing import Any, final
+
+from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.means import means
+from adapters.needs import Needs
+from adapters.newton.profiles import PROFILES, TUNED_ITERATIONS, checked
+from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
+from adapters.newton.simulation import NewtonSimulation, imported
+from adapters.probes import GRAVITY, SLIDE_TIME
+from adapters.receipts import FRICTION_SHARE
+from adapters.scene import Scene
+from adapters.settings import checked_step
+from adapters.single_precision import without_a_place
+
+#: Most that the mass of a box is above what its corner feels, on any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 + c^2).
+LEAST_SHARE = 7.0
+
+
+@final
+class NewtonEngine(Engine):
+    """Spatial engine; see the module's docstring for its step."""
+
+    facts = EngineFacts(
+        name="newton",
+        title="Newton (XPBD)",
+        package="newton",
+        dimensions=frozenset({3}),
+        scheme=Scheme("detect, forces and position, then contacts on positions", 1),
+        customary_dt=1.0 / 600.0,
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        precision="single",
+        apart=True,
+        abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "hull"}),
+        quirks=(
+            Quirk(
+                "restitution is ignored unless the solver is asked for it",
+                "asked for where a scene has any",
+                "SolverXPBD, enable_restitution",
+            ),
+            Quirk(
+                "materials of a pair are means of two bodies' numbers",
+                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "xpbd/kernels.py, _solve_body_contact_positions",
+            ),
+            Quirk(
+                "what rubs resists rolling and spinning as well, by 0.1 mm and 5 mm of the load",
+                "left alone in `default` where a body has friction; not in `tuned`",
+                "ModelBuilder.ShapeConfig, mu_rolling and mu_torsional",
+            ),
+            Quirk(
+                "a body slower than 0.1 mm/s is stopped, and so is a spin below 0.1 mrad/s",
+                "left alone",
+                "xpbd/kernels.py, apply_body_deltas",
+            ),
+            Quirk(
+                "two bodies with different numbers of contacts get different impulses from the one they share",
+                "left alone; impulses of such a contact are a mean",
+                "SolverXPBD, rigid_contact_con_weighting",
+            ),
+            Quirk(
+                "impulses are told of positions alone",
+                "where rebounds are solved as well impulses are not stated (NaN)",
+                "SolverXPBD, ObservableKind.CONTACT_F; xpbd/solver_xpbd.py: rebounds come after it",
+            ),
+            Quirk(
+                "kernels are compiled at the first steps, into Warp's own cache",
+                "left alone: the first cells on a machine take 35 s of CPU more, which no later ones do",
+                "warp.config.kernel_cache_dir, ~/.cache/warp; measured: 41 s of CPU and 6 MB for all of them",
+            ),
+            Quirk(
+                "a step costs a millisecond of launches",
+                "a step is recorded once and replayed by Warp, to the same bits",
+                "warp.ScopedCapture; measured: 1.2 ms and 0.03 ms",
+            ),
+            Quirk(
+                "a body that is moved is never moved by the solver",
+                "placed where its step ends before each step, with the velocity that took it there",
+                "BodyFlags.KINEMATIC, copy_kinematic_body_state_kernel",
+            ),
+        ),
+    )
+    profiles = PROFILES
+
+    def version(self) -> str:
+        """Version of the installed distribution."""
+        imported()  # a release that cannot be imported has no version
+        return version("newton")
+
+    def refuses(self, scene: Scene, profile: str) -> str | None:
+        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        for coefficient in ("restitution", "friction"):
+            if means(scene, coefficient) is None:
+                return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
+        return without_a_place(scene)
+
+    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
+        """Make a world.
+
+        Raises
+        ------
+        EngineError
+            For a scene that `refuses` names, a bad step or setting.
+        """
+        dt, chosen = checked_step(dt), checked(settings)
+        reason = self.refuses(scene, "")
+        if reason:
+            raise EngineError(reason)
+        return NewtonSimulation(scene, dt, chosen)
+
+    def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
+        """What two sweeps leave of an approach, what stopping takes, and rebounds without friction."""
+        declared, sweeps = {}, TUNED_ITERATIONS if profile == "tuned" else ITERATIONS
+        left = (1.0 - RELAXATION) ** sweeps
+        if needs.regime == "impact" and needs.restitution == 0.0 and left > self.facts.epsilon:
+            # Two steps of a ball: the first leaves a share of its overlap, which the second pushes out.
+            most = left * (1.0 - 2.0 * left)
+            because = "what is left of an overlap is pushed out in the step after"
+            declared["restitution"] = Declared(0.5 * most, 0.5 * most + self.facts.round_off, because)
+        # Each sweep stops what is slow and tells its impulse all the same. What a sweep is asked for falls by the share
+        # of an overlap that it takes back, for a box on four corners a seventh of the relaxation or more.
+        stopped = STOPPED * min(sweeps, LEAST_SHARE / RELAXATION)
+        because = "impulses of sweeps that end below 0.1 mm/s are told, and are not kept"
+        band = stopped / (GRAVITY * dt) + self.facts.round_off
+        declared["impulse"] = Declared(1.0, band, because)
+        if needs.friction > 0.0 and needs.restitution > 0.0 and profile != "tuned":
+            # A corner that came in at over 2 g dt is thrown back, by an impulse of at most (1 + e) 3 g dt a mass.
+            most = (1.0 + needs.restitution) * (LEAST_APPROACH + 1.0) * dt / SLIDE_TIME
+            because = "rebounds of what rocks carry no friction"
+            declared["friction"] = Declared(
+                needs.friction * (1.0 - 0.5 * most), needs.friction * (0.5 * most + FRICTION_SHARE), because
+            )
+        return declared

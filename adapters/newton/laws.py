@@ -1,0 +1,91 @@
+"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.law import Deviation, exactly
+from adapters.newton.motion import motion_law
+from adapters.newton.profiles import PROFILES
+from adapters.single_precision import UNIT, Method, rounded_law
+from adapters.unswept import passing_law
+
+_SWEPT = "overlaps and slips are taken back by a share in each sweep, and what a sweep leaves or adds is a velocity"
+_REBOUNDS = "rebounds come after the sweeps, from approaches before them, without friction, and numbers are singles"
+_ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
+_PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
+
+#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook.
+MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect")),
+    "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),
+    "head_on": (_REBOUNDS, ("rebound_ratio", "first_speed", "second_speed", "momentum_defect", "impulse")),
+    "stacked_balls": (_REBOUNDS, ("small_speed", "large_speed", "energy_lost")),
+    "cradle": (_PAIRS, ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6)))),
+    "rack": (_PAIRS, ("momentum_defect", "energy_defect")),
+    "flat_box": (_REBOUNDS, ("rebound_ratio", "edge_speed")),
+    "kane": (_REBOUNDS, ("rise", "ahead", "spin", "gain")),
+    "oblique": (_REBOUNDS, ("rebound_ratio", "forward_speed", "sideways", "spin_speed")),
+    "incline": (_SWEPT, ("creep", "acceleration")),
+    "slide": (_SWEPT, ("hop", "turned", "braking", "stopping_distance", "end_speed")),
+    "roll_incline": (_ROLLS, ("acceleration", "turning")),
+    "masse": (_ROLLS, ("final_vx", "final_vy")),
+    "slide_to_roll": (_ROLLS, ("final_speed",)),
+    "rocking_block": (_SWEPT, ("amplitude", "landing", "slid")),
+    "pivot": (_SWEPT, ("edge_moved", "passing_time")),
+    "position_correction": (_SWEPT, ("launched",)),
+    "overlap": (_SWEPT, ("centre_moved", "thrown")),
+    "pressed_box": (_SWEPT, ("creep", "acceleration")),
+    "v_groove": (_SWEPT, ("load",)),
+    "rod_gas": (_REBOUNDS, ("astray", "energy_defect", "wrong_speed")),
+}
+
+DEVIATIONS: tuple[Deviation, ...] = tuple(
+    Deviation(
+        "newton",
+        (profile,),
+        scene,
+        exactly(metric),
+        motion_law(metric, profile),
+        because,
+        "xpbd/kernels.py, xpbd/restitution_kernels.py; recurrence in adapters/newton/motion.py",
+        ("1.8.",),
+    )
+    for profile in PROFILES
+    for scene, (because, metrics) in MOTIONS.items()
+    for metric in metrics
+)
+
+#: Round-off of a place after a thousand steps, as a share of the way.
+PLACES = 1000.0 * UNIT
+DEVIATIONS += tuple(
+    Deviation(
+        "newton",
+        ("default",),
+        "thin_wall",
+        metric,
+        passing_law(metric, PLACES),
+        "nothing is swept: what is farther than two gaps from a thin body where a step begins, and beyond it where the "
+        "step ends, passes",
+        "ModelBuilder.rigid_gap; motion in adapters/unswept.py",
+        ("1.8.",),
+    )
+    for metric in ("rebound_ratio", "beyond")
+)
+DEVIATIONS += tuple(
+    Deviation(
+        "newton",
+        tuple(PROFILES),
+        scene,
+        exactly(metric),
+        rounded_law(metric, Method(lambda e, speed: e)),
+        "numbers are singles, 2^-24 of their size",
+        "xpbd/restitution_kernels.py, built for floats; motion in adapters/single_precision.py",
+        ("1.8.",),
+    )
+    for scene, metrics in (
+        ("closing_wall", ("speed[1]", "speed[2]", "speed[3]")),
+        ("off_centre", ("momentum_defect",)),
+    )
+    for metric in metrics
+)

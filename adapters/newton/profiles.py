@@ -1,0 +1,92 @@
+"""Profiles of Newton's XPBD solver: settings with their reasons.
+
+default   `SolverXPBD` and its shapes as constructed
+tuned     more sweeps, without friction that no scene asks for
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from adapters import settings
+from adapters.engine import ProfileRule, Setting
+from adapters.needs import Needs
+from adapters.newton.shipped import (
+    GAP,
+    ITERATIONS,
+    REBOUND_ITERATIONS,
+    RELAXATION,
+    ROLLING,
+    TORSIONAL,
+)
+
+#: Sweeps of `tuned`: a fifth to the 50th power is nothing in singles.
+TUNED_ITERATIONS = 50
+KINDS: Mapping[str, settings.Check] = MappingProxyType(
+    {
+        "iterations": settings.whole(1, 10_000),
+        "relaxation": settings.number(1e-6, 2.0),
+        "weighted": settings.flag,
+        "rebounds": settings.flag,
+        "rebound_iterations": settings.whole(1, 10_000),
+        "torsional": settings.number(0.0, 1e9),
+        "rolling": settings.number(0.0, 1e9),
+        "gap": settings.number(0.0, 1e9),
+    }
+)
+_SOLVER, _SHAPE = "SolverXPBD", "ModelBuilder.ShapeConfig"
+
+
+def default_profile(needs: Needs, dt: float) -> list[Setting]:
+    """As constructed; restitution is asked for where the scene has one, since it is off otherwise."""
+    said = "as shipped"
+    return [
+        Setting("iterations", ITERATIONS, f"{said}: sweeps over positions", f"{_SOLVER}, iterations"),
+        Setting(
+            "relaxation", RELAXATION, f"{said}: share of an overlap that a sweep takes back",
+            f"{_SOLVER}, rigid_contact_relaxation",
+        ),
+        Setting(
+            "weighted", True, f"{said}: a body's correction is divided by the number of its contacts",
+            f"{_SOLVER}, rigid_contact_con_weighting",
+        ),
+        Setting(
+            "rebounds", needs.restitution > 0.0, "off as shipped, which ignores restitution: on where a scene has any",
+            f"{_SOLVER}, enable_restitution",
+        ),
+        Setting(
+            "rebound_iterations", REBOUND_ITERATIONS, f"{said}: sweeps over rebounds",
+            f"{_SOLVER}, rigid_contact_restitution_iterations",
+        ),
+        Setting("torsional", TORSIONAL, f"{said}: friction about the normal [m]", f"{_SHAPE}, mu_torsional"),
+        Setting("rolling", ROLLING, f"{said}: friction against rolling [m]", f"{_SHAPE}, mu_rolling"),
+        Setting("gap", GAP, f"{said}: contacts are made so far ahead, of each shape [m]", "ModelBuilder.rigid_gap"),
+    ]  # fmt: skip
+
+
+def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
+    """Best stock settings for what the scene needs."""
+    changed = {
+        "iterations": (
+            TUNED_ITERATIONS,
+            "what two leave of an overlap is a speed, of a slip creep",
+            "derived",
+        ),
+        "torsional": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_torsional"),
+        "rolling": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_rolling"),
+        "gap": (max(GAP, needs.top_speed * dt), "nothing crosses it unseen within a step", "derived"),
+    }
+    return [
+        Setting(each.name, *changed[each.name]) if each.name in changed else each
+        for each in default_profile(needs, dt)
+    ]  # fmt: skip
+
+
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
+
+
+def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
+    return settings.checked("newton", KINDS, asked)

@@ -1,0 +1,315 @@
+"""One Newton model under XPBD and what is read from it; a step is recorded once and replayed.
+
+A step of the solver is some thirty launches of kernels, which cost 1.2 ms of Python on a CPU. Warp records them into a
+graph, as it does on GPUs, and replays the same launches on the same arrays in 0.03 ms, to the same bits.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from adapters.drives import place_after, velocity_over
+from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.means import means
+from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
+
+#: Turn that takes Newton's capsules, along z, to the scene's, along x (x, y, z, w).
+_ALONG_X = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)
+
+
+@cache
+def imported() -> tuple[Any, Any]:
+    """Import Warp and Newton, which say what they do on the terminal otherwise."""
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    _without_a_word(warp.init)
+    import newton
+    from newton._src.geometry import narrow_phase
+
+    # Every pipeline makes the same kernels anew, of the same arguments: 80 ms, and memory that is never given back.
+    for name in ("create_narrow_phase_kernel_gjk_mpr", "create_narrow_phase_primitive_kernel"):
+        setattr(narrow_phase, name, cache(getattr(narrow_phase, name)))
+    return warp, newton
+
+
+def _without_a_word(start: Callable[[], None]) -> None:
+    """Start Warp, which says on standard error, from C, that there is no GPU: that does not matter here."""
+    with open(os.devnull, "w") as nothing:
+        held = os.dup(2)
+        os.dup2(nothing.fileno(), 2)
+        try:
+            start()
+        finally:
+            os.dup2(held, 2)
+            os.close(held)
+
+
+def turned(quaternion: tuple[float, ...], spin: tuple[float, ...], time: float) -> Array:
+    """Quaternion (w, x, y, z) after turning with ``spin`` [rad/s, world axes] for ``time`` [s]."""
+    rate = float(np.linalg.norm(spin))
+    w, x, y, z = quaternion
+    if rate == 0.0:
+        return np.array(quaternion)
+    c, (a, b, d) = np.cos(0.5 * rate * time), np.sin(0.5 * rate * time) / rate * np.asarray(spin)
+    return np.array(
+        [
+            c * w - a * x - b * y - d * z,
+            c * x + a * w + b * z - d * y,
+            c * y + b * w + d * x - a * z,
+            c * z + d * w + a * y - b * x,
+        ]
+    )
+
+
+class NewtonSimulation(Simulation):
+    """One model on the CPU; free and moving bodies are Newton's, shapes of fixed ones belong to its world."""
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+        warp, newton = imported()
+        self.scene, self.dt, self.settings, self.warp = scene, dt, settings, warp
+        self.restitutions, self.frictions = means(scene, "restitution") or [], means(scene, "friction") or []
+        builder = newton.ModelBuilder(gravity=tuple(float(g) for g in scene.gravity))
+        builder.rigid_gap = settings["gap"]
+        #: Newton's number of each of the scene's bodies; -1 for what is fixed.
+        self.numbers = [self._made(newton, builder, index, body) for index, body in enumerate(scene.bodies)]
+        self.model: Any = builder.finalize(device="cpu")
+        self.solver: Any = newton.solvers.SolverXPBD(
+            self.model,
+            iterations=settings["iterations"],
+            rigid_contact_relaxation=settings["relaxation"],
+            rigid_contact_con_weighting=settings["weighted"],
+            enable_restitution=settings["rebounds"],
+            rigid_contact_restitution_iterations=settings["rebound_iterations"],
+        )
+        self.pipeline: Any = newton.CollisionPipeline(self.model)
+        self.touching: Any = self.pipeline.contacts()
+        self.told: Any = self.solver.observables({"contact_f"}, contacts=self.touching)
+        self.now, self.next = self.model.state(), self.model.state()
+        self.control: Any = self.model.control()
+        # Views on the engine's own numbers: on a CPU nothing is copied.
+        self.place, self.speed = self.now.body_q.numpy(), self.now.body_qd.numpy()
+        self._start()
+        self.driven = [k for k, body in enumerate(scene.bodies) if self._is_driven(body)]
+        self.steps = 0
+        self.graph: Any = None
+
+    @staticmethod
+    def _is_driven(body: Body) -> bool:
+        return body.motion == "prescribed" or any(body.surface_velocity)
+
+    # ---- making ------------------------------------------------------------------------------------------------------
+
+    def _made(self, newton: Any, builder: Any, index: int, asked: Body) -> int:
+        """Body and shape of one of the scene's bodies; its number, or -1."""
+        number, place = -1, self._transform(asked)
+        if asked.motion == "free":
+            inertia = self.warp.mat33(*np.diag(np.asarray(asked.inertia, float)).ravel())
+            number = builder.add_body(xform=place, mass=asked.mass, inertia=inertia, lock_inertia=True)
+        elif self._is_driven(asked):
+            number = builder.add_body(xform=place, is_kinematic=True, lock_inertia=True)
+        config = newton.ModelBuilder.ShapeConfig(
+            density=0.0,
+            mu=self.frictions[index],
+            restitution=self.restitutions[index],
+            mu_torsional=self.settings["torsional"] if self.frictions[index] > 0.0 else 0.0,
+            mu_rolling=self.settings["rolling"] if self.frictions[index] > 0.0 else 0.0,
+        )
+        self._shape(newton, builder, number, asked, None if number >= 0 else place, config)
+        return int(number)
+
+    def _transform(self, asked: Body) -> Any:
+        if isinstance(asked.shape, HalfSpace):
+            return self.warp.transform_identity()
+        w, x, y, z = asked.pose[3:]
+        return self.warp.transform(asked.pose[:3], (x, y, z, w))
+
+    def _shape(self, newton: Any, builder: Any, number: int, asked: Body, place: Any, config: Any) -> None:
+        shape, warp = asked.shape, self.warp
+        if isinstance(shape, HalfSpace):
+            plane = (*(float(n) for n in shape.normal), -float(shape.offset))
+            builder.add_shape_plane(plane=plane, width=0.0, length=0.0, body=number, cfg=config)
+        elif isinstance(shape, Sphere):
+            builder.add_shape_sphere(number, xform=place, radius=shape.radius, cfg=config)
+        elif isinstance(shape, Capsule):
+            along = warp.transform((0.0, 0.0, 0.0), _ALONG_X)
+            along = along if place is None else place * along
+            builder.add_shape_capsule(
+                number, xform=along, radius=shape.radius, half_height=shape.half_length, cfg=config
+            )
+        elif isinstance(shape, Hull):
+            builder.add_shape_convex_hull(number, xform=place, mesh=_mesh(newton, shape), cfg=config)
+        else:
+            assert isinstance(shape, Box)
+            x, y, z = shape.half_extents
+            builder.add_shape_box(number, xform=place, hx=x, hy=y, hz=z, cfg=config)
+
+    def _start(self) -> None:
+        """Twists and loads of the scene; a state's forces stay until they are cleared."""
+        loads = self.now.body_f.numpy()
+        for asked, number in zip(self.scene.bodies, self.numbers, strict=True):
+            if number < 0:
+                continue
+            self.speed[number] = asked.twist
+            if asked.motion == "free":
+                loads[number] = (*asked.force, *asked.torque)
+            elif asked.motion == "fixed":
+                self.speed[number] = (*asked.surface_velocity, 0.0, 0.0, 0.0)
+
+    # ---- stepping ----------------------------------------------------------------------------------------------------
+
+    def _solve(self) -> None:
+        """One step of the solver: contacts where the step begins, then positions; the state is ready for the next."""
+        self.pipeline.collide(self.now, self.touching)
+        self.solver.step(self.now, self.next, self.control, self.touching, self.dt, observables=self.told)
+        self.warp.copy(self.now.body_q, self.next.body_q)
+        self.warp.copy(self.now.body_qd, self.next.body_qd)
+
+    def _record(self) -> None:
+        """Load the kernels by a step, record one, which makes it as well, and go back to where the world was."""
+        place, speed = self.place.copy(), self.speed.copy()
+        self._solve()
+        with self.warp.ScopedCapture(device="cpu") as capture:
+            self._solve()
+        self.graph = capture.graph
+        self.place[:], self.speed[:] = place, speed
+
+    def advance(self, steps: int) -> None:
+        """See `Simulation.advance`; a driven body is where its step ends before others move, as they are projected."""
+        if not len(self.place):
+            self.steps += steps
+            return
+        if self.graph is None:
+            self._record()
+        launch = self.warp.capture_launch
+        for _ in range(steps):
+            self.steps += 1
+            for k in self.driven:
+                self._lead(k)
+            launch(self.graph)
+
+    def _lead(self, k: int) -> None:
+        """Say where a driven body is at the end of the step that comes, and how fast it gets there."""
+        body, number = self.scene.bodies[k], self.numbers[k]
+        if body.motion == "fixed" or isinstance(body.shape, HalfSpace):
+            return  # a surface that runs along itself stays where it is
+        time = self.steps * self.dt
+        self.place[number, :3] = place_after(body, time)
+        w, x, y, z = turned(body.pose[3:], body.twist[3:], time)
+        self.place[number, 3:] = (x, y, z, w)
+        self.speed[number, :3] = velocity_over(body, self.dt, self.steps - 1)
+
+    # ---- reading -----------------------------------------------------------------------------------------------------
+
+    def pose(self) -> Array:
+        """See `Simulation.pose`; a half-space's own pose is the scene's."""
+        rows = np.array([body.pose for body in self.scene.bodies], float)
+        for k, (body, number) in enumerate(zip(self.scene.bodies, self.numbers, strict=True)):
+            if number >= 0 and not isinstance(body.shape, HalfSpace):
+                rows[k, :3] = self.place[number, :3]
+                rows[k, 3:] = self.place[number, [6, 3, 4, 5]]
+        return rows
+
+    def twist(self) -> Array:
+        """See `Simulation.twist`; a prescribed body's is the one of the step that was made."""
+        rows = np.zeros((len(self.scene.bodies), 6))
+        for k, (body, number) in enumerate(zip(self.scene.bodies, self.numbers, strict=True)):
+            if number >= 0 and body.motion != "fixed":
+                rows[k] = self.speed[number]
+        return rows
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step; impulses are those of positions, and unknown where rebounds are solved as well.
+
+        Shapes are made in the order of bodies, one each, so that a shape's number is its body's in the scene.
+        """
+        if self.graph is None:
+            return Contacts.from_rows([], 3)
+        held, count = self.touching, int(self.touching.rigid_contact_count.numpy()[0])
+        force = self.told.contact_f.numpy()[:count, :3].astype(float)
+        shapes, local, offsets = (
+            [part.numpy()[:count] for part in parts]
+            for parts in (
+                (held.rigid_contact_shape0, held.rigid_contact_shape1),
+                (held.rigid_contact_point0, held.rigid_contact_point1),
+                (held.rigid_contact_offset0, held.rigid_contact_offset1),
+            )
+        )
+        margins = held.rigid_contact_margin0.numpy()[:count] + held.rigid_contact_margin1.numpy()[:count]
+        normals = held.rigid_contact_normal.numpy()[:count].astype(float)
+        bodies = self.model.shape_body.numpy()
+        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        for k in range(count):
+            numbers = [int(bodies[shapes[side][k]]) for side in (0, 1)]
+            # Overlaps are told between points within the shapes, less what these are thick; offsets lead to surfaces.
+            inner = [self._world(numbers[side], local[side][k]) for side in (0, 1)]
+            outer = [self._world(numbers[side], local[side][k] + offsets[side][k]) for side in (0, 1)]
+            gap = float(normals[k] @ (inner[1] - inner[0])) - float(margins[k])
+            place = 0.5 * (outer[0] + outer[1])
+            # The force is the one on the first body; contacts that were out of reach have none.
+            impulse = np.full(3, np.nan) if self.settings["rebounds"] else -self.dt * force[k]
+            rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], impulse, gap))
+        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
+        return Contacts.from_rows(rows, 3)
+
+    def _world(self, number: int, point: Array) -> Array:
+        if number < 0:
+            return point
+        x, y, z, w = self.place[number, 3:].astype(float)
+        across = np.array([x, y, z])
+        turned_point = point + 2.0 * np.cross(across, np.cross(across, point) + w * point)
+        return np.asarray(self.place[number, :3].astype(float) + turned_point)
+
+    def readback(self) -> dict[str, Any]:
+        """What the model and its solver hold."""
+        model, solver = self.model, self.solver
+        mass, inertia = model.body_mass.numpy(), model.body_inertia.numpy()
+        friction, restitution = model.shape_material_mu.numpy(), model.shape_material_restitution.numpy()
+        return {
+            "dt": self.dt,
+            "gravity": [float(g) for g in model.gravity.numpy()[0]],
+            "iterations": int(solver.iterations),
+            "relaxation": float(solver.rigid_contact_relaxation),
+            "weighted": bool(solver.rigid_contact_con_weighting),
+            "rebounds": bool(solver.enable_restitution),
+            "rebound_iterations": int(solver.rigid_contact_restitution_iterations),
+            "gap": [float(x) for x in model.shape_gap.numpy()],
+            "torsional": [float(x) for x in model.shape_material_mu_torsional.numpy()],
+            "rolling": [float(x) for x in model.shape_material_mu_rolling.numpy()],
+            "bodies": {
+                asked.name: {
+                    "mass": float(mass[number]),
+                    "inertia": [float(inertia[number][axis][axis]) for axis in range(3)],
+                }
+                for asked, number in zip(self.scene.bodies, self.numbers, strict=True)
+                if asked.motion == "free"
+            },
+            "pairs": {
+                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
+                    "restitution": 0.5 * float(restitution[i] + restitution[j]),
+                    "friction": 0.5 * float(friction[i] + friction[j]),
+                }
+                for i, j, _ in self.scene.contact_pairs()
+            },
+        }
+
+
+def _mesh(newton: Any, shape: Hull) -> Any:
+    """Triangles around a hull, looking outwards."""
+    from scipy.spatial import ConvexHull
+
+    vertices = np.array(shape.vertices, float)
+    hull = ConvexHull(vertices)
+    triangles = []
+    for (i, j, k), plane in zip(hull.simplices, hull.equations, strict=True):
+        outwards = np.cross(vertices[j] - vertices[i], vertices[k] - vertices[i]) @ plane[:3] > 0.0
+        triangles.append((i, j, k) if outwards else (i, k, j))
+    mesh = newton.Mesh(vertices.astype(np.float32), np.array(triangles, np.int32).ravel(), compute_inertia=False)
+    if len(mesh.vertices) != len(vertices):
+        raise EngineError(f"shape: newton keeps {len(mesh.vertices)} of {len(vertices)} vertices")
+    return mesh
