@@ -19,7 +19,7 @@ these two is what the band of a law is made of.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -123,7 +123,10 @@ class Motion:
         self.gravity = np.array(scene.gravity, kind)
         self.pull = kind(np.linalg.norm(scene.gravity))
         bodies = [scene.bodies[k] for k in self.free]
-        rows = lambda of, last: np.array([*(of(body) for body in bodies), last], kind)  # noqa: E731
+
+        def rows(of: Callable[[Body], Any], last: Any) -> Numbers:
+            return np.array([*(of(body) for body in bodies), last], kind)
+
         self.lightness = rows(lambda body: 1.0 / body.mass, 0.0)
         self.inertia = rows(lambda body: tuple(np.broadcast_to(body.inertia, 3)), (1.0,) * 3)
         self.softness = rows(lambda body: tuple(1.0 / np.broadcast_to(body.inertia, 3)), (0.0,) * 3)
@@ -195,7 +198,10 @@ class Motion:
             index, flat = np.zeros(0, int), np.zeros(0, self.kind)
             return Contacts(index, index, none, (none, none), (none, none), flat, flat, flat)
         a, b, normals, p, q, r, s, thicks, pairs = zip(*rows, strict=True)
-        some = lambda values: np.array(values, self.kind)  # noqa: E731
+
+        def some(values: Any) -> Numbers:
+            return np.array(values, self.kind)
+
         return Contacts(
             np.array(a), np.array(b), some(normals), (some(p), some(q)), (some(r), some(s)), some(thicks),
             some([pair.friction for pair in pairs]), some([pair.restitution for pair in pairs]),
