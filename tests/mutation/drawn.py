@@ -11,9 +11,9 @@ from subjects import PACKAGES
 
 DRAWN = Path(__file__).resolve().parent / "sample.csv"
 #: Engines that are set apart: their tests are skipped where they are not installed.
-APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx"))
+APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx", "newton"))
 #: Seconds of CPU of a test file that are recorded, and of tests that are run against one mutant.
-RECORDED, SPENT = 4.0, 15.0
+RECORDED, SPENT = 6.0, 40.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
 #: Verdicts that count as noticed: what only time ended is noticed as well.
 NOTICED = (KILLED, TIMED)

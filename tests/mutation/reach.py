@@ -1,10 +1,12 @@
-"""Which tests reach which function of the three packages.
+"""Which tests reach which statements of the three packages.
 
-    copy of the checkout -> every function says that it ran -> each test file once -> test, seconds, functions
+    copy of the checkout -> every block says that it ran -> each test file once -> test, seconds, blocks
 
-A record of a test file is kept beside the copy and made anew when the file changed. What it does not know only makes a
+A block is a run of statements that no branch or loop divides, named by its function and its first line in there. The
+record of a test file is kept beside the copy and made anew when the file changed. What it does not know only makes a
 mutation score smaller: a file is given up after some seconds of CPU, tests that fail or are skipped in the copy reach
-nothing, what a fixture or a cache computed once is reached by the test that came first.
+nothing, what a cache computed once is reached by the test that came first. What a fixture of a whole file computed is
+reached by all of its tests.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from subjects import PACKAGES, ROOT
 LEFT_OUT = ("tests/test_house.py", "tests/reference_solver/", "tests/chaos/", "tests/mutation/")
 #: Name under which the recorder lies in the copy.
 PLUGIN = "recording_of_tests"
-#: Function -> tests that reach it, with their seconds of CPU.
+#: Block -> tests that reach it, with their seconds of CPU.
 Reach = dict[str, dict[str, float]]
 
 
@@ -42,17 +44,47 @@ def dotted(module: str) -> str:
 
 
 def instrumented(source: str, module: str) -> str:
-    """Let every function and method say that it ran, under mutmut's name for it; inner ones belong to the outer."""
+    """Let every block of a function or method say that it ran."""
     tree = ast.parse(source)
     for name, function in functions(tree):
-        docstring = ast.get_docstring(function, clean=False) is not None
-        word = ast.parse(f"_seen_by_tests.add({f'{dotted(module)}.{name}'!r})").body
-        function.body[int(docstring) : int(docstring)] = word
+        for block in blocks(function):
+            key = named(module, name, function, block)
+            docstring = block is function.body and ast.get_docstring(function, clean=False) is not None
+            # Told once a test: a loop's body pays one look into a set.
+            block[int(docstring) : int(docstring)] = ast.parse(
+                f"{key!r} in _seen_by_tests or _seen_by_tests.add({key!r})"
+            ).body
     start = int(ast.get_docstring(tree, clean=False) is not None)
     while start < len(tree.body) and getattr(tree.body[start], "module", "") == "__future__":
         start += 1
     tree.body[start:start] = ast.parse(f"from {PLUGIN} import seen as _seen_by_tests").body
     return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def blocks(function: ast.FunctionDef) -> list[list[ast.stmt]]:
+    """Blocks of a function, outer ones first; what stands in inner functions belongs to the outer."""
+    found = [function.body]
+    for node in ast.walk(function):
+        if node is not function and not isinstance(node, ast.Lambda | ast.IfExp | ast.ClassDef):
+            parts = (getattr(node, part, None) for part in ("body", "orelse", "finalbody"))
+            found += [part for part in parts if isinstance(part, list) and part]
+    return found
+
+
+def named(module: str, name: str, function: ast.FunctionDef, block: list[ast.stmt]) -> str:
+    """Name of a block: mutmut's of its function, and the line in there, so that edits elsewhere leave it."""
+    return f"{dotted(module)}.{name}:{0 if block is function.body else block[0].lineno - function.lineno}"
+
+
+def block_of(source: str, module: str, function: str, line: int) -> str:
+    """Name of the innermost block of a function that has this line of the source; its body for what stands above."""
+    name, found = function.removeprefix(f"{dotted(module)}."), ""
+    for own, node in functions(ast.parse(source)):
+        if own == name:
+            for block in blocks(node):
+                if block is node.body or block[0].lineno <= line <= (block[-1].end_lineno or 0):
+                    found = named(module, name, node, block)
+    return found
 
 
 def functions(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef]]:
@@ -109,17 +141,17 @@ def reached(copy: Path, name: str, seconds: float) -> dict[str, tuple[float, lis
         found: dict[str, set[str]] = defaultdict(set)
         for path in folder.glob("*.reached"):
             for line in path.read_text(encoding="utf-8").splitlines():
-                test, _, function = line.rpartition("\t")
-                found[test].add(function)
+                test, _, block = line.rpartition("\t")
+                found[test].add(block)
         return {test: (cost, sorted(found[test] | found[""])) for test, cost in passed.items()}
 
 
-def by_function(records: Path) -> Reach:
+def by_block(records: Path) -> Reach:
     """Every record, turned round."""
     reach: Reach = defaultdict(dict)
     for name in test_files():
         if (path := record_of(records, name)).exists():
             for test, (seconds, names) in json.loads(path.read_text(encoding="utf-8")).items():
-                for function in names:
-                    reach[function][test] = seconds
+                for block in names:
+                    reach[block][test] = seconds
     return reach

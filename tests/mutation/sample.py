@@ -16,6 +16,7 @@ import json
 import os
 import random
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import chdir
 from dataclasses import replace
@@ -28,7 +29,7 @@ from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, import_common, run
-from reach import PLUGIN, by_function, dotted, environment, record
+from reach import PLUGIN, Reach, block_of, by_block, dotted, environment, record
 from subjects import PACKAGES, ROOT
 
 #: Exit status of pytest where a test that is named is not there.
@@ -99,7 +100,7 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
     copy, records = folder / "copy", folder / "records"
     copy_of_the_checkout(copy)
     record(copy, records, RECORDED)
-    reach = by_function(records)
+    reach = by_block(records)
     import_common()
     (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
     with chdir(folder):
@@ -119,7 +120,8 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
         function, mutation = mutations[place]
         spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
         assert isinstance(spoilt, Module)
-        verdict, tests, failed = judged(copy, module, spoilt.code, reach.get(function, {}))
+        tests_of_it = reaching(reach, tree.code, spoilt.code, module, function)
+        verdict, tests, failed = judged(copy, module, spoilt.code, tests_of_it)
         if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
         if k in found:
@@ -140,14 +142,33 @@ def located(each: dict[str, int], index: int) -> tuple[str, int]:
     raise IndexError(index)
 
 
+def reaching(reach: Reach, before: str, after: str, module: str, function: str) -> dict[str, float]:
+    """Tests that reach what a mutant changes; those of all its function where none is known to."""
+    both = zip(before.splitlines(), after.splitlines(), strict=False)
+    line = next((number for number, (old, new) in enumerate(both, 1) if old != new), 1)
+    if tests := reach.get(block_of(before, module, function, line)):
+        return tests
+    return {
+        test: cost for block, tests in reach.items() if block.startswith(f"{function}:") for test, cost in tests.items()
+    }
+
+
+def in_turn(tests: dict[str, float]) -> list[str]:
+    """Tests in the order in which they are asked: the cheapest case of each first, for different ones see more."""
+    met, place = Counter[str](), dict[str, tuple[int, float, str]]()
+    for test, seconds in sorted(tests.items(), key=lambda item: (item[1], item[0])):
+        name = test.partition("[")[0]
+        place[test], met[name] = (met[name], seconds, test), met[name] + 1
+    return sorted(tests, key=place.__getitem__)
+
+
 def judged(copy: Path, module: str, source: str, tests: dict[str, float]) -> tuple[str, int, str]:
     """Verdict over one mutant, how many tests were asked, and the one that failed."""
     chosen, spent = list[str](), 0.0
-    for test, seconds in sorted(tests.items(), key=lambda item: (item[1], item[0])):
-        if chosen and spent + seconds > SPENT:
-            break
-        chosen.append(test)
-        spent += seconds
+    for test in in_turn(tests):
+        if not chosen or spent + tests[test] <= SPENT:
+            chosen.append(test)
+            spent += tests[test]
     if not chosen:
         return UNREACHED, 0, ""
     path = copy / module

@@ -36,6 +36,8 @@ from validation.canonical import (
 from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states, upward
 
 RADIUS = 0.5
+#: Runs for this long after the last impact, or after a tenth more than it takes to rest [s].
+AFTERMATH = 0.25
 #: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
 APEXES = 5
 #: An arc counts if its launch speed is above this many g dt: shorter ones are a handful of samples.
@@ -54,7 +56,7 @@ def make(dimension: int, params: Params) -> Scene:
     e, height, g = params["e"], params["height"], params["g"]
     fall = math.sqrt(2.0 * height / g)
     longest = fall * (2.0 * APEXES + 2.0)
-    end = longest if e >= 1.0 else max(1.1 * rest_time(e, height, g) + 0.25, fall + 0.25)
+    end = longest if e >= 1.0 else max(1.1 * rest_time(e, height, g), fall) + AFTERMATH
     return Scene(
         "bounce",
         1,

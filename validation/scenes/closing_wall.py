@@ -21,6 +21,8 @@ from validation import bounds
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import along, at, ball, between_impacts, mass_of, pose_at, states
 
+#: Of the plate [m]; the ball is a tenth of its width.
+THICKNESS, WIDTH = 1.0, 2.0
 #: Blows of the plate that are told.
 BLOWS = 3
 
@@ -41,7 +43,7 @@ def make(dimension: int, params: Params) -> Scene:
     """Build the scene: the ball starts in the middle, towards the plate; no gravity."""
     p, spin = params, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0)
     wall = Body("wall", HalfSpace(along(dimension, 1.0), 0.0), motion="fixed")
-    half, r = (0.5, *(1.0,) * (dimension - 1)), p["radius"]
+    half, r = (0.5 * THICKNESS, *(0.5 * WIDTH,) * (dimension - 1)), p["radius"]
     plate = Body(
         "plate",
         Box(half),

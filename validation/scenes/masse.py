@@ -120,7 +120,9 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     def place(axis: int) -> bounds.Bound:
         because = "a contact found one step late is |u0| k/(1 + k) dt without friction, a step order shows half of it"
         change = of_the_arm(lambda arm: float(end(arm)[axis]), r, depth)
-        return bounds.Bound(1.5 * lost * dt + p["mu"] * depth + change + bounds.ROUND_OFF * fastest, because)
+        return bounds.Bound(
+            1.5 * lost * dt + p["mu"] * depth + change + bounds.ROUND_OFF * fastest * scene.duration, because
+        )
 
     turned = bounds.Bound(
         4.0 * float(np.linalg.norm(_spin(p))) * depth / slip + bounds.ROUND_OFF * fastest / slip,

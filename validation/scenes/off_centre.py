@@ -234,7 +234,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     scales = {
         "ball_speed": ("m/s", closing),
         "bar_speed": ("m/s", closing),
-        "spin": ("rad/s", closing * max(1.0, p["offset"] * p["mass"] / _moment(p))),
+        "spin": ("rad/s", closing * max(1.0 / WIDTH, p["offset"] * p["mass"] / _moment(p))),
         "impulse": ("N s", p["mass"] * closing),
         "energy_lost": ("1", there / blow.available),
     }

@@ -30,6 +30,8 @@ from validation.canonical import (
 )
 from validation.scenes.parts import PHASES, along, at, ball, between_impacts, delay, mass_of, phases, pose_at, states
 
+#: Of the plate [m].
+WIDTH = 2.0
 #: Runs for this long after the ideal contact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
 
@@ -41,7 +43,7 @@ LATEST = 0.0500001
 def make(dimension: int, params: Params) -> Scene:
     """Build the scene: the plate's near face is at 0, and the ball meets its middle after ``delay`` seconds."""
     p = params
-    half = (0.5 * p["thickness"], *(1.0,) * (dimension - 1))
+    half = (0.5 * p["thickness"], *(0.5 * WIDTH,) * (dimension - 1))
     place = pose_at(dimension, along(dimension, 0.5 * p["thickness"]))
     plate = Body("plate", Box(half), pose=place, motion="fixed")
     thrown = at(
