@@ -117,3 +117,9 @@ def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
     lowered, outside = lower_pose(_turned(pose, 0.25))
     assert lowered[0] == pytest.approx([1.0, 2.0, 2.0 * half + 0.25], abs=1e-15) and outside == 0.0
     assert _turned(lowered, -0.25)[0, 2] == pytest.approx(2.0 * half, abs=1e-15)
+
+
+@pytest.mark.parametrize("fault", [name for name, fault in FAULTS.items() if fault.sizes])
+def test_a_fault_of_no_size_is_none(fault):
+    """What is planted is as large as it says: with nothing of it the toy is healthy again."""
+    assert self_test.broken(Spoilt(fault, 0.0), FAULTS[fault].check) == ""

@@ -435,3 +435,18 @@ def test_one_impact_too_few_and_a_soft_one_fail():
     for size in (0.1, 0.01, 0.001):
         soft = [(1, 0, truth["small_speed"]), (2, 0, truth["large_speed"] * (1.0 - size))]
         assert failing(canonical, scene, ended(scene, soft)) == {"large_speed", "energy_defect"}
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0, 100.0])
+def test_the_balls_touch_each_other_or_the_wall_whenever_they_are_told_to_meet(ratio):
+    """Straight on between impacts: one gap, of the balls and of the wall in turn, is nothing at each of the times."""
+    params = CATALOGUE["galperin"].complete({"ratio": ratio, "gap": 0.7, "v": 1.3})
+    time, wall, between = 0.0, params["gap"], params["v"] * params["delay"]
+    small, large = 0.0, -params["v"]
+    for k, (at, small_after, large_after) in enumerate(galperin.impacts(params)):
+        assert at > time
+        wall, between, time = wall + small * (at - time), between + (large - small) * (at - time), at
+        assert (between, wall)[k % 2] == pytest.approx(0.0, abs=1e-11) and (between, wall)[1 - k % 2] > 0.0
+        assert small_after + ratio * large_after == pytest.approx((-1) ** (k % 2) * small + ratio * large)
+        assert small_after**2 + ratio * large_after**2 == pytest.approx(small**2 + ratio * large**2)
+        small, large = small_after, large_after

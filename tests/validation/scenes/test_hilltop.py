@@ -151,3 +151,21 @@ def test_a_disc_that_stays_does_not_leave():
 def test_a_disc_that_takes_off_at_the_top_is_refused():
     with pytest.raises(SceneError, match=r"hilltop\.v"):
         made(v=3.0)
+
+
+@pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
+@pytest.mark.parametrize("v", [0.5, 1.0, 2.0])
+def test_bounds_owe_what_the_hill_turns_by_and_a_step_and_a_half(v, dt):
+    """Without friction the hill's force over the angle has a closed form: 3 g sin(phi) - (2 g + v^2/reach) phi."""
+    canonical, scene = made(mu=0.0, v=v)
+    g, reach = scene.params["g"], scene.params["hill"] + scene.params["radius"]
+    truth = canonical.exact(scene)
+    phi = math.radians(truth["leaving_angle"])
+    turned = dt * (3.0 * g * math.sin(phi) - (2.0 * g + v * v / reach) * phi)
+    bound = {check.metric: check.bound for check in canonical.checks(scene, dt)}
+    assert bound["level_speed"] >= 0.999 * turned > 0.0
+    assert bound["leaving_time"] >= 1.5 * dt + 0.999 * 2.0 * turned / g
+    # v^2 = g reach cos(phi)^3 of a level speed: the angle that such a change of it is worth.
+    cosine = (truth["level_speed"] + np.array([-turned, turned])) ** 2 / (g * reach)
+    worth = np.abs(np.degrees(np.arccos(np.cbrt(cosine))) - truth["leaving_angle"]).min()
+    assert bound["leaving_angle"] >= 0.9 * worth

@@ -8,6 +8,7 @@ from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.scenes.pair_matrix import GAP, RADIUS, materials
+from validation.scenes.pair_matrix import _times as times
 
 DT = 1 / 240
 
@@ -79,3 +80,14 @@ def test_a_ball_that_does_not_come_back_has_no_restitution():
 def test_impacts_that_would_grip_are_refused():
     with pytest.raises(SceneError, match=r"pair_matrix\.v"):
         made(v=1.0)
+
+
+def test_a_record_that_ends_before_the_second_impact_has_no_coefficients_of_the_ceiling():
+    canonical, scene = made()
+    whole = bouncing(scene, materials(scene.params))
+    (first, _), _ = times(scene.params)
+    kept = int(np.searchsorted(whole.t, first + 5.0 * DT))
+    short = Trajectory(whole.t[:kept], whole.pose[:kept], whole.twist[:kept], None, DT, "completed")
+    measured = canonical.measure(scene, short)
+    assert measured["restitution[1]"][0] == pytest.approx(0.9) and measured["friction[1]"][0] == pytest.approx(0.2)
+    assert measured["restitution[2]"] == (None, "it does not come back")

@@ -214,3 +214,22 @@ def test_what_is_measured_on_a_tilted_table():
     tilted[6:, 1, 3:] = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
     found = canonical.measure(scene, Trajectory(t, tilted, twist, None, DT, "completed"))
     assert 5.0 * DT < found["passing_time"][0] < 6.0 * DT and found["edge_moved"] == (pytest.approx(0.3), "")
+
+
+@pytest.mark.parametrize(
+    ("start", "spin", "end"), [(0.1, 0.0, 0.6), (0.1, 1.5, 0.6), (-0.3, 2.0, 0.5), (0.0, 0.3, 0.4)]
+)
+def test_the_time_of_a_fall_is_that_of_its_equation_of_motion(start, spin, end):
+    """phi'' = r sin(phi), integrated in time until the angle is passed; r is the rate of a pendulum upside down."""
+    on = Pivot(0.5, 1.0, 9.81)
+
+    def passed(t, y):
+        return y[0] - end
+
+    passed.terminal = True
+    found = solve_ivp(
+        lambda t, y: [y[1], on.rate * math.sin(y[0])], (0.0, 10.0), [start, spin], "DOP853", passed, rtol=1e-11,
+        atol=1e-12,
+    )  # fmt: skip
+    assert on.time(start, spin, end) == pytest.approx(found.t[-1], rel=1e-8)
+    assert on.speed(start, spin, end) == pytest.approx(found.y[1, -1], rel=1e-8)

@@ -1,0 +1,141 @@
+"""Tables and marks of the page, from rows made up for one thing each."""
+
+from collections import Counter
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from reports import cures as told_cures
+from reports.matrix import Field
+from reports.page import cost, fairness
+from reports.page.charts import log_scale
+from reports.page.conclusions import NAMED, scenes_text
+from reports.page.slimming import small_svg
+from reports.page.verdicts import family_mark
+from reports.spread import spread_lines
+from reports.wording import MARKS
+from validation.cells import Slot
+from validation.questions.spread import Spread
+
+SLOT = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
+
+
+def told(engine, **changed):
+    """A row of the table of times at equal error."""
+    plain = {
+        "engine": engine, "profile": "tuned", "scene": "impact", "dimension": 2, "level": 1e-3, "cost": 2e-3,
+        "reason": "", "times_cheapest": 1.0, "tied": True, "rank": 1, "dt": 1 / 240, "iterations": None,
+        "slot": SLOT.as_dict(),
+    }  # fmt: skip
+    return plain | changed
+
+
+def test_the_cheapest_cell_names_one_its_cost_and_who_is_not_told_apart():
+    cell = cost._cheapest_cell([told("chipmunk"), told("bullet"), told("mujoco", profile="default")])
+    assert (cell.text, cell.best, cell.ties) == ("chipmunk/tuned", True, ("bullet/tuned", "mujoco/default"))
+    assert cell.detail == "2 ms, dt 1/240" and "crosscheck run impact" in cell.title
+    assert cost._cheapest_cell([]) == cost.LevelCell("none reaches it", "", False, "")
+
+
+def test_a_table_of_levels_has_who_answers_and_names_who_cannot_be_asked():
+    assert cost._level_tables(pd.DataFrame(columns=list(told("a"))), "cost", 0.0) == []
+    rows = [
+        told("chipmunk"), told("chipmunk", level=1e-6, cost=8e-3),
+        told("bullet", cost=6e-3, times_cheapest=3.0, tied=False, rank=2),
+        told("bullet", level=1e-6, cost=float("nan"), reason="no step reaches it"),
+        told("box2d", cost=float("nan"), reason="unsupported: no such shape"),
+    ]  # fmt: skip
+    (table,) = cost._level_tables(pd.DataFrame(rows), "cost", 0.0)
+    assert (table.scene, table.dimension, table.refused) == ("impact", 2, "box2d/tuned")
+    assert [(engine, profile) for engine, profile, _ in table.rows] == [("chipmunk", "tuned"), ("bullet", "tuned")]
+    (first, _), (second, missing) = (cells for _, _, cells in table.rows)
+    assert first.best and (first.text, first.detail) == ("2 ms", "dt 1/240")
+    assert not second.best and second.text == "6 ms" and second.detail.endswith(", ×3")
+    assert (missing.text, missing.title, missing.best) == ("–", "no step reaches it", False)
+    assert len(table.levels) == 2
+    (coarse,) = cost._level_tables(pd.DataFrame(rows), "cost", 1e-4)
+    assert len(coarse.levels) == 1
+
+
+def test_a_mark_of_a_family_counts_what_fails_and_says_more_where_there_is_more():
+    passing, failing = MARKS[-1], "known"
+    assert passing == "pass" and failing in MARKS
+    mixed = family_mark(Field(Counter({failing: 2, passing: 3})), "there")
+    assert (mixed.mark, mixed.text, mixed.href) == (failing, "2/5", "#there")
+    assert "2 " in mixed.title and "3 " in mixed.title and ", " in mixed.title
+    alone = family_mark(Field(Counter({passing: 3})), "there")
+    assert (alone.mark, alone.text, alone.href, alone.title) == (passing, "3", "#there", "")
+    assert family_mark(None, "there").mark == "unsupported" and family_mark(None, "there").href == ""
+
+
+@pytest.mark.parametrize("values", [[1e-3, 10.0], [2.0, 3.0], [5.0]])
+def test_a_logarithmic_scale_has_room_at_both_ends_and_ticks_inside(values):
+    scale, ticks = log_scale([*values, 0.0, float("inf")])
+    low, high = scale.to_dict()["domain"]
+    assert low < min(values) <= max(values) < high and high / low >= 10.0
+    assert min(values) / low == pytest.approx(high / max(values)), "as much room below as above"
+    assert ticks and all(low <= tick <= high for tick in ticks)
+
+
+def test_only_the_ground_of_a_picture_that_is_drawn_by_nothing_is_left_out():
+    ground = "M0,0h40.5v20h-40.5Z"
+    assert "h40" not in small_svg(f'<svg role="img"><path d="{ground}"/><path d="M0,0L9,9" stroke="red"/></svg>')
+    assert "h40" in small_svg(f'<svg role="img"><path d="{ground}" fill="red"/></svg>')
+
+
+def test_scenes_are_named_while_a_sentence_can_hold_them():
+    few, many = [f"s{k}" for k in range(NAMED)], [f"s{k}" for k in range(NAMED + 1)]
+    assert all(name in scenes_text(few, 51) for name in few) and "of 51" not in scenes_text(few, 51)
+    assert scenes_text(many, 51) == f"{NAMED + 1} of 51 scenes"
+
+
+def test_the_farthest_of_a_scene_stands_first_under_its_own_heading():
+    found = [
+        Spread("a", 2, "near", "p", 2.0, "ball", 1e-6, True),
+        Spread("a", 2, "far", "p", 2.0, "box", 0.5, True),
+        Spread("a", 3, "other", "p", 1.5, "ball", 0.25, False),
+    ]
+    lines = list(spread_lines(found))
+    assert lines[1] == "How far from our own solution: a 2-D, after 2 s"
+    assert lines[2].split()[0] == "far/p" and "(box)" in lines[2] and lines[3].split()[0] == "near/p"
+    assert lines[5] == "How far from our own solution: a 3-D, after 1.5 s; that run is not certified"
+    assert len({line.index("  (") for line in lines[2:4]}) == 1, "numbers stand below each other"
+
+
+def slip(measured, holds=True, **changed):
+    return {
+        "quantity": "friction", "asked": 0.5, "declared": 0.5, "band": 0.01, "measured": measured, "holds": holds,
+        "because": "a slide",
+    } | changed  # fmt: skip
+
+
+def test_of_the_receipts_of_a_quantity_the_one_farthest_from_what_is_declared_is_told():
+    runs = [SimpleNamespace(receipts=(slip(0.5004567),)), SimpleNamespace(receipts=(slip(0.493456789),))]
+    (line,) = fairness._receipts(runs)
+    assert (line.quantity, line.asked, line.measured, line.holds) == ("friction", "0.5", "0.493457", "2/2")
+    assert line.declared == "0.5 ± 0.01" and not line.differs and line.because == "a slide"
+    broken = SimpleNamespace(receipts=(slip(0.5009, False, declared=0.4, band=10.0),))
+    (line,) = fairness._receipts([*runs, broken])
+    assert (line.holds, line.differs, line.measured) == ("2/3", True, "0.5009")
+    (unmeasured,) = fairness._receipts([SimpleNamespace(receipts=(slip(None),))])
+    assert (unmeasured.measured, unmeasured.holds, unmeasured.differs) == ("not measured", "1/1", False)
+
+
+def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
+    findings = fairness.findings_of("bullet")
+    listed = {entry.id: entry.count for entry in fairness._listed(page_source, "bullet")}
+    rows = [row for row in page_source.of(engine="bullet") if row["standing"] == "known"]
+    assert listed.keys() == {*findings.families, *(entry.id for entry in findings.unsupported)}
+    for name, family in findings.families.items():
+        assert listed[name] == sum(family.reason in row["reason"] for row in rows), name
+    assert len(rows) < sum(len(rows) - listed[name] for name in findings.families), "most reasons are of other rows"
+
+
+def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monkeypatch):
+    """Where it was measured what decides, a setting that only completes another says so."""
+    kept = page_source.observations
+    monkeypatch.setattr(told_cures, "belongs_of", lambda engine: {"useMaximalCoordinates": f"the solver of {engine}"})
+    monkeypatch.setattr(told_cures, "decisive", lambda *asked: SimpleNamespace(parts=()))
+    found = {change.name: change for change in told_cures.changes(kept, "impact", 2, "bullet", "default", "tuned")}
+    assert "belongs to the solver of bullet" in vars(found["useMaximalCoordinates"]).values()
