@@ -108,3 +108,18 @@ def test_what_a_scene_raises_is_its_answer():
 def test_the_command_hands_over(monkeypatch):
     monkeypatch.setattr(certifying, "show_random", lambda console, as_json, count, seed, dims: 7)
     assert CliRunner().invoke(main, ["certify", "--random", "1"]).exit_code == 7
+
+
+def test_what_refused_stands_most_frequent_first_with_its_numbers():
+    """Of each condition: scenes that it refused, alone, those that were wrong, its worst value, and their seeds."""
+    refused = [
+        answer(1, certified=False, conditions={"residual": 2.0}, off=1.0),
+        answer(2, certified=False, conditions={"residual": 5.0, "energy": 3.0}),
+        answer(3, certified=False, conditions={"residual": float("nan")}),
+    ]
+    table = fuzzing._refusals(refused)
+    assert [column.header for column in table.columns] == ["condition", "scenes", "alone", "off", "worst", "seeds"]
+    cells = list(zip(*(column.cells for column in table.columns), strict=True))
+    assert [row[:4] for row in cells] == [("residual", "3", "2", "1"), ("energy", "1", "0", "0")]
+    assert [row[4:] for row in cells] == [("5", "1 2 3"), ("3", "2")]
+    assert [column.no_wrap for column in table.columns] == [True] * 5 + [False]

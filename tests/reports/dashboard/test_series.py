@@ -18,6 +18,7 @@ from reports.dashboard.steps import ERROR, TIME, steps
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
+from validation.posed import resolve
 from validation.records.store import Store
 
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
@@ -95,6 +96,19 @@ def test_a_flip_is_marked_once_and_says_in_which_direction():
         entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
     (panel,) = _divided(entries, "runs")
     assert [(event.at, event.kind, event.worse) for event in events(panel)] == [(2, "flip", True), (4, "flip", False)]
+    assert [event.text for event in events(panel)] == ["begin to fail: 1 cell", "cease to fail: 1 cell"]
+    primary = resolve("impact").primary
+    assert (panel.unit, panel.law) == (primary.unit, primary.law)
+
+
+def test_cells_that_begin_and_cease_to_fail_at_once_are_said_in_one_line():
+    entries = []
+    for k, (one, other) in enumerate([(0, 1), (0, 1), (1, 0)]):
+        cells = {("e", "p", "impact", 2): {"s": (0.1, one, 1, one), "r": (0.1, other, 1, other)}}
+        entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
+    (panel,) = _divided(entries, "runs")
+    (event,) = events(panel)
+    assert (event.at, event.text) == (2, "begin to fail: 1 cell, cease to fail: 1 cell")
 
 
 def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():

@@ -228,7 +228,7 @@ def test_the_time_of_a_fall_is_that_of_its_equation_of_motion(start, spin, end):
 
     passed.terminal = True
     found = solve_ivp(
-        lambda t, y: [y[1], on.rate * math.sin(y[0])], (0.0, 10.0), [start, spin], "DOP853", passed, rtol=1e-11,
+        lambda t, y: [y[1], on.rate * math.sin(y[0])], (0.0, 10.0), [start, spin], "DOP853", events=passed, rtol=1e-11,
         atol=1e-12,
     )  # fmt: skip
     assert on.time(start, spin, end) == pytest.approx(found.t[-1], rel=1e-8)

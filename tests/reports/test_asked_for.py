@@ -1,0 +1,61 @@
+"""What a command is asked for, and what a bench leaves behind."""
+
+import json
+
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from adapters.scene import SceneError
+from reports import speed, tables
+from reports.command.selection import _scene_names
+from validation.catalogue import CATALOGUE
+from validation.records.store import Store
+
+
+def test_scenes_of_several_words_add_up_and_stand_once(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drop.toml").write_text(
+        'name = "drop"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'
+        'bodies = [{ name = "b", shape = { type = "disc", radius = 0.5 }, pose = [0.0, 1.0, 0.0] }]\n'
+    )
+    assert _scene_names(["bounce", "imp*", "bounce"]) == ["bounce", "impact"]
+    first, last = _scene_names(["bounce", "drop.toml"])
+    assert first == "bounce" and last.startswith("drop.toml@")
+    assert _scene_names([]) == list(CATALOGUE)
+    with pytest.raises(SceneError):
+        _scene_names(["no-such-scene"])
+
+
+def shown(data):
+    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    tables._engine(data, console)
+    return console.export_text()
+
+
+def test_an_engine_is_described_with_its_habits_and_versions_that_are_bad():
+    data = {
+        "name": "toy", "version": "1.2", "title": "Toy", "status": "installed", "package": "toy", "dimensions": [2],
+        "customary_dt": "1/60", "scheme": {"order": "velocity first"}, "profiles": {},
+        "quirks": [{"what": "sinks", "what_we_do": "nothing", "source": "its manual"}],
+        "known_bad_versions": {"1.1": "it forgets contacts"},
+    }  # fmt: skip
+    text = shown(data)
+    assert "toy 1.2: Toy, installed" in text and "velocity first" in text
+    assert "version 1.1 is known to be bad: it forgets contacts" in text
+    assert all(word in text for word in ("sinks", "nothing", "its manual"))
+    assert shown({"name": "toy", "version": "", "status": "not installed", "reason": "no wheel"}).count("no wheel") == 1
+
+
+def test_a_bench_is_written_as_one_json_and_a_table_each(tmp_path):
+    store = Store(tmp_path / "results")
+    run, _ = store.start("bench", [])
+    table = pd.DataFrame([{"scene": "impact", "cost": 2.5e-3, "slot": {"scene": "impact"}}])
+    raw = pd.DataFrame([{"seconds": 1.5e-3}])
+    paths = speed.write_all(tmp_path, run, {"rounds": 3}, {"work_points": table}, raw)
+    store.close()
+    assert [path.name for path in paths] == ["bench.json", "raw_timings.csv", "work_points.csv"]
+    assert all(path.parent == tmp_path / "bench" for path in paths)
+    assert isinstance(json.loads(paths[0].read_text()), dict)
+    assert pd.read_csv(paths[2]).to_dict("records") == [{"scene": "impact", "cost": 2.5e-3}]
+    assert pd.read_csv(paths[1]).to_dict("records") == [{"seconds": 1.5e-3}]
