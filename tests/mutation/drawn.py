@@ -14,6 +14,8 @@ DRAWN = Path(__file__).resolve().parent / "sample.csv"
 APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx", "newton"))
 #: Seconds of CPU of a test file that are recorded, and of tests that are run against one mutant.
 RECORDED, SPENT = 6.0, 40.0
+#: Test files whose record ended early that are run whole against what survives, and seconds of CPU of each.
+WHOLE_FILES, LONGEST = 2, 60.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
 #: Verdicts that count as noticed: what only time ended is noticed as well.
 NOTICED = (KILLED, TIMED)
@@ -68,8 +70,9 @@ def table(rows: list[Drawn]) -> list[str]:
         "", "## A sample of all modules", "",
         f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {rows[0].seed} from all of the "
         f"three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
-        f"A mutant met the tests that reach its function, from the cheapest on, for up to {SPENT:g} s of CPU, of those "
-        f"that a test file begins within {RECORDED:g} s; a survivor may be one that other tests notice.", "",
+        f"A mutant met the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of "
+        f"CPU, of those that a test file begins within {RECORDED:g} s; what survived them {WHOLE_FILES} whole files of "
+        f"those that go on, {LONGEST:g} s of each. A survivor may be one that other tests notice.", "",
         f"**{len(noticed)} of {len(rows)} are noticed, {100.0 * len(noticed) / len(rows):.1f} % (95 %: "
         f"{100.0 * interval.low:.1f} to {100.0 * interval.high:.1f} %).**", "",
         "| package | drawn | killed | ended by time | survived | no test reaches it | test fails without it |",

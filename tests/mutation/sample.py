@@ -4,9 +4,10 @@
 
 `SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
 likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
-its function (`reach`) run from the cheapest on, until one fails or what a mutant may cost is spent. It *survived* if
-none failed, for whatever reason: what it may cost was spent, or no test is known to reach it. So the share that is
-killed is a lower bound. A kill counts only if the test that failed passes in the copy without a mutant.
+its statements (`reach`) run, the cheapest case of each first, until one fails or what a mutant may cost is spent; then
+whole test files whose record ended before they did. It *survived* if none failed, for whatever reason: what it may cost
+was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the test
+that failed passes in the copy without a mutant.
 """
 
 from __future__ import annotations
@@ -17,13 +18,28 @@ import os
 import random
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import chdir
+from collections.abc import Iterator, Sequence
+from contextlib import chdir, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from checkout import copy_of_the_checkout
-from drawn import APART, KILLED, NOTICED, RECORDED, SPENT, SURVIVED, TIMED, UNREACHED, UNSHOWN, Drawn, stored, write
+from drawn import (
+    APART,
+    KILLED,
+    LONGEST,
+    NOTICED,
+    RECORDED,
+    SPENT,
+    SURVIVED,
+    TIMED,
+    UNREACHED,
+    UNSHOWN,
+    WHOLE_FILES,
+    Drawn,
+    stored,
+    write,
+)  # fmt: skip
 from libcst import FunctionDef, Module
 from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
@@ -121,9 +137,12 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
         spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
         assert isinstance(spoilt, Module)
         tests_of_it = reaching(reach, tree.code, spoilt.code, module, function)
-        verdict, tests, failed = judged(copy, module, spoilt.code, tests_of_it)
+        verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it))
         if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
+        if verdict in (SURVIVED, UNREACHED):
+            failed = by_whole_files(copy, module, spoilt.code, cut_short(reach, module)) or failed
+            verdict = KILLED if failed else verdict
         if k in found:
             found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
         else:
@@ -153,38 +172,70 @@ def reaching(reach: Reach, before: str, after: str, module: str, function: str) 
     }
 
 
-def in_turn(tests: dict[str, float]) -> list[str]:
+def in_turn(tests: dict[str, float]) -> list[tuple[str, float]]:
     """Tests in the order in which they are asked: the cheapest case of each first, for different ones see more."""
     met, place = Counter[str](), dict[str, tuple[int, float, str]]()
     for test, seconds in sorted(tests.items(), key=lambda item: (item[1], item[0])):
         name = test.partition("[")[0]
         place[test], met[name] = (met[name], seconds, test), met[name] + 1
-    return sorted(tests, key=place.__getitem__)
+    return sorted(tests.items(), key=lambda item: place[item[0]])
 
 
-def judged(copy: Path, module: str, source: str, tests: dict[str, float]) -> tuple[str, int, str]:
+def judged(copy: Path, module: str, source: str, tests: Sequence[tuple[str, float]]) -> tuple[str, int, str]:
     """Verdict over one mutant, how many tests were asked, and the one that failed."""
     chosen, spent = list[str](), 0.0
-    for test in in_turn(tests):
-        if not chosen or spent + tests[test] <= SPENT:
+    for test, seconds in tests:
+        if not chosen or spent + seconds <= SPENT:
             chosen.append(test)
-            spent += tests[test]
+            spent += seconds
     if not chosen:
         return UNREACHED, 0, ""
-    path = copy / module
-    before, times = path.read_bytes(), path.stat()
-    try:
-        path.write_text(source, encoding="utf-8")
+    with spoilt_copy(copy, module, source):
         code, failed = asked(copy, chosen, 60.0 + 4.0 * spent)
         if code == NOT_FOUND:  # a file that cannot be imported, or tests that are made of what has changed
             files = dict.fromkeys(test.partition("::")[0] for test in chosen)
             code, failed = asked(copy, list(files), 60.0 + 4.0 * spent)
-    finally:
-        path.write_bytes(before)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     if code == OUT_OF_TIME:
         return TIMED, len(chosen), ""
     return (SURVIVED if code in (0, NOT_FOUND, 5) else KILLED), len(chosen), failed
+
+
+def by_whole_files(copy: Path, module: str, source: str, files: Sequence[str]) -> str:
+    """First test of these files that fails, and not without the mutant; empty where there is none."""
+    for name in files:
+        with spoilt_copy(copy, module, source):
+            _, failed = asked(copy, [name], LONGEST)
+        if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
+            return failed
+    return ""
+
+
+def cut_short(reach: Reach, module: str) -> list[str]:
+    """Test files whose record ended before they did and that reach a module, those that reach most of it first."""
+    spent, met = dict[str, float](), Counter[str]()
+    for block, tests in reach.items():
+        for test, seconds in tests.items():
+            spent[test] = seconds
+        if block.startswith(f"{dotted(module)}."):
+            met.update({test.partition("::")[0] for test in tests})
+    whole = dict[str, float]()
+    for test, seconds in spent.items():
+        name = test.partition("::")[0]
+        whole[name] = whole.get(name, 0.0) + seconds
+    return [name for name, _ in met.most_common() if whole[name] >= RECORDED][:WHOLE_FILES]
+
+
+@contextmanager
+def spoilt_copy(copy: Path, module: str, source: str) -> Iterator[None]:
+    """A module as a mutant of it; as it was afterwards."""
+    path = copy / module
+    before, times = path.read_bytes(), path.stat()
+    try:
+        path.write_text(source, encoding="utf-8")
+        yield
+    finally:
+        path.write_bytes(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 def asked(copy: Path, tests: Sequence[str], cpu_seconds: float) -> tuple[int, str]:
