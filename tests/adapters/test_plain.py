@@ -191,3 +191,9 @@ class Liar(str):
 
 def test_a_text_is_what_it_holds_whatever_it_says():
     assert one_line(Liar("what it holds")) == "what it holds"
+
+
+def test_a_text_of_exactly_as_many_characters_as_are_shown_stays_whole():
+    for letter in "aé":
+        assert one_line(letter * NAME, NAME) == letter * NAME
+        assert one_line(letter * (NAME + 1), NAME) == letter * (NAME - 4) + " ..."

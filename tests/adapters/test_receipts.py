@@ -10,7 +10,7 @@ from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
-from adapters.receipts import QUANTITIES, _receipt, receipts
+from adapters.receipts import QUANTITIES, _receipt, _starved, receipts
 
 DT = 1 / 60
 IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
@@ -483,3 +483,11 @@ def test_the_sample_farthest_from_what_is_declared_counts_and_none_at_all_most(s
     found = _receipt("mass", 1.0, Declared(1.0, 0.1), samples, None)
     assert not found.holds
     assert math.isnan(found.measured) if counts is None else found.measured == counts
+
+
+def test_what_is_told_of_one_sweep_says_what_else_it_may_cost():
+    case, told = Case(2, 0.8, 0.0, DT, 1), Declared(1.0, 0.01, "a landing")
+    found = _starved("size", told, case, 1, False)
+    assert found.value == 1.0 and found.band == pytest.approx(0.01 + LANDING_SPEED * case.dt / HALF_EXTENTS[0])
+    assert found.because == "a landing; 1 iteration was asked for: a step of motion more"
+    assert _starved("size", told, case, 2, False) == told

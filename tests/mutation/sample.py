@@ -201,12 +201,16 @@ def judged(copy: Path, module: str, source: str, tests: Sequence[tuple[str, floa
 
 
 def by_whole_files(copy: Path, module: str, source: str, files: Sequence[str]) -> str:
-    """First test of these files that fails, and not without the mutant; empty where there is none."""
+    """First test of these files that fails, and not without the mutant; empty where there is none.
+
+    Those that name the module, as cases of scenes do, come first.
+    """
     for name in files:
-        with spoilt_copy(copy, module, source):
-            _, failed = asked(copy, [name], LONGEST)
-        if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
-            return failed
+        for chosen in ([name, "-k", Path(module).stem], [name]):
+            with spoilt_copy(copy, module, source):
+                _, failed = asked(copy, chosen, LONGEST)
+            if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
+                return failed
     return ""
 
 

@@ -30,8 +30,16 @@ SUBJECTS = {
     "validation/truths/sliding.py": ("validation/scenes/test_worked_slides.py", "validation/scenes/test_standing.py"),
     "validation/scenes/tilt_table.py": ("validation/scenes/test_worked_falls.py", "validation/scenes/test_tilting.py"),
     "validation/scenes/rocker.py": ("validation/scenes/test_worked_rocking.py", "validation/scenes/test_rocker.py"),
-    "validation/scenes/seam.py": ("validation/scenes/test_worked_slides.py", "validation/scenes/test_seams.py"),
-    "validation/scenes/overlap.py": ("validation/scenes/test_worked_blows.py", "validation/scenes/test_overlaps.py"),
+    "validation/scenes/seam.py": (
+        "validation/scenes/test_worked_slides.py",
+        "validation/scenes/test_seams.py",
+        "validation/test_units.py",
+    ),
+    "validation/scenes/overlap.py": (
+        "validation/scenes/test_worked_blows.py",
+        "validation/scenes/test_overlaps.py",
+        "validation/test_units.py",
+    ),
     "validation/scenes/closing_wall.py": (
         "validation/scenes/test_worked_blows.py",
         "validation/scenes/test_moved_blows.py",

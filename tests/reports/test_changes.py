@@ -8,6 +8,8 @@ import pytest
 from reports import changes
 from reports.changes import Side, as_json, as_markdown, as_text, header, headline, load_side
 from reports.wording import reproduce
+from validation.bench.agreement import ratios
+from validation.bench.reading import bench_runs
 from validation.cells import Observation, Outcome, Slot
 from validation.judging.comparison import Change, Kind
 from validation.records.store import MissingError, Store
@@ -267,3 +269,14 @@ def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
     with pytest.raises(MissingError):
         load_side("nothing", tmp_path / "not there")
     assert not (tmp_path / "not there").exists()
+
+
+def test_a_side_is_the_last_run_with_its_date_and_the_times_of_the_last_bench(page_folder):
+    store = Store(page_folder, create=False)
+    bench = bench_runs(store)[-1]
+    run = [run for run in store.runs() if run.id != bench.id][-1]
+    wanted = [row for table in [ratios(store, bench)] for row in table.to_dict("records")]
+    store.close()
+    found = changes._load_run(page_folder, "latest")
+    assert (found.run, found.date, found.commit) == (run.id, run.date, run.commit) and found.rows
+    assert list(found.ratios) == [{str(k): v for k, v in row.items()} for row in wanted] and wanted

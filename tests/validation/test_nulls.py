@@ -242,3 +242,27 @@ def test_the_row_of_a_null_is_that_of_the_engine_with_its_own_answer_and_nothing
         wanted = replace(asked, profile=name, value=value, error=value - 0.8, slot=slot, skill=pytest.approx(worth),
                          null="did nothing", **own)  # fmt: skip
         assert found[name].as_dict() == wanted.as_dict()
+
+
+def test_rows_of_several_cells_and_without_a_truth_are_nobody_s_and_their_outcome_is_not_the_null_s():
+    pytest.importorskip("pymunk")
+    row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT)) if r.metric == "rebound_ratio")
+    assert null_rows([replace(row, cells=["one", "two"])]) == [] and null_rows([replace(row, truth=None)]) == []
+    assert {guess.outcome for guess in null_rows([replace(row, outcome="invalid", cells=["one"])])} == {"ok"}
+
+
+def test_a_null_without_an_answer_is_measured_against_none(monkeypatch):
+    pytest.importorskip("pymunk")
+    row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT)) if r.metric == "rebound_ratio")
+    monkeypatch.setattr(nulls, "nulls_of", lambda *asked: [Null("did nothing", None, None, "it has none")])
+    (guess,) = null_rows([row])
+    assert (guess.value, guess.skill, guess.null, guess.physics, guess.reason) == (None, None, "", None, "it has none")
+
+
+def test_as_many_cells_as_are_asked_at_most_are_asked(monkeypatch):
+    pytest.importorskip("pymunk")
+    rows = judged(*(Slot("impact", (("e", e),), 2, "chipmunk", "tuned", DT) for e in (0.25, 0.5)))
+    monkeypatch.setattr(nulls, "MOST_CELLS", 2)
+    assert null_rows(rows) and any(row.skill is not None for row in with_skill(rows))
+    monkeypatch.setattr(nulls, "MOST_CELLS", 1)
+    assert null_rows(rows) == [] and with_skill(rows) == rows

@@ -3,6 +3,7 @@
 import math
 import os
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from adapters.engine import Contacts
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.cells import Slot
+from validation.questions import residuals as asked
 from validation.questions.residuals import LAWS, Residuals, ask, measured, residuals
 from validation.running.apart import Apart
 
@@ -191,3 +193,59 @@ def test_a_cell_that_is_refused_breaks_or_is_lost_says_so_of_itself():
     assert "planar" in refused.refused and refused == Residuals(spatial, nothing(refused.refused), 0, refused.refused)
     two, three = (Slot("stack", (("n", n),), 2, "chipmunk", "tuned", 1 / 60) for n in (2.0, 3.0))
     assert measured(two).slot == two and measured(three).contacts > measured(two).contacts > 0
+
+
+def test_a_ball_that_rolls_does_not_slip_whatever_friction_holds_it():
+    rolling = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
+    floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+    twists = [[[0.0] * 3, [2.0, 0.0, -4.0]]] * 2
+    for push in (0.1 * WEIGHT, -0.1 * WEIGHT):
+        row = (0, 1, (0.0, 0.0), (0.0, 1.0), (push, WEIGHT), 0.0)
+        found = values(residuals(*touching(2, (floor, rolling), row, (Pair(friction=MU),), twists, (0.0, -G))))
+        assert (found["slip"], found["separation"], found["cone"]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("belt_last", [False, True])
+def test_friction_of_a_belt_drags_along_with_it_and_one_against_it_is_seen(belt_last):
+    """At rest on a belt of 3 m/s the ball slips back by 3: friction forwards is right, backwards it drives."""
+    belt = Body("belt", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(3.0, 0.0))
+    still = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
+    bodies, side = ((still, belt), -1.0) if belt_last else ((belt, still), 1.0)
+    for drag, drives in ((0.4, False), (-0.4, True)):
+        # The impulse acts on the body with the higher index, and the normal points to it.
+        row = (0, 1, (0.0, 0.0), (0.0, side), (side * drag * WEIGHT, side * WEIGHT), 0.0)
+        found = residuals(*touching(2, bodies, row, (Pair(friction=MU),), [[[0.0] * 3] * 2] * 2, (0.0, -G)))
+        # Nothing is faster than 3 m/s over the belt but what moves there is nothing: the speed told is one step's fall.
+        assert values(found)["slip"] == pytest.approx(3.0 * 0.4 / (G * DT) if drives else 0.0)
+        assert all(reason == "" for _, reason in found[0].values())
+
+
+def test_without_any_speed_there_is_no_work_and_what_parts_already_owes_nothing():
+    """Pressed together without gravity: no residual but of momentum; and a contact that parted before, and carries."""
+    floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
+    still = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
+    row = (0, 1, (0.0, 0.0), (0.0, 1.0), (0.0, WEIGHT), 0.0)
+    pairs = (Pair(restitution=0.8, friction=MU),)
+    found = values(residuals(*touching(2, (floor, still), row, pairs, [[[0.0] * 3] * 2] * 2, (0.0, 0.0))))
+    assert (found["separation"], found["slip"], found["momentum"]) == (0.0, 0.0, 1.0)
+    parted = [[[0.0] * 3, [0.0, 0.5, 0.0]], [[0.0] * 3, [0.0, 0.0, 0.0]]]
+    found = values(residuals(*touching(2, (floor, still), row, pairs, parted, (0.0, 0.0))))
+    assert found["separation"] == 0.0
+
+
+def test_an_engine_that_refuses_a_profile_is_asked_for_that_one_and_believed(monkeypatch):
+    slot = Slot("impact", (), 2, "toy", "tuned", 1 / 240)
+    refuses = {"tuned": "it has no such solver"}.get
+    monkeypatch.setattr(asked, "load", lambda name: SimpleNamespace(refuses=lambda scene, profile: refuses(profile)))
+    monkeypatch.setattr(asked, "posed_for", lambda engine, scene: scene)
+    said = "it has no such solver"
+    assert measured(slot) == Residuals(slot, nothing(said), 0, said)
+
+
+def test_every_contact_is_recorded_from_the_first_step_on_whatever_the_scene_samples(monkeypatch):
+    pytest.importorskip("pymunk")
+    wanted, run = [], asked.run
+    monkeypatch.setattr(asked, "run", lambda *given: wanted.append(given[-1]) or run(*given))
+    for scene in ("stack", "long_rest"):
+        assert measured(Slot(scene, (("duration", 2.0),), 2, "chipmunk", "tuned", 1 / 60)).refused == ""
+    assert [(sampling.stride, sampling.contacts_from) for sampling in wanted] == [(1, 0.0)] * 2

@@ -9,6 +9,7 @@ from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import Family, Finding, Findings, FindingsError, row_key
 from validation.judging.comparison import Change, Kind
+from validation.judging.rows import rows_of
 from validation.judging.verdicts import Physics
 from validation.records.store import RELEASE_TITLE, Store
 from validation.releases import history, notes
@@ -16,6 +17,7 @@ from validation.releases.choosing import Release
 from validation.releases.driving import Effort
 from validation.releases.floors import moved_starts
 from validation.releases.history import Told, steps, told_by
+from validation.running.execution import execute
 
 SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
 OTHER = Slot("impact", (("e", 0.5), ("v", 8.0)), 2, "toy", "default", 1 / 240)
@@ -386,3 +388,13 @@ def test_every_note_of_ours_can_be_read():
     for engine in registry.names():
         for note in notes.notes_of(engine):
             assert note.says and note.source
+
+
+def test_a_doubted_row_has_neither_verdict_nor_standing():
+    pytest.importorskip("pymunk")
+    row = rows_of("r", [execute(Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240))])[0]
+    known = replace(row, standing="known", physics="fail")
+    doubted = history._doubted(known, {"tuned": "a receipt fails"})
+    assert (doubted.physics, doubted.standing, doubted.outcome) == (None, None, Outcome.INVALID.value)
+    assert doubted.reason == "no verdict: a receipt fails"
+    assert history._doubted(known, {"default": "a receipt fails"}) is known

@@ -121,3 +121,11 @@ def test_no_other_scene_starts_with_an_overlap(name):
             assert overlap_at_the_start(canonical.scene(dimension, variation.params)) is None or not variation.runs_in(
                 dimension
             )
+
+
+def test_what_is_thrown_is_told_by_its_speed_and_not_by_its_spin():
+    canonical, scene = made("overlap")
+    trajectory = parting(scene)
+    before = canonical.measure(scene, trajectory)["thrown"][0]
+    trajectory.twist[:, 1, 2] = 50.0
+    assert canonical.measure(scene, trajectory)["thrown"] == (before, "")

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
+from validation.scenes import tilt_table
 from validation.scenes.tilt_table import TOLD
 from validation.truths.pivoting import Pivot, fall_checks
 
@@ -233,3 +234,26 @@ def test_the_time_of_a_fall_is_that_of_its_equation_of_motion(start, spin, end):
     )  # fmt: skip
     assert on.time(start, spin, end) == pytest.approx(found.t[-1], rel=1e-8)
     assert on.speed(start, spin, end) == pytest.approx(found.y[1, -1], rel=1e-8)
+
+
+def test_of_a_step_that_is_nothing_only_round_off_is_forgiven():
+    """No kick is owed at the start where none is told: what is left grows with the step alone."""
+    for dt in (1e-6, 1e-9):
+        assert ON.spin_off(START, 1.0, END, dt) < 1e2 * dt and ON.time_off(START, 1.0, END, dt) < 1e2 * dt
+    truth = {"passing_time": ON.time(START, 0.0, END), "passing_spin": ON.speed(START, 0.0, END), "edge_moved": 0.0}
+    (_, _, moved) = fall_checks(ON, START, END, 1e-9, truth)
+    assert moved.bound >= 0.5e-12, "the edge is told to the round-off of the arm of 0.5 m, 1e-12 of it"
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.5])
+def test_friction_of_a_tilted_table_is_asked_along_the_table(monkeypatch, ratio):
+    """What a force across and up in space is along and against a table that falls to the right by its angle."""
+    canonical = CATALOGUE["tilt_table"]
+    p = canonical.complete({"ratio": ratio})
+    turned = tilt_table.angle(p)
+    for along in np.linspace(-0.9, 0.9, 13):
+        for against in (0.5, 1.0, 2.0):
+            across = along * math.cos(turned) + against * math.sin(turned)
+            up = -along * math.sin(turned) + against * math.cos(turned)
+            monkeypatch.setattr(Pivot, "grip", lambda *asked, found=(across, up): found)
+            assert tilt_table._held(p, ON, 0.0, 0.1) is (abs(along) <= p["mu"] * against)

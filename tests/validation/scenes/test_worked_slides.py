@@ -145,3 +145,13 @@ def test_the_error_of_a_slide_is_the_distance_from_where_it_should_stop_over_the
     assert error(scene, DT, {"stopping_distance": (1.7, "")}) == (pytest.approx(0.15), "")
     assert error(scene, DT, {"stopping_distance": (2.0, ""), "astray": (None, "lost")}) == (0.0, "")
     assert error(scene, DT, {"stopping_distance": (None, "lost")}) == (None, "lost")
+
+
+def test_places_are_told_to_the_round_off_of_the_way_or_of_the_farthest_plate():
+    """A step of 10 ns sinks by 1e-15 m: what is left of a bound on height is 1e-12 of the largest coordinate."""
+    for name, params, place in (("slide", {"v": 0.1}, 0.01 / (0.8 * 9.81)), ("seam", {"v": 10.0, "plate": 5.0}, None)):
+        canonical = CATALOGUE[name]
+        scene = canonical.scene(2, params)
+        (hop,) = (check for check in canonical.checks(scene, 1e-8) if check.metric == "hop")
+        farthest = place or scene.bodies[-2].pose[0]
+        assert hop.bound == pytest.approx(9.81e-16 + 1e-12 * farthest, rel=1e-3)
