@@ -104,7 +104,7 @@ mutants-check: $(STAMP)
 	$(BIN)/python tests/mutation/run.py --check 40
 
 # N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 20 min of CPU at first, to
-# see which tests reach which functions, then ten seconds a mutant.
+# see which tests reach which statements, then half a minute a mutant.
 N ?= 150
 SEED ?= 1
 mutants-sample: $(STAMP)

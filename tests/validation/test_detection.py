@@ -12,7 +12,7 @@ from adapters.planted_faults import REPORTED, SIZED, Planted
 from adapters.receipts import receipts
 from validation import questions
 from validation.catalogue import CATALOGUE
-from validation.questions.detection import SIZES, detection, lines, only_by_receipts
+from validation.questions.detection import SIZES, Seen, detection, lines, only_by_receipts
 
 DT = 1 / 240
 NEEDS = {
@@ -181,3 +181,18 @@ def test_a_fault_of_what_is_read_leaves_what_is_built_alone(fault):
 def test_a_fault_that_does_not_exist_cannot_be_planted():
     with pytest.raises(Exception, match="fault: 'colour' is none of"):
         Planted(registry.load("reference"), "colour", 0.1)
+
+
+def test_a_line_names_its_scene_and_a_receipt_is_any_scene_s_and_comes_last():
+    found = [
+        Seen("any", "receipt mass", "mass", 0.01), Seen("bounce", "apex", "mass", None),
+        Seen("bounce", "apex", "gravity", 0.001), Seen("any", "receipt mass", "gravity", 0.1),
+        Seen("any", "receipt force", "force", 0.1), Seen("any", "receipt burst", "force", 0.1),
+    ]  # fmt: skip
+    assert list(lines(found)) == [
+        {"name": "bounce/apex", "mass": "", "gravity": "0.1 %"},
+        {"name": "receipt mass", "mass": "1 %", "gravity": "10 %"},
+        {"name": "receipt force", "force": "10 %"},
+        {"name": "receipt burst", "force": "10 %"},
+    ]
+    assert only_by_receipts(found) == {"mass": ["mass"], "force": ["burst", "force"]}

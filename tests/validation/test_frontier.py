@@ -156,3 +156,17 @@ def test_a_scene_that_cannot_be_driven_is_refused_with_those_that_can():
 
     result = CliRunner().invoke(main, ["frontier", "impact"])
     assert result.exit_code == 2 and "impact cannot be driven" in result.stderr and "thin_wall" in result.stderr
+
+
+def test_a_quick_search_asks_one_dimension_and_a_named_one_is_asked_whatever_the_search():
+    pytest.importorskip("pymunk")
+    name, frontier = next((name, f) for name, f in axes() if resolve(name).dimensions == (2, 3))
+
+    def asked(dimensions, quick):
+        found = brackets([name], ["reference"], ["reference"], dimensions, quick)
+        assert {b.base.profile for b in found} <= {"reference"}
+        return sorted({(b.base.dimension, b._hard) for b in found if b.frontier.name == frontier.name})
+
+    assert asked((), True) == [(2, frontier.hard)] and asked((3,), True) == [(3, frontier.hard)]
+    assert asked((2, 3), True) == [(2, frontier.hard), (3, frontier.hard)]
+    assert asked((), False) == [(2, frontier.hardest), (3, frontier.hardest)]

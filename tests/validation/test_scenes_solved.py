@@ -42,6 +42,9 @@ def test_what_finds_every_event_passes_and_stands_where_the_ghost_is(name):
     canonical = CATALOGUE[name]
     for scene, trajectory in of_the_suite(name):
         assert failing(canonical, scene, trajectory) == set(), scene.params
+        measured = canonical.measure(scene, trajectory)
+        # A number needs no excuse, unless it is nothing because what was to be measured did not come.
+        assert {metric for metric, (value, reason) in measured.items() if reason and value} == set()
         if (track := canonical.track(scene)) is not None:
             told = np.array([track.position(float(t)) for t in trajectory.t])
             place = trajectory.pose[:, scene.index(track.body), : scene.dimension]
