@@ -11,7 +11,6 @@ from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import DEVIATIONS
 from adapters.needs import needs
 from adapters.scene import Pair
-from adapters.single_motions import corner_law, standstill_law
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 
@@ -47,38 +46,6 @@ def test_a_box_on_its_corner_is_where_the_law_says_and_a_thousandth_more_is_not(
             assert abs(spoilt[metric][0] - value) > band, metric
 
 
-def test_the_law_of_the_corner_is_the_scene_s_own_truth_where_nothing_is_rounded():
-    for variation in CORNER.full:
-        scene = CORNER.scene(2, variation.params)
-        for metric in METRICS:
-            value, _ = corner_law(metric, lambda scene, dt: (1.0, 0.0), 0.0)(scene, DT, CORNER.measure)
-            assert value == pytest.approx(CORNER.exact(scene)[metric], rel=1e-12)
-
-
-def test_the_law_of_the_corner_is_silent_about_all_that_it_does_not_compute():
-    def said(scene, units=1.0, skin=0.0, dt=DT):
-        return corner_law("rise", lambda scene, dt: (units, skin), 1.0)(scene, dt, CORNER.measure)
-
-    scene = CORNER.scene(2, {"e": 0.8, "tilt": 30.0, "v": 2.0})
-    floor, box = scene.bodies
-    assert said(scene) is not None
-    assert said(scene, skin=0.01) is None
-    assert said(CORNER.scene(2, {"e": 0.8, "tilt": 30.0}), skin=0.01) is not None  # at 1 m/s nothing rebounds
-    assert said(scene, dt=scene.duration) is None
-    for other in (
-        replace(scene, gravity=(0.0, -1.0)),
-        replace(scene, pairs=(Pair(restitution=0.8, friction=0.1),)),
-        replace(scene, bodies=(floor, replace(box, twist=(0.0, -2.0, 1.0)))),
-        replace(scene, bodies=(floor, replace(box, twist=(0.1, -2.0, 0.0)))),
-        replace(scene, bodies=(floor, replace(box, twist=(0.0, 2.0, 0.0)))),
-        replace(scene, bodies=(floor, replace(box, pose=(*box.pose[:2], 0.0)))),
-        replace(scene, bodies=(floor, replace(box, force=(0.0, 1.0)))),
-        CATALOGUE["impact"].scene(2),
-        CORNER.scene(3),
-    ):
-        assert said(other) is None, other
-
-
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 def test_a_box_stands_still_where_a_step_is_less_than_half_a_spacing_of_singles(profile):
     """And moves where it is more: the speed alone decides, at the same place."""
@@ -90,25 +57,6 @@ def test_a_box_stands_still_where_a_step_is_less_than_half_a_spacing_of_singles(
         said = law(scene, DT, FAR.measure)
         assert (moved == 0.0) == still and (said is not None) == still
         assert not still or said == (0.0, 0.0)
-
-
-def test_near_the_origin_and_of_other_scenes_the_law_of_places_is_silent():
-    law = standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0))
-    far = FAR.scene(2)
-    plate, box = far.bodies
-    assert law(far, DT, FAR.measure) == (0.0, 0.0)
-    for other in (
-        FAR.scene(2, {"far": 0.0}),
-        FAR.scene(2, {"far": 1024.0}),
-        replace(far, gravity=(1.0, -9.81)),
-        replace(far, bodies=(plate, replace(box, force=(1.0, 0.0)))),
-        replace(far, bodies=(plate, replace(box, twist=(3.0, 1.0, 0.0)))),
-        SEAM.scene(2),
-    ):
-        assert law(other, DT, FAR.measure) is None
-    deep = FAR.scene(3)
-    assert law(deep, DT, FAR.measure) == (0.0, 0.0)
-    assert law(replace(deep, gravity=(0.0, 0.1, -9.81)), DT, FAR.measure) is None
 
 
 @pytest.mark.parametrize(("skin", "stopped"), [(0.01, True), (0.0, False)])

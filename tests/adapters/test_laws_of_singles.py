@@ -1,0 +1,135 @@
+"""Laws that engines share, without an engine: where nothing is rounded they are the scenes' own truths."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from adapters.scene import Pair
+from adapters.single_motions import corner_law, standstill_law
+from adapters.single_precision import UNIT, Method, Threshold, rounded_law, without_a_place
+from validation.catalogue import CATALOGUE
+
+DT = 1.0 / 240.0
+CORNER, FAR, SEAM = CATALOGUE["edge_drop"], CATALOGUE["far_origin"], CATALOGUE["seam"]
+METRICS = ("rise", "spin", "impulse")
+#: Scenes of blows in free space, each of them told by the law to round-off.
+BLOWS = (
+    "impact",
+    "head_on",
+    "oblique",
+    "cradle",
+    "stacked_balls",
+    "galperin",
+    "pair_matrix",
+    "thin_wall",
+    "off_centre",
+)
+
+
+def test_the_law_of_the_corner_is_the_scene_s_own_truth_where_nothing_is_rounded():
+    for variation in CORNER.full:
+        scene = CORNER.scene(2, variation.params)
+        for metric in METRICS:
+            value, _ = corner_law(metric, lambda scene, dt: (1.0, 0.0), 0.0)(scene, DT, CORNER.measure)
+            assert value == pytest.approx(CORNER.exact(scene)[metric], rel=1e-12)
+
+
+def test_the_law_of_the_corner_is_silent_about_all_that_it_does_not_compute():
+    def said(scene, units=1.0, skin=0.0, dt=DT):
+        return corner_law("rise", lambda scene, dt: (units, skin), 1.0)(scene, dt, CORNER.measure)
+
+    scene = CORNER.scene(2, {"e": 0.8, "tilt": 30.0, "v": 2.0})
+    floor, box = scene.bodies
+    assert said(scene) is not None
+    assert said(scene, skin=0.01) is None
+    assert said(CORNER.scene(2, {"e": 0.8, "tilt": 30.0}), skin=0.01) is not None  # at 1 m/s nothing rebounds
+    assert said(scene, dt=scene.duration) is None
+    for other in (
+        replace(scene, gravity=(0.0, -1.0)),
+        replace(scene, pairs=(Pair(restitution=0.8, friction=0.1),)),
+        replace(scene, bodies=(floor, replace(box, twist=(0.0, -2.0, 1.0)))),
+        replace(scene, bodies=(floor, replace(box, twist=(0.1, -2.0, 0.0)))),
+        replace(scene, bodies=(floor, replace(box, twist=(0.0, 2.0, 0.0)))),
+        replace(scene, bodies=(floor, replace(box, pose=(*box.pose[:2], 0.0)))),
+        replace(scene, bodies=(floor, replace(box, force=(0.0, 1.0)))),
+        CATALOGUE["impact"].scene(2),
+        CORNER.scene(3),
+    ):
+        assert said(other) is None, other
+
+
+def test_near_the_origin_and_of_other_scenes_the_law_of_places_is_silent():
+    law = standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0))
+    far = FAR.scene(2)
+    plate, box = far.bodies
+    assert law(far, DT, FAR.measure) == (0.0, 0.0)
+    for other in (
+        FAR.scene(2, {"far": 0.0}),
+        FAR.scene(2, {"far": 1024.0}),
+        replace(far, gravity=(1.0, -9.81)),
+        replace(far, bodies=(plate, replace(box, force=(1.0, 0.0)))),
+        replace(far, bodies=(plate, replace(box, twist=(3.0, 1.0, 0.0)))),
+        SEAM.scene(2),
+    ):
+        assert law(other, DT, FAR.measure) is None
+    deep = FAR.scene(3)
+    assert law(deep, DT, FAR.measure) == (0.0, 0.0)
+    assert law(replace(deep, gravity=(0.0, 0.1, -9.81)), DT, FAR.measure) is None
+
+
+def told(metric, method, scene, dt=DT):
+    return rounded_law(metric, method)(scene, dt, CATALOGUE[scene.name].measure)
+
+
+@pytest.mark.parametrize("name", BLOWS)
+def test_blows_event_by_event_end_in_the_scene_s_own_truth(name):
+    """In doubles, with the restitution that is asked for: as near as the scene's check asks of anybody."""
+    canonical, exact, said = CATALOGUE[name], Method(lambda e, speed: e, 200, 2.0**-53), 0
+    for dimension in canonical.dimensions:
+        for variation in canonical.quick:
+            scene = canonical.scene(dimension, variation.params)
+            for check in canonical.checks(scene, DT):
+                found = told(check.metric, exact, scene) if check.bound is not None else None
+                if found is not None:
+                    said += 1
+                    assert abs(found[0] - check.truth) <= check.bound, (check.metric, variation.params)
+                    assert 0.0 < found[1] < 1e-9, "a band of doubles"
+    assert said >= 4
+
+
+def test_the_band_is_that_of_the_roundings_and_grows_with_their_unit():
+    scene = CATALOGUE["head_on"].scene(3)
+    bands = [told("impulse", Method(lambda e, speed: e, 0, unit), scene)[1] for unit in (UNIT, 2.0 * UNIT)]
+    assert bands[1] == pytest.approx(2.0 * bands[0], rel=1e-3) and 1e-6 < bands[0] < 1e-3
+
+
+def test_restitution_of_an_engine_that_has_none_for_slow_blows_is_that_of_its_threshold():
+    scene = CATALOGUE["impact"].scene(2, {"e": 0.5, "v": 2.0})
+    for limit, at, rebound in ((1.0, False, 0.5), (3.0, False, 0.0), (2.0, False, 0.0), (2.0, True, 0.5)):
+        value, _ = told("rebound_ratio", Method(Threshold(limit, at)), scene)
+        assert value == pytest.approx(rebound, abs=1e-12)
+    assert Threshold(1.0)(0.7, 1.0) == 0.0 and Threshold(1.0)(0.7, 1.1) == 0.7
+
+
+def test_nothing_is_said_where_a_load_acts_or_blows_follow_each_other_within_a_few_steps():
+    exact = Method(lambda e, speed: e, 200)
+    scene = CATALOGUE["impact"].scene(2)
+    assert told("rebound_ratio", exact, scene) is not None
+    assert told("rebound_ratio", exact, replace(scene, gravity=(0.0, -1.0))) is None
+    floor, ball = scene.bodies
+    assert told("rebound_ratio", exact, replace(scene, bodies=(floor, replace(ball, force=(0.0, 1.0))))) is None
+    row = CATALOGUE["cradle"].scene(2)
+    metric = next(check.metric for check in CATALOGUE["cradle"].checks(row, DT) if check.bound is not None)
+    assert told(metric, exact, row) is not None and told(metric, exact, row, 0.3 * row.params["apart"]) is None
+
+
+def test_a_mass_that_singles_cannot_hold_is_named():
+    scene = CATALOGUE["impact"].scene(2)
+    floor, ball = scene.bodies
+    assert without_a_place(scene) is None
+    for name in ("mass", "inertia"):
+        for value in (1e-31, 1e31):
+            said = without_a_place(replace(scene, bodies=(floor, replace(ball, **{name: value}))))
+            assert said == f"{ball.name}.{name}: {value:g} has no place in single precision"
+    assert math.isclose(UNIT, 2.0**-24)
