@@ -16,7 +16,7 @@ pytest.importorskip("mujoco")
 
 from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
-from adapters.mujoco.pairs import contact_law
+from adapters.mujoco.pairs import contact_law, pair_solreffriction
 from adapters.needs import needs
 from adapters.receipts import receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
@@ -533,3 +533,10 @@ def test_the_solver_s_scale_is_of_the_free_bodies_where_a_body_is_prescribed() -
     scene = Scene("belt", 1, 3, (belt, light), (Pair(),), (0.0, 0.0, -G), 1.0)
     settings = {s.name: s.value for s in ENGINE.settings("default", needs(scene), DT)}
     assert Spec(scene, DT, settings).compile().stat.meaninertia == pytest.approx((3 * 1e-3 + 3 * 0.1) / 6)
+
+
+def test_friction_of_a_pair_is_softened_as_is_said_stopped_in_a_step_or_left_to_the_pair():
+    """Nothing said is MuJoCo's own (0, 0), "as solref"; -1/dt takes all of a slip off within a step of dt."""
+    assert pair_solreffriction({"solreffriction": None}, 0.25) == (0.0, 0.0)
+    assert pair_solreffriction({"solreffriction": "stick"}, 0.25) == (0.0, -4.0)
+    assert pair_solreffriction({"solreffriction": (0.02, 0.5)}, 0.25) == (0.02, 0.5)

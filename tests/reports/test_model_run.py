@@ -1,6 +1,7 @@
 """`crosscheck run model.xml`: a model people have, on every engine, as a user calls it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -175,3 +176,21 @@ def test_spread_is_read_at_the_horizon_of_the_certified_run():
     assert whole.time == 1.0 and whole.distance == pytest.approx(0.2)
     assert "not certified" in list(spread_lines([whole]))[1]
     assert spreads([other], kept[1:]) == []
+
+
+def test_momentum_is_counted_whichever_of_the_two_is_fixed_and_not_between_bodies_that_move():
+    scene, found = falling(kick=0.5, impulse=(0.0, 1.0))
+    rows = found.contacts.rows
+    # The floor is listed last: the impulse on it is what the ball loses.
+    turned = Contacts.from_rows([(0, 1, (0, 0), (0, -1), (0.0, -1.0), 0.0)], 2)
+    record = ContactRecord(found.contacts.step, found.contacts.offset, turned)
+    last = replace(found, pose=found.pose[:, ::-1], twist=found.twist[:, ::-1], contacts=record)
+    assert momentum_drift(replace(scene, bodies=scene.bodies[::-1]), last)[0] == pytest.approx(0.0, abs=1e-12)
+    # Two balls that push each other apart keep what both have, whatever is reported of it.
+    other = replace(scene.bodies[1], name="other", pose=(5.0, 9.0, 0.0))
+    both = replace(scene, bodies=(*scene.bodies, other))
+    twist = np.concatenate([found.twist, found.twist[:, 1:]], axis=1)
+    twist[:, 1:] -= [[[0.0, 0.5, 0.0]]] * (np.arange(len(twist)) == len(twist) - 1)[:, None, None]
+    pair = Contacts.from_rows([(1, 2, (0, 0), (1, 0), (3.0, 0.0), 0.0)], 2)
+    pushed = replace(found, pose=np.zeros_like(twist), twist=twist, contacts=replace(found.contacts, rows=pair))
+    assert rows.a[0] == 0 and momentum_drift(both, pushed)[0] == pytest.approx(0.0, abs=1e-12)

@@ -4,14 +4,17 @@ import hashlib
 import sys
 import textwrap
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from adapters import registry
 from adapters.stepping import run
+from validation.bench import sweep
 from validation.bench.lane import Limits, run_lane
 from validation.bench.stopwatch import lap
+from validation.bench.sweep import SAMPLED_DT
 from validation.bench.units import Unit, overhead_units, own_error, prepared, scene_of, size_units, work_unit
 from validation.cells import Slot
 
@@ -238,3 +241,19 @@ def test_overhead_is_timed_for_every_engine_that_has_the_dimension(clockwork):
     assert {(u.slot.scene, u.slot.dimension, u.sampled) for u in units} == {
         (scene, 2, sampled) for scene in ("empty", "flight") for sampled in (False, True)
     }
+
+
+@pytest.mark.parametrize("iterations", [None, 4])
+@pytest.mark.parametrize("dt", [SAMPLED_DT, 0.5 * SAMPLED_DT])
+def test_a_work_point_is_timed_with_states_read_too_at_one_step_and_the_profile_s_own_sweeps(
+    monkeypatch, dt, iterations
+):
+    slot = Slot("impact", (), 2, "chipmunk", "tuned", dt, iterations)
+    members = [SimpleNamespace(slot=slot, cell="its cell")]
+    point = {"reason": "", "slot": slot.as_dict(), "error": 0.25}
+    monkeypatch.setattr(sweep, "accuracy", lambda asked: point)
+    found = list(sweep._work_units(members))
+    assert [unit.sampled for unit in found] == [False, True][: 1 + (dt == SAMPLED_DT and iterations is None)]
+    assert {(unit.slot, unit.cell, unit.error, unit.purpose) for unit in found} == {(slot, "its cell", 0.25, "work")}
+    monkeypatch.setattr(sweep, "accuracy", lambda asked: point | {"reason": "it has no error"})
+    assert list(sweep._work_units(members)) == []

@@ -75,3 +75,11 @@ def test_a_file_that_is_no_store_is_said_in_one_line(tmp_path):
     (tmp_path / "results.sqlite").write_text("this is not a database, but long enough to look like one" * 20)
     with pytest.raises(StoreError, match="out: cannot use"):
         Store(tmp_path)
+
+
+def test_a_store_that_is_closed_says_that_it_cannot_write(tmp_path):
+    store = Store(tmp_path)
+    store.compact()
+    store.close()
+    with pytest.raises(StoreError, match=r"^out: cannot write .*results"):
+        store.compact()

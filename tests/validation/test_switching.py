@@ -12,6 +12,7 @@ from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of
 from validation.running.plan import QUICK_DT, in_quick_suite
+from validation.settings import proofs
 from validation.settings.proofs import Proof
 from validation.settings.switching import Reading, reading, readings, side_by_side, switched
 from validation.settings.tuning import Score, broken, score
@@ -148,3 +149,17 @@ def test_what_passed_and_fails_is_broken_and_what_failed_is_not():
 def test_an_unfinished_cell_has_readings_without_values():
     lost = Observation(SLOT, "", 0, "", Outcome.TIMED_OUT, "no answer")
     assert all(each.value is None and "no answer" in each.reason for each in readings(lost))
+
+
+def test_a_study_whose_cells_have_no_answer_is_read_as_its_check_without_a_value(monkeypatch):
+    slot = Slot("impact", (), 2, "chipmunk", "tuned", QUICK_DT)
+    check = Check("threshold", "1", 0.5, 0.01, "a step", "a law")
+    observation = Observation(slot, "", 1, "1", Outcome.OK)
+    monkeypatch.setattr(proofs, "_cells", lambda slot, metric: [slot, slot])
+    monkeypatch.setattr(proofs, "study_of", lambda scene, metric: "a study")
+    monkeypatch.setattr(proofs, "readings", lambda seen: [Reading(slot, check, 0.5, "")])
+    monkeypatch.setattr(proofs, "results_of", lambda *asked: iter(()))
+    said = "the study's cells have no answer"
+    assert proofs._read(slot, "threshold", {slot: observation}) == Reading(slot, check, None, said)
+    monkeypatch.setattr(proofs, "results_of", lambda *asked: iter([Reading(slot, check, 0.25, "told")]))
+    assert proofs._read(slot, "threshold", {slot: observation}) == Reading(slot, check, 0.25, "told")

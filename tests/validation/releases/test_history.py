@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from reports import history as published
 from reports.command import releasing
 from reports.history import sentences
 from validation.cells import Observation, Outcome, Slot
@@ -398,3 +399,18 @@ def test_a_doubted_row_has_neither_verdict_nor_standing():
     assert (doubted.physics, doubted.standing, doubted.outcome) == (None, None, Outcome.INVALID.value)
     assert doubted.reason == "no verdict: a receipt fails"
     assert history._doubted(known, {"default": "a receipt fails"}) is known
+
+
+def test_the_published_page_has_a_part_per_engine_with_what_moved_or_that_nothing_did(tmp_path, monkeypatch):
+    store = Store(tmp_path)
+    monkeypatch.setattr(history, "engines", lambda store: ["one", "other"])
+    monkeypatch.setattr(history, "told", lambda store, engine: [])
+    monkeypatch.setattr(history, "steps", lambda told: [])
+    monkeypatch.setattr(published, "as_table", lambda told, steps: "a table")
+    monkeypatch.setattr(published, "sentences", lambda engine, steps: ["two rows moved"] if engine == "one" else [])
+    lines = published.page(store).splitlines()
+    store.close()
+    assert lines[0] == "# Physics over engine releases"
+    assert lines[lines.index("## one") :] == [
+        "## one", "", "a table", "* two rows moved", "", "## other", "", "a table", "No row moved.",
+    ]  # fmt: skip
