@@ -38,8 +38,10 @@ def import_common() -> None:
             continue
 
 
-def run(copy: Path, arguments: Sequence[str], environment: Mapping[str, str], cpu_seconds: float) -> int:
-    """Pytest's exit status in ``copy``; `OUT_OF_TIME` where it took more CPU than that, or all `PATIENCE`."""
+def run(
+    copy: Path, arguments: Sequence[str], environment: Mapping[str, str], cpu_seconds: float, patience: float = PATIENCE
+) -> int:
+    """Pytest's exit status in ``copy``; `OUT_OF_TIME` where it took more CPU than that, or all ``patience`` [s]."""
     child = start(copy, arguments, environment, cpu_seconds)
     begun = time.monotonic()
     while True:
@@ -47,7 +49,7 @@ def run(copy: Path, arguments: Sequence[str], environment: Mapping[str, str], cp
         if pid:
             code = os.waitstatus_to_exitcode(status)
             return OUT_OF_TIME if code == -signal.SIGKILL else code
-        if time.monotonic() - begun > PATIENCE:
+        if time.monotonic() - begun > patience:
             os.killpg(child, signal.SIGKILL)
             os.waitpid(child, 0)
             return OUT_OF_TIME

@@ -44,10 +44,12 @@ from libcst import FunctionDef, Module
 from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
-from pytest_apart import OUT_OF_TIME, import_common, run
+from pytest_apart import OUT_OF_TIME, PATIENCE, import_common, run
 from reach import PLUGIN, Reach, block_of, by_block, dotted, environment, record
 from subjects import PACKAGES, ROOT
 
+#: Seconds of wall time that a whole file may take: what its tests start in processes of their own counts nowhere else.
+PATIENCE_WITH_FILES = 60.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
 
@@ -203,14 +205,14 @@ def judged(copy: Path, module: str, source: str, tests: Sequence[tuple[str, floa
 def by_whole_files(copy: Path, module: str, source: str, files: Sequence[str]) -> str:
     """First test of these files that fails, and not without the mutant; empty where there is none.
 
-    Those that name the module, as cases of scenes do, come first.
+    Of a scene the cases that name it.
     """
+    cases = ["-k", Path(module).stem] if module.startswith("validation/scenes/") else []
     for name in files:
-        for chosen in ([name, "-k", Path(module).stem], [name]):
-            with spoilt_copy(copy, module, source):
-                _, failed = asked(copy, chosen, LONGEST)
-            if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
-                return failed
+        with spoilt_copy(copy, module, source):
+            _, failed = asked(copy, [name, *cases], LONGEST, PATIENCE_WITH_FILES)
+        if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
+            return failed
     return ""
 
 
@@ -242,12 +244,12 @@ def spoilt_copy(copy: Path, module: str, source: str) -> Iterator[None]:
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
-def asked(copy: Path, tests: Sequence[str], cpu_seconds: float) -> tuple[int, str]:
+def asked(copy: Path, tests: Sequence[str], cpu_seconds: float, patience: float = PATIENCE) -> tuple[int, str]:
     """Exit status of these tests in the copy as it is, and the first that failed."""
     with tempfile.TemporaryDirectory(prefix="crosscheck-sample-") as text:
         folder = Path(text)
         (folder / "tests").write_text("\n".join(tests), encoding="utf-8")
         arguments = ["-p", PLUGIN, f"@{folder / 'tests'}"]
-        code = run(copy, arguments, environment(copy, folder, float("inf")), cpu_seconds)
+        code = run(copy, arguments, environment(copy, folder, float("inf")), cpu_seconds, patience)
         said = (folder / "failed").read_text(encoding="utf-8") if (folder / "failed").exists() else ""
         return code, next(iter(said.splitlines()), "")
