@@ -27,7 +27,7 @@ class Drawn:
 
     ``of`` is the hash of everything that could be drawn, ``now`` what became of a survivor since, with tests that were
     written for it: the estimate is made of ``verdict`` alone, for what is mended because it was drawn says nothing of
-    the others.
+    the others. ``met`` says what could notice it: a sample stays what it was drawn with.
     """
 
     seed: int
@@ -41,6 +41,15 @@ class Drawn:
     failed: str
     now: str = ""
     reason: str = ""
+    met: str = ""
+
+
+#: What a mutant meets that is drawn today.
+MEETS = (
+    f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those that "
+    f"a test file begins within {RECORDED:g} s; then, unless its form tells that it changes words, {WHOLE_FILES} of the "
+    f"files that go on, for {LONGEST:g} s"
+)
 
 
 def stored() -> list[Drawn]:
@@ -70,9 +79,7 @@ def table(rows: list[Drawn]) -> list[str]:
         "", "## A sample of all modules", "",
         f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {rows[0].seed} from all of the "
         f"three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
-        f"A mutant met the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of "
-        f"CPU, of those that a test file begins within {RECORDED:g} s; what survived them {WHOLE_FILES} whole files of "
-        f"those that go on, {LONGEST:g} s of each. A survivor may be one that other tests notice.", "",
+        f"A mutant met {rows[0].met}. A survivor may be one that other tests notice.", "",
         f"**{len(noticed)} of {len(rows)} are noticed, {100.0 * len(noticed) / len(rows):.1f} % (95 %: "
         f"{100.0 * interval.low:.1f} to {100.0 * interval.high:.1f} %).**", "",
         "| package | drawn | killed | ended by time | survived | no test reaches it | test fails without it |",

@@ -28,6 +28,7 @@ from drawn import (
     APART,
     KILLED,
     LONGEST,
+    MEETS,
     NOTICED,
     RECORDED,
     SPENT,
@@ -41,6 +42,7 @@ from drawn import (
     write,
 )  # fmt: skip
 from libcst import FunctionDef, Module
+from lists import known_by_form
 from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
@@ -142,13 +144,16 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
         verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it))
         if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
-        if verdict in (SURVIVED, UNREACHED):
+        change = change_of(tree, mutation)
+        why = known_by_form(change)
+        if verdict in (SURVIVED, UNREACHED) and not why:
             failed = by_whole_files(copy, module, spoilt.code, cut_short(reach, module)) or failed
             verdict = KILLED if failed else verdict
         if k in found:
             found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
         else:
-            found[k] = Drawn(seed, k, of, module, function, change_of(tree, mutation), verdict, tests, failed)
+            reason = "" if verdict in NOTICED else why
+            found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=MEETS)
         print(f"{k + 1} of {number}: {verdict}, {found[k].function}: {found[k].change[:100]}", flush=True)
         write(list(found.values()))
     return list(found.values())
