@@ -46,9 +46,9 @@ class Drawn:
 
 #: What a mutant meets that is drawn today.
 MEETS = (
-    f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those that "
-    f"a test file begins within {RECORDED:g} s; then, unless its form tells that it changes words, {WHOLE_FILES} of the "
-    f"files that go on, for {LONGEST:g} s"
+    f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those "
+    f"that a test file begins within {RECORDED:g} s; then, unless its form tells that it changes words, "
+    f"{WHOLE_FILES} of the files that go on, for {LONGEST:g} s"
 )
 
 
