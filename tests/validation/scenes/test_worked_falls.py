@@ -241,7 +241,7 @@ def test_of_a_step_that_is_nothing_only_round_off_is_forgiven():
     for dt in (1e-6, 1e-9):
         assert ON.spin_off(START, 1.0, END, dt) < 1e2 * dt and ON.time_off(START, 1.0, END, dt) < 1e2 * dt
     truth = {"passing_time": ON.time(START, 0.0, END), "passing_spin": ON.speed(START, 0.0, END), "edge_moved": 0.0}
-    (_, _, moved) = fall_checks(ON, START, END, 1e-9, truth)
+    (_, _, moved) = fall_checks(ON, START, END, 1e-18, truth)
     assert moved.bound >= 0.5e-12, "the edge is told to the round-off of the arm of 0.5 m, 1e-12 of it"
 
 

@@ -1,6 +1,7 @@
 """Boxes that slide to a stop, worked out once more by hand: how they start, what is forgiven, ghost and error."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,4 +155,11 @@ def test_places_are_told_to_the_round_off_of_the_way_or_of_the_farthest_plate():
         scene = canonical.scene(2, params)
         (hop,) = (check for check in canonical.checks(scene, 1e-8) if check.metric == "hop")
         farthest = place or scene.bodies[-2].pose[0]
-        assert hop.bound == pytest.approx(9.81e-16 + 1e-12 * farthest, rel=1e-3)
+        assert hop.bound == pytest.approx(9.81e-16 + 1e-12 * farthest, rel=1e-3, abs=0.0)
+
+
+def test_a_ghost_in_space_starts_where_the_box_does():
+    canonical, scene = made("slide", 3, heading=30.0)
+    box = scene.bodies[-1]
+    moved = replace(scene, bodies=(*scene.bodies[:-1], replace(box, pose=(1.0, -2.0, *box.pose[2:]))))
+    assert canonical.track(moved).position(0.0) == pytest.approx((1.0, -2.0, box.pose[2]))
