@@ -271,12 +271,14 @@ def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
     assert not (tmp_path / "not there").exists()
 
 
-def test_a_side_is_the_last_run_with_its_date_and_the_times_of_the_last_bench(page_folder):
+def test_a_side_is_the_last_run_with_its_date_and_the_times_of_the_last_bench(page_folder, monkeypatch):
+    kept = Store.runs
+    monkeypatch.setattr(Store, "runs", lambda self: [replace(run, commit=f"made at {run.id}") for run in kept(self)])
     store = Store(page_folder, create=False)
     bench = bench_runs(store)[-1]
     run = [run for run in store.runs() if run.id != bench.id][-1]
     wanted = [row for table in [ratios(store, bench)] for row in table.to_dict("records")]
     store.close()
     found = changes._load_run(page_folder, "latest")
-    assert (found.run, found.date, found.commit) == (run.id, run.date, run.commit) and found.rows
+    assert (found.run, found.date, found.commit) == (run.id, run.date, f"made at {run.id}") and found.rows
     assert list(found.ratios) == [{str(k): v for k, v in row.items()} for row in wanted] and wanted
