@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from validation.cells import Outcome, Slot
+from adapters.registry import load
+from adapters.stepping import run
+from validation.cells import Outcome, Slot, settings_of
 from validation.field import measured
 from validation.field.measured import CONTRADICTED, SHOWN, facts_of
+from validation.posed import resolve
 from validation.running.execution import execute
 from validation.settings.switching import observe
 
@@ -98,6 +102,25 @@ class TestReference:
         found = measure("stack", "reference", "reference", 1 / 240, dimension, n=float(n))
         for i in range(1, n + 1):
             assert abs(found[f"interface_impulse[{i}]"] - 1.0) <= 1e-6
+
+
+@pytest.mark.parametrize(
+    ("engine", "scene", "dt", "params", "depth", "within"),
+    [
+        ("mujoco", "stack", 1 / 1000, {"n": 2.0}, 34e-6, 0.5e-6),
+        ("mujoco", "heavy_on_light", 1 / 1000, {}, 0.85e-3, 0.025e-3),  # half of what the top sinks by
+        ("bullet", "heavy_on_light", 1 / 240, {}, 3.5e-3, 0.05e-3),
+        ("bullet", "stack", 1 / 240, {"n": 10.0}, 0.39e-3, 0.005e-3),
+    ],
+)
+def test_columns_end_as_deep_as_measured(engine, scene, dt, params, depth, within):
+    """The deepest pair at the end of the run, as shipped; the scene's own metric is the deepest of the whole run."""
+    canonical = resolve(scene)
+    slot = Slot(scene, canonical.minimal(params), 3, engine, "default", dt)
+    posed, loaded = canonical.scene(3, params), load(engine)
+    settings = {setting.name: setting.value for setting in settings_of(loaded, slot, posed)}
+    heights = run(loaded, posed, dt, settings, canonical.sampling(posed)).pose[-1, 1:, 2]
+    assert np.max(1.0 - np.diff(heights)) == pytest.approx(depth, abs=within)
 
 
 @pytest.fixture(scope="module")
