@@ -12,6 +12,7 @@ from rich.text import Text
 
 from reports.cures import setting_text
 from reports.wording import number, quantity
+from validation.cells import format_dt
 from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
@@ -133,7 +134,7 @@ def _said_of(fact: Plain) -> str:
     params = "".join(f" {name}={value:g}" for name, value in fact["params"].items())
     params += "".join(f" {name}={setting_text(value)}" for name, value in fact["settings"].items())
     sweeps = f" {fact['iterations']} iterations" if fact["iterations"] else ""
-    cell = f"{fact['profile']} {fact['scene']} {fact['dimension']}-D{params}, step {fact['dt']:.3g} s{sweeps}"
+    cell = f"{fact['profile']} {fact['scene']} {fact['dimension']}-D{params}, step {format_dt(fact['dt'])} s{sweeps}"
     off = "off by " if fact["error"] else ""
     because = f"; {fact['because']}" if fact["because"] else ""
     return f"{cell}: {fact['metric']} {off}{number(fact['found'])}{because}"
