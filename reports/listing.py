@@ -14,6 +14,7 @@ from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from validation.catalogue import CATALOGUE, broken
+from validation.field.measured import facts_of
 from validation.identity import commit, machine
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
@@ -112,6 +113,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "profile_schemes": {profile: asdict(scheme) for profile, scheme in facts.profile_schemes.items()},
         "customary_dt": facts.customary_dt,
         "quirks": [asdict(quirk) for quirk in facts.quirks],
+        "measured": [asdict(fact) | {"standing": fact.standing} for fact in facts_of(name)],
         "known_bad_versions": dict(facts.known_bad_versions),
         "profiles": profiles,
     }

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from reports.cures import setting_text
 from reports.wording import number, quantity
+from validation.cells import format_dt
 from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
@@ -117,6 +118,26 @@ def _engine(data: Plain, console: Console) -> None:
     console.print(table)
     for version, why in data["known_bad_versions"].items():
         console.print(Text(f"version {version} is known to be bad: {why}"))
+    if data["measured"]:
+        _heading("Measured without this adapter, and what our cells say", console)
+        table = grid("measured", "", "our cell, test or reason")
+        table.columns[0].no_wrap = False
+        for fact in data["measured"]:
+            table.add_row(Text(fact["says"]), Text(fact["standing"]), Text(_said_of(fact)))
+        console.print(table)
+
+
+def _said_of(fact: Plain) -> str:
+    """The cell that shows a fact with its number, the test that asserts it, or why nothing does."""
+    if not fact["scene"]:
+        return str(fact["test"] or fact["unasked"])
+    params = "".join(f" {name}={value:g}" for name, value in fact["params"].items())
+    params += "".join(f" {name}={setting_text(value)}" for name, value in fact["settings"].items())
+    sweeps = f" {fact['iterations']} iterations" if fact["iterations"] else ""
+    cell = f"{fact['profile']} {fact['scene']} {fact['dimension']}-D{params}, step {format_dt(fact['dt'])} s{sweeps}"
+    off = "off by " if fact["error"] else ""
+    because = f"; {fact['because']}" if fact["because"] else ""
+    return f"{cell}: {fact['metric']} {off}{number(fact['found'])}{because}"
 
 
 def _settings(scenes: Mapping[str, Sequence[Plain]]) -> Table:

@@ -131,8 +131,8 @@ def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
     moves = ", ".join(map(str, MOVES))
     console.print()
     said = (
-        f"A change counts above {FACTOR:g} times the largest one from starts moved by {moves} units in the last place "
-        f"and {INVISIBLE:g} of its check's tolerance."
+        f"A change counts above {FACTOR:g} times the largest one from starts moved, or turned, by {moves} units in the "
+        f"last place and {INVISIBLE:g} of its check's tolerance."
     )
     console.print(Text(said, style="dim"))
     console.print(Text("; ".join(f"{each.name}: {each.says}" for each in RELATIONS), style="dim"))

@@ -19,14 +19,16 @@ from click.testing import CliRunner
 from reports import page
 from reports.answers import answers
 from reports.command import main
+from reports.cures import Change
 from reports.page import Source, as_data, first_answers, load_source, policy, render
-from reports.page.choosing import choices, cures
+from reports.page.choosing import Cure, choices, cures
 from reports.page.conclusions import NAMED, findings, scenes_text, sentences
 from reports.page.explorer import explorer
+from reports.page.fairness import _once
 from reports.page.families import families, sentence
 from reports.page.replay import Replay, people, replays
 from reports.page.scenes import split_figure
-from reports.page.verdicts import slug
+from reports.page.verdicts import Mark, slug
 from validation.cells import Slot
 from validation.records.store import Run, Store
 from validation.running.execution import execute
@@ -479,3 +481,21 @@ def test_the_guides_of_a_chart_have_the_slopes_they_claim_also_where_the_picture
 )  # fmt: skip
 def test_who_leaves_the_tolerance_is_told_in_a_line_the_first_on_top(departures, said):
     assert Replay("i", "t", "s", {}, "", None, "c", departures).departures_text == said
+
+
+def cure_of(engine, scene, dimension=2, changed="10", paste="iterations = 30"):
+    """A cure with one changed setting."""
+    mark = Mark("fail", "")
+    return Cure(scene, dimension, engine, "default", "tuned", mark, mark, "drift", "1", "0",
+                [Change("iterations", changed, "30", "fewer leave more")], paste, "")  # fmt: skip
+
+
+def test_equal_cures_are_said_once_and_others_point_at_the_first():
+    """One per engine and scene; the same settings of one engine stand with the first scene that has them."""
+    first, flat, space = cure_of("chipmunk", "stack"), cure_of("chipmunk", "rack"), cure_of("chipmunk", "stack", 3)
+    other, pasted = cure_of("chipmunk", "pinch", changed="20"), cure_of("chipmunk", "arch", paste="iterations = 31")
+    found = _once([first, space, flat, other, pasted, cure_of("bullet", "stack")])
+    assert [(c.engine, c.scene, c.dimension, c.like) for c in found] == [
+        ("chipmunk", "stack", 2, ""), ("chipmunk", "rack", 2, "stack"), ("chipmunk", "pinch", 2, ""),
+        ("chipmunk", "arch", 2, ""), ("bullet", "stack", 2, ""),
+    ]  # fmt: skip

@@ -1,9 +1,18 @@
 """The adapters are right: figures measured independently on each engine come out of our own cells."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from validation.cells import Outcome, Slot
+from adapters.registry import load
+from adapters.stepping import run
+from validation.cells import Outcome, Slot, settings_of
+from validation.field import measured
+from validation.field.measured import CONTRADICTED, SHOWN, facts_of
+from validation.posed import resolve
 from validation.running.execution import execute
+from validation.settings.switching import observe
 
 
 def measure(scene, engine, profile, dt, dimension=2, iterations=None, **params):
@@ -93,3 +102,64 @@ class TestReference:
         found = measure("stack", "reference", "reference", 1 / 240, dimension, n=float(n))
         for i in range(1, n + 1):
             assert abs(found[f"interface_impulse[{i}]"] - 1.0) <= 1e-6
+
+
+@pytest.mark.parametrize(
+    ("engine", "scene", "dt", "params", "depth", "within"),
+    [
+        ("mujoco", "stack", 1 / 1000, {"n": 2.0}, 34e-6, 0.5e-6),
+        ("mujoco", "heavy_on_light", 1 / 1000, {}, 0.85e-3, 0.025e-3),  # half of what the top sinks by
+        ("bullet", "heavy_on_light", 1 / 240, {}, 3.5e-3, 0.05e-3),
+        ("bullet", "stack", 1 / 240, {"n": 10.0}, 0.39e-3, 0.005e-3),
+    ],
+)
+def test_columns_end_as_deep_as_measured(engine, scene, dt, params, depth, within):
+    """The deepest pair at the end of the run, as shipped; the scene's own metric is the deepest of the whole run."""
+    canonical = resolve(scene)
+    slot = Slot(scene, canonical.minimal(params), 3, engine, "default", dt)
+    posed, loaded = canonical.scene(3, params), load(engine)
+    settings = {setting.name: setting.value for setting in settings_of(loaded, slot, posed)}
+    heights = run(loaded, posed, dt, settings, canonical.sampling(posed)).pose[-1, 1:, 2]
+    assert np.max(1.0 - np.diff(heights)) == pytest.approx(depth, abs=within)
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Answers of all cells of all facts."""
+    return observe([fact.slot(engine) for engine, fact in MEASURED if fact.scene])
+
+
+MEASURED = [(engine, fact) for engine in ("chipmunk", "bullet", "mujoco") for fact in facts_of(engine)]
+
+
+@pytest.mark.parametrize(
+    ("engine", "fact"), [pytest.param(*each, id=f"{each[0]}-{each[1].says}") for each in MEASURED if each[1].scene]
+)
+def test_our_cells_answer_what_was_measured_or_what_contradicts_it(engine, fact, seen):
+    """A fact that is shown stays between its ends; one that is contradicted stays what it was found to be."""
+    observation = seen[fact.slot(engine)]
+    assert observation.outcome is Outcome.OK, observation.reason
+    value = fact.number_of(observation.metrics)
+    assert value is not None
+    assert fact.holds(value) is (fact.standing == SHOWN), value
+    assert fact.standing == SHOWN or value == pytest.approx(fact.found, rel=0.01)
+
+
+@pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco"])
+def test_facts_without_a_cell_name_a_test_that_there_is_or_say_why(engine):
+    assert len(facts_of(engine)) >= 30
+    root = Path(__file__).parents[2]
+    for fact in facts_of(engine):
+        if fact.test:
+            path, _, name = fact.test.partition("::")
+            assert f"def {name}(" in (root / path).read_text(encoding="utf-8"), fact.test
+        assert fact.scene or fact.test or len(fact.unasked) > 20
+
+
+def test_a_fact_is_shown_contradicted_or_refused_by_its_numbers():
+    ends = {"says": "it creeps", "scene": "incline", "profile": "default", "metric": "creep", "low": 1.0, "high": 2.0}
+    assert measured._fact(ends | {"found": 1.5}).standing == SHOWN
+    assert measured._fact(ends | {"found": 2.5, "because": "another floor"}).standing == CONTRADICTED
+    for wrong in ({"found": 2.5}, {"found": 1.5, "because": "none needed"}, {"found": 1.5, "unasked": "both"}):
+        with pytest.raises(ValueError, match="it creeps"):
+            measured._fact(ends | wrong)

@@ -4,18 +4,20 @@
 
 Bodies renumbered, world turned about the vertical or mirrored, moved far away or carried along, a bystander out of
 reach, the same again in the same process and in a fresh one. The largest change of each metric is judged against ten
-times the largest change from starts moved by 1 to 16 units in the last place, and a thousandth of its check's
-tolerance: what a chaotic scene makes of round-off is no fault of its engine, and nobody sees what no check could. Where
-the map itself rounds coarser (far away), the moved starts are rounded as coarsely. What looks like a break is asked of
-moved starts of the scene as it is posed as well: the larger scatter of both counts.
+times the largest change from starts moved, and turned, by 1 to 16 units in the last place, and a thousandth of its
+check's tolerance: what a chaotic scene makes of round-off is no fault of its engine, and nobody sees what no check
+could. Where the map itself rounds coarser (far away), the moved starts are rounded as coarsely.
+
+A map that only swaps numbers and signs rounds nothing: an engine that does not see it scatters as much in the other
+pose as in the scene's own, from starts that are the same numbers. Scatter of the other pose alone is the break itself.
+Where every step rounds otherwise (a third of a quarter turn, a speed, a place far away), it counts as well.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from adapters.scene import Body, HalfSpace, Hull, Pair, Polygon, Scene, Shape
 from adapters.shapes import reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
+from validation.canonical import CanonicalScene
 from validation.cells import Slot, settings_of
 from validation.posed import resolve
 from validation.running.apart import Apart
@@ -34,7 +37,8 @@ from validation.running.apart import Apart
 MOVES = (1, 2, 4, 8, 16)
 #: How many times the largest change from moved starts a map may change a metric by.
 FACTOR = 10.0
-#: What is left where moved starts change nothing: the last digits of the value itself, in units of the machine's.
+#: What is left where moved starts change nothing: last digits of the value itself, or of what it is a small difference
+#: of (`scales`), in units of the machine's.
 LAST_DIGITS = 64.0 * float(np.finfo(float).eps)
 #: Share of a check's tolerance below which a change is not seen: a defect of exactly nothing has no last digits.
 INVISIBLE = 1e-3
@@ -55,12 +59,16 @@ class Posed:
 
 @dataclass(frozen=True)
 class Relation:
-    """One thing that must not matter; ``pose`` gives the scene posed so, or says why it cannot be."""
+    """One thing that must not matter; ``pose`` gives the scene posed so, or says why it cannot be.
+
+    ``rounds`` says that the map, or each step of the scene posed so, rounds otherwise than the scene itself.
+    """
 
     name: str
     says: str
     pose: Callable[[Scene], Posed | str]
     fresh: bool = False
+    rounds: bool = False
 
 
 @dataclass(frozen=True)
@@ -249,11 +257,11 @@ RELATIONS = (
     Relation("again", "run again in the same process", itself),
     Relation("fresh process", "run in a process that has run nothing else", itself, fresh=True),
     Relation("renumbered", "bodies in the opposite order", renumbered),
-    Relation("turned 33", "world turned by 33 degrees about the vertical", turned(33.0)),
+    Relation("turned 33", "world turned by 33 degrees about the vertical", turned(33.0), rounds=True),
     Relation("turned 90", "world turned by 90 degrees about the vertical", turned(90.0)),
     Relation("mirrored", "left and right swapped", mirrored),
-    Relation("boosted", "everything carried along at one size a second", boosted),
-    Relation("moved", "a thousand of its sizes to the side", moved_away),
+    Relation("boosted", "everything carried along at one size a second", boosted, rounds=True),
+    Relation("moved", "a thousand of its sizes to the side", moved_away, rounds=True),
     Relation("bystander", "one more body, out of reach", with_a_bystander),
 )
 
@@ -339,10 +347,11 @@ def _mapped(
 # ---- runs ------------------------------------------------------------------------------------------------------------
 
 
-def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
+def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) -> Metrics | str:
     """Metrics of a cell posed as ``relation`` says, or why there are none; runs in this process.
 
-    ``moves`` [m] is how far each free body is moved along all axes, one up and the next down.
+    ``moves`` [m] is how far each free body is moved along all axes, one up and the next down; ``turns`` [rad], how far
+    it is turned about all axes.
     """
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
@@ -357,7 +366,7 @@ def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
             return refusal
         # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
-        found = run(engine, _nudged(posed.scene, moves), slot.dt, settings, canonical.sampling(scene))
+        found = run(engine, _nudged(posed.scene, moves, turns), slot.dt, settings, canonical.sampling(scene))
         if found.finish == "diverged":
             return found.reason
         return dict(canonical.measure(scene, posed.back(found)))
@@ -365,15 +374,22 @@ def measured(slot: Slot, relation: str, moves: float = 0.0) -> Metrics | str:
         return said_by(error)
 
 
-def _nudged(scene: Scene, by: float) -> Scene:
-    """Every free body moved along all axes, each against the one before: what lies between any two is changed."""
-    if by == 0.0:
+def _nudged(scene: Scene, by: float, turn: float = 0.0) -> Scene:
+    """Every free body moved along and turned about all axes, each against the one before.
+
+    What lies between any two is changed, and which of a body's corners is the lowest.
+    """
+    if by == 0.0 and turn == 0.0:
         return scene
-    bodies, sign = [], 1.0
+    d, bodies, sign = scene.dimension, [], 1.0
     for body in scene.bodies:
         if body.motion == "free":
-            place = tuple(x + sign * by for x in body.pose[: scene.dimension])
-            body, sign = replace(body, pose=(*place, *body.pose[scene.dimension :])), -sign
+            place, attitude = np.array(body.pose[:d]) + sign * by, np.array(body.pose[d:])
+            if d == 2:
+                attitude = attitude + sign * turn
+            elif turn:
+                attitude = _product(np.array([1.0, *[0.5 * sign * turn] * 3]), attitude)
+            body, sign = replace(body, pose=(*_plain(place), *_plain(attitude))), -sign
         bodies.append(body)
     return replace(scene, bodies=tuple(bodies))
 
@@ -395,32 +411,62 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     tolerances = {check.metric: check.bound for check in canonical.checks(scene, slot.dt) if check.bound}
+    sizes = scales(canonical, scene, slot.dt)
     base = apart.ask(measured, slot, "again")
     if isinstance(base, str):
         return [Change(each.name, refused=base) for each in wanted]
-    floors: dict[float, Mapping[str, float]] = {}
+
+    def scatter(start: Metrics, relation: str, unit: float, turn: float = 0.0) -> Mapping[str, float]:
+        steps = [sign * k for k in MOVES for sign in (1, -1)]
+        return floor(start, [apart.ask(measured, slot, relation, k * unit, k * turn) for k in steps])
+
+    moved: dict[float, Mapping[str, float]] = {}
+    turned: dict[float, Mapping[str, float]] = {}
     found = []
     for relation in wanted:
         posed = relation.pose(scene)
         if isinstance(posed, str):
             found.append(Change(relation.name, refused=posed))
             continue
-        unit = unit_of(scene, posed.shift)
-        if unit not in floors:
-            floors[unit] = floor(
-                base, [apart.ask(measured, slot, "again", sign * k * unit) for k in MOVES for sign in (1, -1)]
-            )
+        unit, finest = unit_of(scene, posed.shift), unit_of(scene, 0.0)
+        if unit not in moved:
+            moved[unit] = scatter(base, "again", unit)
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
-        coarser = unit / unit_of(scene, 0.0)
-        change = judged(relation.name, base, answer, floors[unit], tolerances, coarser)
+        allowances = Allowances(moved[unit], tolerances, sizes, unit / finest)
+        change = judged(relation.name, base, answer, allowances)
+        # Starts are moved first; what no scatter can mend, or need, is not asked of further ones.
         if not change.holds and not isinstance(answer, str):
-            # Steps round otherwise there, all along the way: what that scatters is no change either.
-            there = floor(
-                answer, [apart.ask(measured, slot, relation.name, sign * k * unit) for k in MOVES for sign in (1, -1)]
-            )
-            wider = {name: max(by, there.get(name, 0.0)) for name, by in floors[unit].items()}
-            change = judged(relation.name, base, answer, wider, tolerances, coarser)
+            if unit not in turned:
+                turned[unit] = scatter(base, "again", 0.0, unit / size_of(scene))
+            allowances = allowances.wider(turned[unit])
+            change = judged(relation.name, base, answer, allowances)
+            if relation.rounds and not change.holds:
+                change = judged(relation.name, base, answer, allowances.wider(scatter(answer, relation.name, unit)))
         found.append(change)
+    return found
+
+
+def scales(canonical: CanonicalScene, scene: Scene, dt: float) -> dict[str, float]:
+    """What each metric is a small difference of, in its own unit: by how large the scene is, and how fast it moves.
+
+    A defect of nothing, or the place of what stays at the origin, has no last digits of its own; lengths, speeds and
+    times that it is computed from have. Units are those of the checks that the scene states in any of its cells.
+    """
+    d = scene.dimension
+    free = [body for body in scene.bodies if body.motion == "free"]
+    length, gravity = size_of(scene), math.hypot(*scene.gravity)
+    # What falls through its own size is as fast, wherever nothing else moves.
+    speed = max(math.sqrt(gravity * length), *(math.hypot(*body.twist[:d]) for body in scene.bodies), 0.0)
+    mass = max(body.mass for body in free)
+    by_unit = {
+        "1": 1.0, "weights": 1.0, "rad": 1.0, "m": length, "m/s": speed, "m/s^2": max(gravity, speed**2 / length),
+        "rad/s": speed / length, "s": scene.duration, "N s": mass * speed, "J": mass * speed**2,
+    }  # fmt: skip
+    cells = [dict(each.params) for each in (*canonical.quick, *canonical.full)]
+    found: dict[str, float] = {}
+    for params in (dict(scene.params), *cells):
+        for check in canonical.checks(canonical.scene(d, params), dt):
+            found.setdefault(check.metric, by_unit.get(check.unit, 0.0))
     return found
 
 
@@ -435,19 +481,40 @@ def floor(base: Metrics, moved: Sequence[Metrics | str]) -> dict[str, float]:
     return changes
 
 
-def judged(
-    relation: str,
-    base: Metrics,
-    answer: Metrics | str,
-    floors: Mapping[str, float],
-    tolerances: Mapping[str, float] = MappingProxyType({}),
-    coarser: float = 1.0,
-) -> Change:
-    """The metric that changed most for what it may.
+@dataclass(frozen=True)
+class Allowances:
+    """What may change a metric without being a break.
 
-    ``tolerances`` are those of its check, where there is one; ``coarser``, how much coarser places are rounded by the
-    map: an arm is a difference of places, and has fewer digits where they are large, which no moved start shows.
+    Parameters
+    ----------
+    floors
+        Largest change of each metric from moved starts.
+    tolerances
+        Tolerances of the checks, where there are any.
+    sizes
+        What each metric is a small difference of (`scales`).
+    coarser
+        How much coarser places are rounded by the map: an arm is a difference of places, and has fewer digits where
+        they are large, which no moved start shows.
     """
+
+    floors: Mapping[str, float]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    coarser: float = 1.0
+
+    def wider(self, floors: Mapping[str, float]) -> Allowances:
+        """The same with the larger of these floors and those."""
+        return replace(self, floors={name: max(by, floors.get(name, 0.0)) for name, by in self.floors.items()})
+
+    def of(self, name: str, value: float) -> float:
+        """How much a metric of this value may change by."""
+        digits = LAST_DIGITS * self.coarser * max(abs(value), self.sizes.get(name, 0.0))
+        return FACTOR * self.floors[name] + digits + INVISIBLE * self.tolerances.get(name, 0.0)
+
+
+def judged(relation: str, base: Metrics, answer: Metrics | str, allowances: Allowances) -> Change:
+    """The metric that changed most for what it may."""
     if isinstance(answer, str):
         return Change(relation, refused=answer, lost=True)
     worst = Change(relation)
@@ -455,7 +522,7 @@ def judged(
         other = answer.get(name, (None, ""))[0]
         if value is None:
             continue
-        allowed = FACTOR * floors[name] + LAST_DIGITS * coarser * abs(value) + INVISIBLE * tolerances.get(name, 0.0)
+        allowed = allowances.of(name, value)
         change = math.inf if other is None else abs(other - value)
         if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
             # Plain numbers: a metric, or the bound of a check, may be one of numpy's, and no comparison of it is JSON.

@@ -1,0 +1,70 @@
+"""Commands below brackets and field notes ask for exactly the cell that they prove."""
+
+import math
+import shlex
+
+import pytest
+
+from adapters.registry import facts
+from reports.command.running import run
+from reports.command.selection import request_from
+from reports.wording import reproduce
+from validation.field import notes
+from validation.posed import resolve
+from validation.questions.frontier import QUICK_RATIO, axes, brackets, fate_of, search, slot_at
+from validation.running.execution import execute
+from validation.running.plan import slots
+
+ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
+
+
+def asked_by(command):
+    """Cells of a command, planned as the command plans them."""
+    words = shlex.split(command)
+    assert words[:2] == ["crosscheck", "run"]
+    options = run.make_context("run", words[2:]).params
+    return slots(request_from(options | {"full": not options["quick"]}))
+
+
+def between(own):
+    """Values of an axis: its ends, and some that a bisection may come to."""
+    ends = (own.easy, own.hard, own.hardest)
+    if own.axis == "iterations":
+        return {int(value) for value in ends}
+    return {*ends, math.sqrt(abs(own.easy * own.hard)) or own.hard / 3.0} if not own.whole else {*ends}
+
+
+@pytest.mark.parametrize(("scene", "own"), axes(), ids=lambda x: x if isinstance(x, str) else x.name)
+def test_the_command_of_an_end_of_a_bracket_asks_for_its_cell(scene, own):
+    found = brackets([scene], ENGINES, (), (), quick=True)
+    mine = [each for each in found if each.frontier == own]
+    assert mine
+    for each in mine:
+        for value in between(own):
+            slot = slot_at(each, value)
+            (again,) = asked_by(reproduce(slot.as_dict()))
+            canonical = resolve(scene)
+            assert canonical.complete(dict(again.params)) == canonical.complete(dict(slot.params))
+            assert (again.engine, again.profile, again.dimension, again.dt, again.iterations) == (
+                slot.engine, slot.profile, slot.dimension, slot.dt, slot.iterations,
+            )  # fmt: skip
+
+
+@pytest.mark.parametrize("note", notes(), ids=lambda note: note.source)
+def test_the_command_of_a_field_note_asks_for_its_cell(note):
+    (again,) = asked_by(reproduce(note.slot.as_dict()))
+    canonical = resolve(note.scene)
+    assert canonical.complete(dict(again.params)) == canonical.complete(dict(note.slot.params))
+    assert (again.engine, again.profile, again.dimension, again.dt) == (
+        note.engine, note.profile, note.dimension, note.dt,
+    )  # fmt: skip
+
+
+def test_the_two_cells_of_a_bracket_end_again_as_it_says():
+    pytest.importorskip("pymunk")
+    assert facts("chipmunk")
+    (one,) = brackets(["thin_wall"], ["chipmunk"], ["tuned"], [2], quick=True)
+    list(search([one], QUICK_RATIO))
+    for end in (one.survives, one.fails):
+        (slot,) = asked_by(reproduce(end.slot.as_dict()))
+        assert fate_of(one.frontier, execute(slot)) == end.fate
