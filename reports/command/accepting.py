@@ -22,7 +22,7 @@ from validation.cells import Observation, prepare
 from validation.findings import Family, FindingsError, files
 from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
 from validation.judging.acceptance import Change, Proposal, accepted, propose, slots_to_move
-from validation.judging.rows import Row, rows_of
+from validation.judging.rows import Row, rows_of, with_floors
 from validation.records.store import SCATTER_TITLE, Store
 
 #: Refused rows that are printed; the rest is counted.
@@ -91,11 +91,12 @@ def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Con
         title = f"{SCATTER_TITLE}{chosen.id}"
         for earlier in (run for run in store.runs() if run.title == title):
             own += filter(_is_of_this_code, store.observations(earlier))
-        moves = slots_to_move(rows_of(chosen.id, own), engine)
-        if moves:
-            console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
-            own += store.observations(run_plan(store, title, moves, console, jobs))
-        return rows_of(chosen.id, own)
+        rows = rows_of(chosen.id, own)  # once: laws may take a while, and moved starts are not judged
+        moves = slots_to_move(rows, engine)
+        if not moves:
+            return rows
+        console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
+        return with_floors(rows, own + store.observations(run_plan(store, title, moves, console, jobs)))
     finally:
         store.close()
 

@@ -186,9 +186,9 @@ def test_another_relaxation_would_be_another_motion(monkeypatch):
     rule = motion.PROFILES["default"]
     off = {"default": lambda n, dt: [replace(s, value=0.81) if s.name == "relaxation" else s for s in rule(n, dt)]}
     monkeypatch.setattr(motion, "PROFILES", off)
-    motion._moved.cache_clear()
+    motion._readings.cache_clear()
     other, _ = motion_law("rebound_ratio", "default")(scene, DT, impact.measure)
-    motion._moved.cache_clear()
+    motion._readings.cache_clear()
     assert abs(other - said) > 10.0 * band
 
 
