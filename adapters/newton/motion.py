@@ -16,12 +16,18 @@ where the step begins, of corners and planes or of two balls that are nearer tha
 Nothing here is Newton's own code: it is what its formulas make of a scene, in doubles and in singles. The steps are
 compiled loops (`recurrence`).
 
-A law predicts what doubles make of the scene. Its band is about roundings, which are drawn: singles and doubles start
-from places moved by some units in a single's last place, and what singles miss of doubles is a draw, once for each
-start. The engine does the same operations in an order of its own, which is one more draw of the same kind. Its distance
-in units of the root mean square of n draws is a Student's t of n degrees of freedom, if draws are normal. The last
-operation of a step is no such sum: what it leaves of a number is a unit in the last place, or none. Of each number of a
-draw one is added or taken, or neither, by chance.
+A law predicts what doubles make of the scene. Its band is about roundings, which are drawn. What rests or slides moves
+by a fixed way a step, which is rounded at the place where it is: the same fraction of a last digit is lost in each
+step, and a depth of 0.1 mm has three digits. Doubles and singles therefore make steps that are longer by some ten-
+thousandths, in which another fraction is lost, and what singles miss of doubles at one length is a draw. The engine
+does the same operations in an order of its own, which is one more draw of the same kind. Its distance in units of the
+root mean square of n draws is a Student's t of n degrees of freedom, if draws are normal. The last operation of a step
+is no such sum: what it leaves of a number is a unit in the last place, or none. Of each number of a draw one is added
+or taken, or neither, by chance.
+
+What the engine's own order of operations makes of a place is beyond draws where it is the same in every step. The band
+has a bound of that beside them: what doubles miss if both points of each contact are seen apart by a share of their
+place, along one axis after the other.
 """
 
 from __future__ import annotations
@@ -51,9 +57,13 @@ INNER = 8
 #: Draws of roundings, and the band in units of their root mean square: Student's t of 8 degrees of freedom is beyond
 #: 7.12 once in 10 000 times, on either side.
 DRAWS, QUANTILE = 8, 7.12
-#: Units in a single's last place by which one draw starts from another place than the next: odd, so that what is read
-#: in binary, such as 0.5 m, has other digits in each.
-APART = 3.0
+#: Share by which the steps of one draw are longer than those of the next: a way of 0.2 mm a step (g dt^2 at 1/240 s) at
+#: a place of half a metre loses another fraction of 2^-24 m, by the golden ratio, which fills the unit evenly.
+LONGER = 1.618e-4
+#: Roundings of the place where two points touch, of which one tells depth and slip: each is taken from the world to a
+#: body's axes (taken away, turned about two axes) and back (turned, added), and may be half a unit off each time. At a
+#: place that does not change they are off the same way in every step, which no draw shows.
+ROUNDINGS = 12.0
 #: Round-off of a single number, as a share of it.
 UNIT = 2.0**-24
 #: Share of a value beyond which a band says nothing about it.
@@ -68,7 +78,12 @@ class _Layout:
     """Arrays of free balls and boxes among fixed half-spaces, as `recurrence` takes them, in one kind of numbers."""
 
     def __init__(
-        self, scene: Scene, dt: float, chosen: Mapping[str, Any], kind: type[np.floating[Any]], off: float
+        self,
+        scene: Scene,
+        dt: float,
+        chosen: Mapping[str, Any],
+        kind: type[np.floating[Any]],
+        blur: tuple[float, float, float],
     ) -> None:
         from adapters.newton.recurrence import Bodies, Candidates, Chosen, Touching
 
@@ -83,7 +98,7 @@ class _Layout:
         still, many = (0.0,) * 3, len(free) + 1
         blank = [np.zeros(shape, kind) for shape in ((many, 3, 3), (many, 3, 3), *((many, 3),) * 4, (many,))]
         self.bodies = Bodies(
-            rows(lambda body: body.pose[:3], still) * kind(1.0 + off),
+            rows(lambda body: body.pose[:3], still),
             rows(lambda body: body.pose[3:], (1.0, 0.0, 0.0, 0.0)),
             rows(lambda body: body.twist[:3], still),
             rows(lambda body: body.twist[3:], still),
@@ -124,7 +139,7 @@ class _Layout:
         self.chosen = Chosen(
             numbers(dt), numbers(*scene.gravity), numbers(chosen["relaxation"]),
             numbers(chosen["torsional"], chosen["rolling"]), numbers(2.0 * chosen["gap"]), numbers(STOPPED * STOPPED),
-            numbers(float(kind(LEAST_APPROACH) * pull * kind(dt))), numbers(0.0, 0.5, 1.0, 2.0),
+            numbers(float(kind(LEAST_APPROACH) * pull * kind(dt))), numbers(*blur), numbers(0.0, 0.5, 1.0, 2.0),
             chosen["iterations"], int(chosen["weighted"]), int(chosen["rebounds"]), chosen["rebound_iterations"], INNER,
         )  # fmt: skip
 
@@ -184,14 +199,16 @@ class _Key:
         return hash(self.told)
 
 
-def _moved(scene: Scene, dt: float, profile: str, single: bool, off: float) -> Trajectory:
+def _moved(
+    scene: Scene, dt: float, profile: str, single: bool, longer: float, blur: tuple[float, float, float]
+) -> Trajectory:
     """The motion of a scene that is `followed`."""
     from adapters.newton.recurrence import Told, run
 
     spatial = scene if scene.dimension == 3 else lift(scene)
     chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
     kind = np.float32 if single else np.float64
-    steps, layout = step_count(scene.duration, dt), _Layout(spatial, dt, chosen, kind, off)
+    steps, layout = step_count(scene.duration, dt), _Layout(spatial, dt * (1.0 + longer), chosen, kind, blur)
     many, pairs = len(layout.free), len(layout.pairs)
     told = Told(
         np.zeros((steps, many, 7), kind), np.zeros((steps, many, 6), kind), np.zeros((steps, pairs, 3), kind),
@@ -227,13 +244,21 @@ def _record(layout: _Layout, told: Any, rebounds: bool, flat: bool) -> ContactRe
     )
 
 
-def moved(scene: Scene, dt: float, profile: str, single: bool = False, off: float = 0.0) -> Trajectory | None:
+def moved(
+    scene: Scene,
+    dt: float,
+    profile: str,
+    single: bool = False,
+    longer: float = 0.0,
+    blur: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Trajectory | None:
     """The motion of a scene, every step, in doubles or singles; None for a scene that is not `followed`.
 
-    ``off``: share of their places by which bodies start elsewhere.
+    ``longer``: share by which steps are longer, under the same settings; times are told as if they were not.
+    ``blur``: by which share of its place the two points of a contact are seen apart, along three axes.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
-    return _moved(scene, dt, profile, single, off) if followed(spatial) else None
+    return _moved(scene, dt, profile, single, longer, blur) if followed(spatial) else None
 
 
 class _Asked:
@@ -251,14 +276,13 @@ class _Asked:
 
 @lru_cache(maxsize=4096)  # tables of some twenty numbers: more cells than any suite asks of one engine
 def _readings(asked: _Asked, dt: float, profile: str) -> Mapping[str, tuple[float, float]]:
-    """What doubles make of each metric, and the root mean square of what singles miss of it."""
+    """What doubles make of each metric, and the band that roundings ask for."""
     scene = asked.scene
     values: Mapping[str, Measured] = {}
     missed: dict[str, list[float]] = {}
     chance = np.random.default_rng(0)
     for draw in range(DRAWS):
-        off = draw * APART * 2.0 * UNIT
-        exact, rounded = (moved(scene, dt, profile, single, off) for single in (False, True))
+        exact, rounded = (moved(scene, dt, profile, single, draw * LONGER) for single in (False, True))
         if exact is None or rounded is None:
             return {}
         found, other = asked.measure(scene, exact), asked.measure(scene, _told_otherwise(rounded, scene, chance))
@@ -266,11 +290,15 @@ def _readings(asked: _Asked, dt: float, profile: str) -> Mapping[str, tuple[floa
         for metric, (value, _) in found.items():
             told = other[metric][0]
             missed.setdefault(metric, []).append(math.inf if value is None or told is None else abs(value - told))
-    return {
-        metric: (value, math.sqrt(sum(miss * miss for miss in missed[metric]) / DRAWS))
-        for metric, (value, _) in values.items()
-        if value is not None
-    }
+    bands = {metric: QUANTILE * math.sqrt(sum(miss * miss for miss in each) / DRAWS) for metric, each in missed.items()}
+    share = ROUNDINGS * UNIT
+    for blur in ((share, 0.0, 0.0), (0.0, share, 0.0), (0.0, 0.0, share)):
+        blurred = moved(scene, dt, profile, blur=blur)
+        found = asked.measure(scene, blurred) if blurred else {}
+        for metric, (value, _) in values.items():
+            told = found[metric][0] if metric in found else None
+            bands[metric] += math.inf if value is None or told is None else abs(value - told)
+    return {metric: (value, bands[metric]) for metric, (value, _) in values.items() if value is not None}
 
 
 def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generator) -> Trajectory:
@@ -293,9 +321,8 @@ def motion_law(metric: str, profile: str) -> Law:
     """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        value, scatter = _readings(_Asked(scene, measure), dt, profile).get(metric, (0.0, math.inf))
-        # A number that is told is rounded at least once.
-        band = QUANTILE * max(scatter, UNIT * abs(value))
+        value, band = _readings(_Asked(scene, measure), dt, profile).get(metric, (0.0, math.inf))
+        band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
         return (value, band) if 0.0 < band <= VAGUE * abs(value) else None
 
     return law

@@ -84,6 +84,8 @@ class Chosen(NamedTuple):
     #: Square of the speed that is stopped, and least approach that rebounds.
     stopped: Numbers
     least: Numbers
+    #: Shares of its place by which the two points of a contact are seen apart, along three axes.
+    blur: Numbers
     #: 0, 1/2, 1, 2.
     plain: Numbers
     iterations: int
@@ -190,14 +192,18 @@ def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) 
             radius = may.radii[c, 1]
             if not height - radius < chosen.reach[0]:
                 continue
-            points[0, 0], points[0, 1], points[0, 2] = px - height * n[0], py - height * n[1], pz - height * n[2]
+            # Points stand about the middle between corner and foot, in body axes: that costs singles digits.
+            half = chosen.plain[1] * height
+            mx, my, mz = px - half * n[0], py - half * n[1], pz - half * n[2]
+            points[0, 0], points[0, 1], points[0, 2] = mx - half * n[0], my - half * n[1], mz - half * n[2]
             _copy(arms[0], points[0])
-            _copy(points[1], may.at[c])
+            ux, uy, uz = _into(t, mx + half * n[0] - x[0], my + half * n[1] - x[1], mz + half * n[2] - x[2])
+            points[1, 0], points[1, 1], points[1, 2] = ux, uy, uz
             if radius > zero:
                 ux, uy, uz = _into(t, n[0], n[1], n[2])
                 arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
             else:
-                _copy(arms[1], may.at[c])
+                _copy(arms[1], points[1])
         else:
             y = bodies.x[a]
             dx, dy, dz = x[0] - y[0], x[1] - y[1], x[2] - y[2]
@@ -246,7 +252,9 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
     ux, uy, uz = xa[0] + ox, xa[1] + oy, xa[2] + oz
     tx, ty, tz = xb[0] + px, xb[1] + py, xb[2] + pz
     thick = may.radii[c, 0] + may.radii[c, 1]
-    depth = n[0] * (tx - ux) + n[1] * (ty - uy) + n[2] * (tz - uz) - thick
+    place = abs(tx) + abs(ty) + abs(tz)
+    lx, ly, lz = place * chosen.blur[0], place * chosen.blur[1], place * chosen.blur[2]
+    depth = n[0] * (tx - ux + lx) + n[1] * (ty - uy + ly) + n[2] * (tz - uz + lz) - thick
     if not depth < zero:
         return False
     share = chosen.relaxation[0] / chosen.dt[0]
@@ -262,7 +270,7 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
     if friction > zero:
         ex, ey, ez = _out(bodies.turn[a], arms[0, 0], arms[0, 1], arms[0, 2])
         fx, fy, fz = _out(bodies.turn[b], arms[1, 0], arms[1, 1], arms[1, 2])
-        sx, sy, sz = xb[0] + fx - xa[0] - ex, xb[1] + fy - xa[1] - ey, xb[2] + fz - xa[2] - ez
+        sx, sy, sz = xb[0] + fx - xa[0] - ex + lx, xb[1] + fy - xa[1] - ey + ly, xb[2] + fz - xa[2] - ez + lz
         along = sx * n[0] + sy * n[1] + sz * n[2]
         sx, sy, sz = sx - along * n[0], sy - along * n[1], sz - along * n[2]
         size = math.sqrt(sx * sx + sy * sy + sz * sz)
