@@ -25,6 +25,7 @@ _STICKS: _Settings = {"stiction_tolerance": 1e-6}
 #: Softer boxes, and boxes that sink in by a tenth.
 _SOFT: _Settings = {"modulus": 1e6}
 _HARD: _Settings = {"modulus": 1e8}
+_HARDEST: _Settings = {"modulus": 1e10}
 #: SAP's contacts dissipate nothing beyond what a step does.
 _AT_ONCE: _Settings = {"relaxation_time": 0.0}
 
@@ -34,12 +35,21 @@ _SAYS = {
     "viscous-friction": "where only slower slips are viscous it stays",
     "relaxes": "where contacts have no relaxation time it passes",
     "throws": "where Hunt and Crossley bound the speed of parting it passes",
-    "sinks": "where boxes are ten times as hard it passes",
+    "sinks": "where boxes are harder it passes",
 }
 #: Family, profile, dimension, metric and parameters of a row; the settings that cure it, and those that must not.
 _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Settings, ...]], ...] = (
     ("far-origin-glides", "sap", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("far-origin-glides", "similar", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("heavy-on-light-sinks", "default", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "drift", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "kinetic_energy", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "settle_time", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "tamsi", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "similar", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-relaxes", "sap", 2, "drift", {}, _AT_ONCE, (_STICKS, _HARD)),
+    ("heavy-on-light-relaxes", "sap", 2, "kinetic_energy", {}, _AT_ONCE, (_STICKS, _HARD)),
+    ("heavy-on-light-relaxes", "sap", 2, "settle_time", {}, _AT_ONCE, (_STICKS, _HARD)),
     ("hilltop-friction-by-an-earlier-load", "default", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_STICKS,)),
     ("hilltop-glides", "sap", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
     ("hilltop-glides", "similar", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
