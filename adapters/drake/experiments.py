@@ -76,6 +76,7 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("position-correction-throws", "sap", 2, "launched", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
     ("position-correction-throws", "sap", 2, "drift", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
     ("v-groove-relaxes", "sap", 3, "displacement", {}, _AT_ONCE, (_SOFT, _STICKS)),
+    ("stack-relaxes", "sap", 2, "penetration", {}, _AT_ONCE, (_STICKS, _HARD)),
     ("starved-relaxes", "sap", 2, "displacement", {}, _AT_ONCE, (_SOFT, _STICKS)),
     ("starved-relaxes", "sap", 2, "penetration", {}, _AT_ONCE, (_SOFT, _STICKS)),
     ("pivot-sinks", "default", 2, "passing_time", {"from": 1.0, "to": 30.0}, _HARD, (_IMPLICIT, _STICKS)),
