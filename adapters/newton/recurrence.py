@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference_solver.compilation import inner_kernel, kernel
+from adapters.compiled import inner_kernel, kernel
 
 Numbers = np.ndarray[Any, np.dtype[Any]]
 
