@@ -12,6 +12,9 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
+from adapters import registry
 from adapters.engine import Engine, Setting
 from adapters.foreign import checked_settings
 from adapters.isolation import LOG_LINES
@@ -91,7 +94,8 @@ class Slot:
     iterations
         None: the profile's own count.
     ulp
-        Units in the last place by which the start height is moved (measures the noise floor).
+        Units in the last place by which the start height is moved (measures the noise floor), of the numbers that the
+        engine computes with.
     switched
         Settings of the profile that are replaced, by name and sorted: an experiment (`validation.settings.switching`).
     """
@@ -270,9 +274,9 @@ def prepare(slot: Slot) -> Prepared:
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     check_size(scene, slot.dt)
+    found, facts = find(slot.engine), registry.facts(slot.engine)
     if slot.ulp:
-        scene = _nudged(scene, slot.ulp)
-    found = find(slot.engine)
+        scene = _nudged(scene, slot.ulp, np.float32 if facts and facts.precision == "single" else np.float64)
     settings: list[Any] = []
     if found.engine is not None:
         settings = settings_of(found.engine, slot, scene)
@@ -323,15 +327,18 @@ def check_size(scene: Scene, dt: float) -> None:
         )
 
 
-def _nudged(scene: Scene, ulp: int) -> Scene:
-    """Move every free body up by ``ulp`` units in the last place of its height."""
-    up = scene.dimension - 1
+def _nudged(scene: Scene, ulp: int, kind: type[np.floating[Any]]) -> Scene:
+    """Move every free body up by ``ulp`` units in the last place of its height, in the numbers of its engine.
+
+    An engine of singles starts at the same place for all doubles next to each other: it would not see them moved.
+    """
+    up, end = scene.dimension - 1, kind(math.copysign(math.inf, ulp))
 
     def nudge(pose: tuple[float, ...]) -> tuple[float, ...]:
-        height = pose[up]
+        height = kind(pose[up])
         for _ in range(abs(ulp)):
-            height = math.nextafter(height, math.copysign(math.inf, ulp))
-        return (*pose[:up], height, *pose[up + 1 :])
+            height = np.nextafter(height, end)
+        return (*pose[:up], float(height), *pose[up + 1 :])
 
     bodies = tuple(replace(b, pose=nudge(b.pose)) if b.motion == "free" else b for b in scene.bodies)
     return replace(scene, bodies=bodies)

@@ -22,18 +22,34 @@ _Settings = Mapping[str, Any]
 _IMPLICIT: _Settings = {"approximation": "tamsi"}
 #: Slips are viscous below a micrometre per second alone.
 _STICKS: _Settings = {"stiction_tolerance": 1e-6}
-#: Softer boxes.
+#: Softer boxes, and boxes that sink in by a tenth.
 _SOFT: _Settings = {"modulus": 1e6}
+_HARD: _Settings = {"modulus": 1e8}
+_HARDEST: _Settings = {"modulus": 1e10}
+#: SAP's contacts dissipate nothing beyond what a step does.
+_AT_ONCE: _Settings = {"relaxation_time": 0.0}
 
 _SAYS = {
     "glides": "where friction goes by the load of the step it passes",
     "friction-by-an-earlier-load": "where friction goes by the load of the step it passes",
     "viscous-friction": "where only slower slips are viscous it stays",
+    "relaxes": "where contacts have no relaxation time it passes",
+    "throws": "where Hunt and Crossley bound the speed of parting it passes",
+    "sinks": "where boxes are harder it passes",
 }
 #: Family, profile, dimension, metric and parameters of a row; the settings that cure it, and those that must not.
 _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Settings, ...]], ...] = (
     ("far-origin-glides", "sap", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("far-origin-glides", "similar", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
+    ("heavy-on-light-sinks", "default", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "drift", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "kinetic_energy", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "default", 2, "settle_time", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "tamsi", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "similar", 2, "penetration", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-relaxes", "sap", 2, "drift", {}, _AT_ONCE, (_STICKS, _HARD)),
+    ("heavy-on-light-relaxes", "sap", 2, "kinetic_energy", {}, _AT_ONCE, (_STICKS, _HARD)),
+    ("heavy-on-light-relaxes", "sap", 2, "settle_time", {}, _AT_ONCE, (_STICKS, _HARD)),
     ("hilltop-friction-by-an-earlier-load", "default", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_STICKS,)),
     ("hilltop-glides", "sap", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
     ("hilltop-glides", "similar", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
@@ -53,6 +69,18 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("pinch-viscous-friction", "default", 2, "creep", {}, _STICKS, (_SOFT,)),
     ("incline-viscous-friction", "default", 2, "creep", {"ratio": 0.9}, _STICKS, (_SOFT,)),
     ("pinch-viscous-friction", "tamsi", 2, "creep", {"margin": 1.05}, _STICKS, (_SOFT,)),
+    ("pinch-glides", "similar", 2, "turned", {"margin": 1.05}, _IMPLICIT, (_STICKS,)),
+    ("pinch-glides", "similar", 2, "carried", {"margin": 1.05}, _IMPLICIT, (_STICKS,)),
+    ("pinch-relaxes", "sap", 2, "turned", {"margin": 100.0}, _AT_ONCE, (_STICKS,)),
+    ("pinch-relaxes", "sap", 2, "carried", {"margin": 100.0}, _AT_ONCE, (_STICKS,)),
+    ("position-correction-throws", "sap", 2, "launched", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
+    ("position-correction-throws", "sap", 2, "drift", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
+    ("v-groove-relaxes", "sap", 3, "displacement", {}, _AT_ONCE, (_SOFT, _STICKS)),
+    ("stack-relaxes", "sap", 2, "penetration", {}, _AT_ONCE, (_STICKS, _HARD)),
+    ("starved-relaxes", "sap", 2, "displacement", {}, _AT_ONCE, (_SOFT, _STICKS)),
+    ("starved-relaxes", "sap", 2, "penetration", {}, _AT_ONCE, (_SOFT, _STICKS)),
+    ("pivot-sinks", "default", 2, "passing_time", {"from": 1.0, "to": 30.0}, _HARD, (_IMPLICIT, _STICKS)),
+    ("pivot-sinks", "tamsi", 3, "edge_moved", {"from": 1.0, "to": 30.0}, _HARD, (_STICKS, _SOFT)),
     ("pressed-box-friction-by-an-earlier-load", "default", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_STICKS,)),
     ("pressed-box-glides", "sap", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_SOFT,)),
     ("pressed-box-glides", "similar", 2, "acceleration", {"load": 0.0}, _IMPLICIT, (_SOFT,)),
@@ -66,6 +94,18 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("slide-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("slide-to-roll-glides", "sap", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
     ("slide-to-roll-glides", "similar", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
+    (
+        "tilt-table-friction-by-an-earlier-load",
+        "default",
+        2,
+        "acceleration",
+        {"aspect": 1.0, "ratio": 1.1},
+        _IMPLICIT,
+        (_STICKS,),
+    ),
+    ("tilt-table-glides", "sap", 2, "acceleration", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_SOFT,)),
+    ("tilt-table-glides", "sap", 2, "turned", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_SOFT,)),
+    ("tilt-table-glides", "similar", 2, "acceleration", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_STICKS,)),
 )
 
 

@@ -18,11 +18,12 @@ import math
 import numpy as np
 
 from adapters.drake.shipped import DISSIPATION, NEAR_RIGID, POINT_STIFFNESS, RELAXATION
+from adapters.engine import Contacts
 from adapters.law import Law, Measure, Prediction
 from adapters.lift import lift
 from adapters.scene import HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
-from adapters.trajectory import Trajectory
+from adapters.trajectory import ContactRecord, Trajectory
 
 #: What a step's solver leaves of a speed, as a share of the fastest. Measured 2e-8 at most.
 LEFT = 1e-6
@@ -33,14 +34,17 @@ def slowest_rebound(profile: str, speed: float, dt: float) -> float:
     return speed * dt / (dt + RELAXATION) if profile == "sap" else 1.0 / DISSIPATION
 
 
-def _pressed(profile: str, mass: float, radius: float, inertia: float, x: float, v: float, dt: float) -> float:
-    """Velocity after a step that starts ``x`` deep and would end with ``v``."""
+def _pressed(profile: str, lightness: float, rubbed: float, x: float, v: float, dt: float) -> float:
+    """Speed of parting after a step that starts ``x`` deep and would end with ``v``.
+
+    ``lightness`` and ``rubbed`` [1/kg]: what an impulse of 1 does along the normal, and across it.
+    """
     if x <= 0.0:
         return v
+    mass = 1.0 / lightness
     if profile == "sap":
         late = dt + RELAXATION
-        slip = 1.0 + mass * (radius - 0.5 * x) ** 2 / inertia
-        mean = math.sqrt((1.0 + 2.0 * slip * slip) / 9.0) / mass
+        mean = math.sqrt((lightness**2 + 2.0 * rubbed**2) / 9.0)
         soft = max(1.0 / (dt * late * POINT_STIFFNESS), NEAR_RIGID**2 / (4.0 * math.pi**2) * mean)
         # m (v' - v) = (x/late - v')/soft
         return max(v, (mass * v + x / (late * soft)) / (mass + 1.0 / soft))
@@ -55,10 +59,13 @@ def _pressed(profile: str, mass: float, radius: float, inertia: float, x: float,
 
 
 def landing_law(metric: str, profile: str) -> Law:
-    """What the recurrence makes of ``metric``: a ball above a level floor, thrown or dropped straight."""
+    """What the recurrence makes of ``metric``: a ball above a level floor, thrown or dropped, or two that overlap.
+
+    Two balls that start inside each other are one, with the reduced mass, that starts inside a floor.
+    """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        motion = _motion(scene, dt, profile)
+        motion = _motion(scene, dt, profile) or _parted(scene, dt, profile)
         value = None if motion is None else measure(scene, motion)[metric][0]
         if value is None:
             return None
@@ -85,8 +92,45 @@ def _motion(scene: Scene, dt: float, profile: str) -> Trajectory | None:
     pose = np.repeat(np.array([[body.pose for body in scene.bodies]]), steps + 1, axis=0)
     twist = np.repeat(np.array([[body.twist for body in scene.bodies]]), steps + 1, axis=0)
     y, v = ball.pose[2] - radius, ball.twist[2]
+    told, normal = [], np.eye(scene.dimension)[up]
     for step in range(1, steps + 1):
-        v = _pressed(profile, mass, radius, inertia, -y, v + spatial.gravity[2] * dt, dt)
+        free = v + spatial.gravity[2] * dt
+        v = _pressed(profile, 1.0 / mass, 1.0 / mass + (radius + 0.5 * min(y, 0.0)) ** 2 / inertia, -y, free, dt)
         y += v * dt
         pose[step, 1, up], twist[step, 1, up] = y + radius, v
+        told.append((0, 1, 0.0 * normal, normal, mass * (v - free) * normal, y))
+    record = ContactRecord(np.arange(1, steps + 1), np.arange(steps + 1), Contacts.from_rows(told, scene.dimension))
+    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, record, dt, "completed")
+
+
+def _parted(scene: Scene, dt: float, profile: str) -> Trajectory | None:
+    """Two balls in free space, one beside the other along x, that move alike and do not turn."""
+    spatial = scene if scene.dimension == 3 else lift(scene)
+    if len(scene.bodies) != 2 or any(spatial.gravity):
+        return None
+    first, second = spatial.bodies
+    if not isinstance(first.shape, Sphere) or not isinstance(second.shape, Sphere):
+        return None
+    pair = spatial.material(first.name, second.name)
+    alike = first.twist == second.twist and first.pose[1:] == second.pose[1:] and not any(first.twist[3:])
+    loaded = any((*first.force, *first.torque, *second.force, *second.torque))
+    if {first.motion, second.motion} != {"free"} or not alike or loaded or pair.restitution > 0.0:
+        return None
+    reach, steps = first.shape.radius + second.shape.radius, step_count(scene.duration, dt)
+    lightness = 1.0 / first.mass + 1.0 / second.mass
+    pose = np.repeat(np.array([[body.pose for body in scene.bodies]]), steps + 1, axis=0)
+    twist = np.repeat(np.array([[body.twist for body in scene.bodies]]), steps + 1, axis=0)
+    pose[:, :, : scene.dimension] += np.arange(steps + 1)[:, None, None] * dt * twist[:, :, : scene.dimension]
+    x, v = reach - (second.pose[0] - first.pose[0]), 0.0
+    for step in range(1, steps + 1):
+        rubbed = lightness
+        for body in (first, second):
+            assert isinstance(body.shape, Sphere)
+            rubbed += (body.shape.radius - 0.5 * max(x, 0.0)) ** 2 / float(np.broadcast_to(body.inertia, 3)[0])
+        before, v = v, _pressed(profile, lightness, rubbed, x, v, dt)
+        x -= v * dt
+        for k, (body, way) in enumerate(((first, -1.0), (second, 1.0))):
+            change = way * (v - before) / (lightness * body.mass)
+            twist[step:, k, 0] += change
+            pose[step:, k, 0] += change * dt * np.arange(1, steps + 2 - step)
     return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")

@@ -8,10 +8,11 @@ from adapters.drake.landing import landing_law
 from adapters.drake.profiles import PROFILES
 from adapters.law import Deviation, exactly
 
-#: Scenes of a ball that falls straight onto a floor without a rebound, and what its motion decides.
+#: Scenes of a ball that falls straight onto a floor without a rebound, or of two that overlap, and what that decides.
 FALLING: Mapping[str, tuple[str, ...]] = {
-    "impact": ("rebound_ratio", "rebound_speed", "velocity_change"),
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_growth", "rest_time"),
+    "overlap": ("thrown",),
 }
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(

@@ -95,10 +95,10 @@ def blow_of(scene: Scene) -> Blow | None:
         return None
     d, (first, second) = scene.dimension, scene.bodies
     if isinstance(first.shape, HalfSpace) and isinstance(second.shape, Box) and any(second.pose[d if d == 2 else 4 :]):
-        arm, below = _edge(second)
+        arm, below = edge_of(second)
         own = 1.0 / second.mass
         gap = second.pose[d - 1] - below - first.shape.offset
-        return Blow(gap, -second.twist[d - 1], own + arm * arm / _moment(second), own, 2)
+        return Blow(gap, -second.twist[d - 1], own + arm * arm / moment_of(second), own, 2)
     if isinstance(first.shape, HalfSpace) and isinstance(second.shape, Box):
         height, half = second.pose[d - 1], second.shape.half_extents[-1]
         return Blow(height - half - first.shape.offset, -second.twist[d - 1], 1.0 / second.mass, 1.0 / second.mass, 4)
@@ -111,7 +111,7 @@ def blow_of(scene: Scene) -> Blow | None:
         arm = second.pose[0] - first.pose[0]
         coming, spin = first.twist[d - 1] - second.twist[d - 1], first.twist[2] if d == 2 else -first.twist[4]
         height = first.shape.half_extents[-1] + second.shape.radius
-        bar = Turning(spin, arm, height, coming, _moment(first), both)
+        bar = Turning(spin, arm, height, coming, moment_of(first), both)
         struck, inverse_mass = bar.found(0.0)
         return Blow(gap / coming * struck, struck, inverse_mass, both, 1, bar if spin else None)
     return None
@@ -134,14 +134,14 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
         },
         "edge_drop": lambda: {
             "rise": impulse / p["mass"] - p["v"],
-            "spin": impulse * _edge(scene.bodies[1])[0] / _moment(scene.bodies[1]),
+            "spin": impulse * edge_of(scene.bodies[1])[0] / moment_of(scene.bodies[1]),
             "impulse": impulse,
         },
         "flat_box": lambda: {"rebound_ratio": after / blow.closing, "impulse": impulse},
         "off_centre": lambda: {
             "ball_speed": impulse / p["mass"] - p["v"],
             "bar_speed": p["rise"] - impulse / (p["ratio"] * p["mass"]),
-            "spin": impulse * p["offset"] / _moment(scene.bodies[0]),
+            "spin": impulse * p["offset"] / moment_of(scene.bodies[0]),
             "impulse": impulse,
             "energy_lost": 1.0 - (after / blow.closing) ** 2,
         },
@@ -151,12 +151,12 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
     return {"energy_lost": found["energy_lost"]} if blow.turning and found else found
 
 
-def _moment(body: Body) -> float:
+def moment_of(body: Body) -> float:
     """Moment of inertia about the axis across the plane of motion [kg m^2]."""
     return body.inertia[1] if isinstance(body.inertia, tuple) else body.inertia
 
 
-def _edge(box: Body) -> tuple[float, float]:
+def edge_of(box: Body) -> tuple[float, float]:
     """Lowest edge of a box that is turned in the plane of motion: along the floor from the centre, and below it [m]."""
     assert isinstance(box.shape, Box)
     turn = box.pose[2] if len(box.pose) == 3 else -2.0 * math.atan2(box.pose[5], box.pose[3])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from adapters.law import Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
+from adapters.mujoco.convex_blows import convex_blow_law
 from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
@@ -34,6 +35,12 @@ _BECAUSE = {
     ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
     ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
     "corners, a blow is off by 1e-4 of it",
+    ("tuned", "shared"): "impedance ends at 0.9999: each rebound is short of 1e-4 of it",
+    (
+        "tuned",
+        "rubbed",
+    ): "an edge is struck half-way into the overlap in which a step finds it, and normal and friction "
+    "are one convex problem: an end that slips is lifted",
 }
 #: Speeds and spins after bounces, accelerations and hops of balls.
 _ROLLING = {
@@ -75,6 +82,11 @@ DEVIATIONS: tuple[Deviation, ...] = (
         _deviation(profile, scene, metric, blow_law(profile, metric), "blow")
         for profile, scene, metrics in _BLOWS
         for metric in metrics
+    ),
+    _deviation("tuned", "rack", "energy_defect", convex_blow_law("tuned", "energy_defect"), "shared"),
+    *(
+        _deviation("tuned", "kane", metric, convex_blow_law("tuned", metric), "rubbed")
+        for metric in ("rise", "ahead", "spin", "gain")
     ),
     *(
         _deviation(profile, "slide", metric, stopping_law(profile, metric), "slide")

@@ -15,7 +15,10 @@ _REBOUNDS = "rebounds come after the sweeps, from approaches before them, withou
 _ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
 _PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
 
-#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook.
+#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook. Left out is what
+#: it misses, for which there is no reason yet: of `rolling_spin` the spin by 2 to 200 bands, of `roll_incline` the
+#: turning by 5, of `edge_drop` the spin by 9, of `kane` the gain by 5, of `rocking_block` amplitudes and landings by 7,
+#: and of `galperin` with 31 blows both speeds altogether, though those with 12 are met.
 MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect")),
     "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),
@@ -24,14 +27,17 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "cradle": (_PAIRS, ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6)))),
     "rack": (_PAIRS, ("momentum_defect", "energy_defect")),
     "flat_box": (_REBOUNDS, ("rebound_ratio", "edge_speed")),
-    "kane": (_REBOUNDS, ("rise", "ahead", "spin", "gain")),
+    "kane": (_REBOUNDS, ("rise", "ahead", "spin")),
     "oblique": (_REBOUNDS, ("rebound_ratio", "forward_speed", "sideways", "spin_speed")),
     "incline": (_SWEPT, ("creep", "acceleration")),
     "slide": (_SWEPT, ("hop", "turned", "braking", "stopping_distance", "end_speed")),
-    "roll_incline": (_ROLLS, ("acceleration", "turning")),
+    "roll_incline": (_ROLLS, ("acceleration",)),
     "masse": (_ROLLS, ("final_vx", "final_vy")),
     "slide_to_roll": (_ROLLS, ("final_speed",)),
-    "rocking_block": (_SWEPT, ("amplitude", "landing", "slid")),
+    "tilt_table": (_SWEPT, ("moved", "edge_moved", "passing_spin", "passing_time", "turned")),
+    "painleve": (_SWEPT, ("edge_moved", "lifted", "passing_spin", "passing_time")),
+    "ladder": (_SWEPT, ("let_go", "passing_time")),
+    "starved": (_SWEPT, ("displacement", "load_error", "penetration")),
     "pivot": (_SWEPT, ("edge_moved", "passing_time")),
     "position_correction": (_SWEPT, ("launched",)),
     "overlap": (_SWEPT, ("centre_moved", "thrown")),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +19,10 @@ from reports.progress import run_plan
 from reports.terminal import terminal
 from reports.wording import number, plural
 from validation.cells import Observation, prepare
-from validation.findings import Family, FindingsError, files
+from validation.findings import Family, Findings, FindingsError, Key, files
 from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
 from validation.judging.acceptance import Change, Proposal, accepted, propose, slots_to_move
-from validation.judging.rows import Row, rows_of
+from validation.judging.rows import Row, rows_of, with_floors
 from validation.records.store import SCATTER_TITLE, Store
 
 #: Refused rows that are printed; the rest is counted.
@@ -40,16 +40,19 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     """List rows of RUN that do not pass as findings, each with its value and band, each family with its reason.
 
     Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
-    every family that would change. Those named by --family are accepted; for the others a terminal is asked, and
-    without one nothing is written for them. Rows that a deviation law covers and misses, rows whose receipts do not
-    hold and rows of a profile that promises a solution are refused; what did not run stays as it is listed.
+    every family that would change. Those named by --family are accepted; for the others a terminal is asked.
+    Without one they stay as they are listed, and no cell is run again for them. Rows that a deviation law covers
+    and misses, rows whose receipts do not hold and rows of a profile that promises a solution are refused; what did
+    not run stays as it is listed.
 
     Exits with 1 if a row is refused or a family that changed is not accepted. Read the diff before you commit it: a
     finding is listed to be shown, not to be hidden.
     """
     registry.find(engine)
     console = terminal(stderr=True)
-    proposal = propose(_rows_with_scatter(out, run, engine, jobs, console), engine, findings_of(engine))
+    findings = findings_of(engine)
+    about = _about(families, findings)
+    proposal = propose(_rows_with_scatter(out, run, engine, jobs, console, about), engine, findings, about)
     unknown = set(families) - {change.family.id for change in proposal.changes}
     if unknown:
         raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such family of {engine} in {FAMILIES}")
@@ -77,7 +80,22 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     sys.exit(1 if left or proposal.refused else 0)
 
 
-def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Console) -> list[Row]:
+def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
+    """Which rows are asked about: all on a terminal; without one, those of the families that are named, if any are."""
+    chosen = set(families)
+    if findings is None or not chosen or not chosen <= set(findings.families) or _on_a_terminal():
+        return lambda key: True
+
+    def about(key: Key) -> bool:
+        member, family = findings.members.get(key), findings.family_of(key)
+        return (member.family.id if member else family.id if family else "") in chosen
+
+    return about
+
+
+def _rows_with_scatter(
+    out: Path, run: str, engine: str, jobs: int, console: Console, about: Callable[[Key], bool]
+) -> list[Row]:
     """Rows of the engine with their scatter, which is measured here where the store does not have it."""
     store = Store(out, create=False, write=True)
     try:
@@ -91,11 +109,12 @@ def _rows_with_scatter(out: Path, run: str, engine: str, jobs: int, console: Con
         title = f"{SCATTER_TITLE}{chosen.id}"
         for earlier in (run for run in store.runs() if run.title == title):
             own += filter(_is_of_this_code, store.observations(earlier))
-        moves = slots_to_move(rows_of(chosen.id, own), engine)
-        if moves:
-            console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
-            own += store.observations(run_plan(store, title, moves, console, jobs))
-        return rows_of(chosen.id, own)
+        rows = rows_of(chosen.id, own)  # once: laws may take a while, and moved starts are not judged
+        moves = slots_to_move(rows, engine, about)
+        if not moves:
+            return rows
+        console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
+        return with_floors(rows, own + store.observations(run_plan(store, title, moves, console, jobs)))
     finally:
         store.close()
 

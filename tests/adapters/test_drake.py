@@ -80,6 +80,18 @@ def test_what_springs_throw_back_is_what_the_law_says(name, params, dimension, p
     assert seen >= 3
 
 
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("params", [{}, {"depth": 0.01, "ratio": 100.0}], ids=str)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_balls_that_overlap_part_as_fast_as_the_law_says(params, dimension, profile):
+    canonical = CATALOGUE["overlap"]
+    scene = canonical.scene(dimension, params)
+    found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), canonical.sampling(scene)))
+    (law,) = [d.law for d in DEVIATIONS if d.covers("drake", "1.51.1", profile, "overlap", "thrown")]
+    said, band = law(scene, DT, canonical.measure)
+    assert abs(found["thrown"][0] - said) <= band < 1e-3 * said
+
+
 def test_a_point_of_contact_lies_half_way_into_the_overlap():
     """SAP's regularisation knows the arm of the point: at the surface it would be 1.2e-3 of the rebound off."""
     impact = CATALOGUE["impact"]

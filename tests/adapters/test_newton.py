@@ -160,7 +160,8 @@ CASES = [
     ("impact", 2, {"e": 0.0}, "rebound_ratio"), ("impact", 3, {"e": 0.0}, "impulse"), ("bounce", 2, {}, "apex[3]"),
     ("head_on", 2, {}, "first_speed"), ("stacked_balls", 2, {}, "large_speed"), ("rack", 2, {}, "energy_defect"),
     ("kane", 2, {}, "rise"), ("oblique", 3, {}, "forward_speed"), ("incline", 2, {"ratio": 0.5}, "creep"),
-    ("roll_incline", 2, {}, "acceleration"), ("slide", 3, {}, "hop"),
+    ("roll_incline", 2, {}, "acceleration"), ("slide", 3, {}, "hop"), ("tilt_table", 2, {}, "moved"),
+    ("painleve", 2, {}, "passing_time"), ("incline", 3, {}, "creep"),
 ]  # fmt: skip
 
 
@@ -186,9 +187,9 @@ def test_another_relaxation_would_be_another_motion(monkeypatch):
     rule = motion.PROFILES["default"]
     off = {"default": lambda n, dt: [replace(s, value=0.81) if s.name == "relaxation" else s for s in rule(n, dt)]}
     monkeypatch.setattr(motion, "PROFILES", off)
-    motion._moved.cache_clear()
+    motion._readings.cache_clear()
     other, _ = motion_law("rebound_ratio", "default")(scene, DT, impact.measure)
-    motion._moved.cache_clear()
+    motion._readings.cache_clear()
     assert abs(other - said) > 10.0 * band
 
 

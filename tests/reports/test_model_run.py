@@ -92,6 +92,14 @@ def test_a_robot_in_urdf_runs_as_well(tmp_path):
     assert "line 3: <joint> 'shoulder': a revolute joint" in arm.output and len(arm.output.splitlines()) == 1
 
 
+def test_sdf_is_refused_in_one_line_that_says_what_is_read(tmp_path):
+    model = tmp_path / "table.sdf"
+    model.write_text("<sdf version='1.9'><model name='table'/></sdf>")
+    refused = call("run", model, "--out", tmp_path / "no", status=(2,))
+    assert "SDF is not read" in refused.output and "URDF (.urdf)" in refused.output
+    assert len(refused.output.splitlines()) == 1 and not (tmp_path / "no").exists()
+
+
 def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
     words = ("run", MODELS / "refused_hinge.xml", "--engine", "mujoco", "--profile", "model", "--out", tmp_path)
     refused = call(*words, status=(2,))

@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from adapters.law import Deviation
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import Observation, Outcome, Slot, prepare
 from validation.findings import Family, Finding, Findings, row_key
 from validation.judging import acceptance
 from validation.judging.acceptance import MOVES, accepted, band, propose, slots_to_move
@@ -180,6 +181,24 @@ def test_cells_that_fail_or_nearly_fail_are_moved_and_no_others():
     assert moved == [replace(SLOT, ulp=n) for n in MOVES]
     assert slots_to_move(rows(), "nameless") == []  # their scatter is known
     assert slots_to_move(rows_of("run", cells), "another") == []
+    assert slots_to_move(rows_of("run", cells), "nameless", lambda key: key[2] == "3") == []
+
+
+def test_what_is_not_asked_about_stays_as_it_is_listed_and_needs_no_moved_starts():
+    unmoved = rows(moved=None)
+    proposal = propose(unmoved, "nameless", listed(FAMILY, creep=Finding(FAMILY, 0.4, 0.01)), lambda key: False)
+    assert not proposal.refused and not any(change.asks for change in proposal.changes)
+    assert [finding.value for finding in accepted(proposal, []).values()] == [0.4]
+
+
+def test_starts_of_an_engine_of_singles_are_moved_by_units_of_singles():
+    """Moved by units of doubles they would be the same numbers to it, and nothing would scatter."""
+    for engine, kind in (("box2d", np.float32), ("mujoco", np.float64)):
+        own = prepare(replace(SLOT, engine=engine)).scene.bodies[1].pose[1]
+        moved = [prepare(replace(SLOT, engine=engine, ulp=ulp)).scene.bodies[1].pose[1] for ulp in (1, 2)]
+        unit = float(np.spacing(kind(own)))
+        assert np.round((np.array(moved) - own) / unit).tolist() == [1.0, 2.0]
+        assert all(float(kind(place)) == place for place in moved)
 
 
 def test_a_study_needs_no_moved_starts():

@@ -39,6 +39,11 @@ CELLS = [
     ("slide_to_roll", {"heading": 30.0}, "tuned", 3, {"hop"}),
     ("roll_incline", {"ratio": 1.5}, "default", 3, {"acceleration", "turning", "hop"}),
     ("roll_incline", {"ratio": 1.5}, "tuned", 2, {"acceleration", "turning", "hop"}),
+    ("rack", {}, "tuned", 2, {"energy_defect"}),
+    ("rack", {"rows": 6.0, "apart": 0.05}, "tuned", 2, {"energy_defect"}),
+    ("kane", {}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
+    ("kane", {"e": 0.5, "mu": 0.1}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
+    ("kane", {"along": -0.727, "mu": 0.1}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
 ]
 
 
@@ -100,3 +105,23 @@ def test_what_a_blow_takes_of_a_spinning_bar_s_energy_is_told_by_the_step_that_f
 
 def test_a_bar_that_turns_under_a_soft_contact_is_not_predicted():
     assert not list(covering("mujoco", "4.0.1", "default", "off_centre", "spin"))
+
+
+@pytest.mark.parametrize(
+    ("name", "metric", "fault"),
+    [
+        ("rack", "energy_defect", ("RIGID", (0.9998, 0.9998, 0.001, 0.5, 1.0))),
+        ("kane", "rise", ("RIGID", (0.9998, 0.9998, 0.001, 0.5, 1.0))),
+        ("kane", "spin", ("CORNERS_OF_AN_EDGE", 4)),
+    ],
+)
+def test_another_problem_would_have_another_answer(name, metric, fault, monkeypatch):
+    """Planted faults: another impedance, or as many contacts as a face has."""
+    from adapters.mujoco import convex_blows, profiles
+
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(2, {})
+    said, band = convex_blows.convex_blow_law("tuned", metric)(scene, DT, canonical.measure)
+    monkeypatch.setattr(profiles if fault[0] == "RIGID" else convex_blows, *fault)
+    other, _ = convex_blows.convex_blow_law("tuned", metric)(scene, DT, canonical.measure)
+    assert abs(other - said) > 1000.0 * band

@@ -57,7 +57,6 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`, those of PhysX in
 #: `tests/adapters/test_findings_of_physx.py`.
 MEASURED_ONLY = {
-    "mujoco": {"kane-convex-cone", "rack-impedance"},
     "bullet": {"arch-hull-points", "wedge-hull-points"},
     "physx": {
         "closing-wall-places-in-singles",

@@ -8,7 +8,7 @@ are; the entries of all others, and of every cell that did not run to its end, s
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from validation.canonical import Check
@@ -72,11 +72,16 @@ class Proposal:
     refused: tuple[tuple[Row, str], ...]
 
 
-def slots_to_move(rows: Iterable[Row], engine: str) -> list[Slot]:
-    """Slots whose scatter must be known: each cell of the quick suite that fails, or nearly, once per move."""
+def slots_to_move(rows: Iterable[Row], engine: str, about: Callable[[Key], bool] = lambda key: True) -> list[Slot]:
+    """Slots whose scatter must be known: each cell of the quick suite that fails, or nearly, once per move.
+
+    ``about``: which rows are to be listed.
+    """
     cells: dict[Slot, None] = {}
     for row in rows:
-        if row.engine == engine and row.floor is None and _may_be_listed(row) and not _is_study(row):
+        if row.engine != engine or not about(row_key(slot_from_dict(row.slot), row.metric)):
+            continue
+        if row.floor is None and _may_be_listed(row) and not _is_study(row):
             cells[slot_from_dict(row.slot)] = None
     return [Slot(**{**vars(slot), "ulp": ulp}) for slot in cells for ulp in MOVES]
 
@@ -88,10 +93,13 @@ def _may_be_listed(row: Row) -> bool:
     return (row.physics == "fail" or is_marginal(row.value, _check(row))) and in_quick_suite(slot)
 
 
-def propose(rows: Iterable[Row], engine: str, findings: Findings | None) -> Proposal:
+def propose(
+    rows: Iterable[Row], engine: str, findings: Findings | None, about: Callable[[Key], bool] = lambda key: True
+) -> Proposal:
     """Compare ``rows`` of a run with what is listed for ``engine``; see `Change` and `Proposal`.
 
-    ``rows`` carry their scatter (`Row.floor`), so the run's cells have been run from moved starts as well.
+    ``rows`` carry their scatter (`Row.floor`), so the run's cells have been run from moved starts as well. What
+    ``about`` does not hold for stays as it is listed.
     """
     findings = findings or Findings(engine, {}, (), {})
     changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
@@ -107,6 +115,8 @@ def propose(rows: Iterable[Row], engine: str, findings: Findings | None) -> Prop
                 refused.append((row, "its receipts or its certificate do not hold"))
             continue
         judged.add(key)
+        if not about(key):
+            continue
         why, found = _entry(row)
         family = findings.members[key].family if key in findings.members else findings.family_of(key)
         if why:

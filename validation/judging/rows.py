@@ -17,7 +17,7 @@ from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.findings import Findings, FindingsError, Known, known_of
 from validation.findings.files import brought_by_ours, findings_of
-from validation.judging.studies import StudyResult, results
+from validation.judging.studies import StudyResult, results, study_of
 from validation.judging.verdicts import (
     Physics,
     Prediction,
@@ -96,16 +96,22 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
     observations = list(observations)
     seen = {observation.slot for observation in observations}
     observations += [_missing(slot) for slot in plan if slot not in seen]
+    rows = [row for o in observations if not o.slot.ulp for row in _cell_rows(run, o)]
+    return with_floors(rows, observations) + [_study_row(run, result) for result in results(observations)]
+
+
+def with_floors(rows: Iterable[Row], observations: Iterable[Observation]) -> list[Row]:
+    """Judged rows with the noise floors that cells with moved starts give; what several cells say together has none."""
     moved: dict[Slot, list[Observation]] = defaultdict(list)
     for observation in observations:
         if observation.slot.ulp:
             moved[replace(observation.slot, ulp=0)].append(observation)
-    rows = []
-    for observation in observations:
-        if not observation.slot.ulp:
-            judged = _cell_rows(run, observation)
-            rows += [replace(row, floor=_floor(row, moved[observation.slot])) for row in judged]
-    return rows + [_study_row(run, result) for result in results(observations)]
+    if not moved:
+        return list(rows)
+    return [
+        row if study_of(row.scene, row.metric) else replace(row, floor=_floor(row, moved[slot_from_dict(row.slot)]))
+        for row in rows
+    ]
 
 
 def _missing(slot: Slot) -> Observation:
