@@ -13,8 +13,13 @@ from __future__ import annotations
 
 import copy
 import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import llvmlite.binding as llvm
+from numba.core import compiler
+from numba.core import config as numba_config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -22,6 +27,10 @@ from numba.core.cpu import CPUContext
 from numba.core.typed_passes import NativeLowering
 
 from reference_solver.structure_types import Convention
+
+# numba's type hints know neither its configuration's attributes nor that methods can be replaced.
+config: Any = numba_config
+Flags: Any = compiler.Flags
 
 
 class Module(JITCodeLibrary):
@@ -35,6 +44,18 @@ class Module(JITCodeLibrary):
 
 class Program(JITCodeLibrary):
     """The code of a kernel with all that it calls."""
+
+    def _optimize_final_module(self) -> None:
+        """Optimise once, with loops as they are.
+
+        Two passes of numba's own, one of them for what counts references, unrolled and vectorised loops that run a few
+        times each: a third more machine code, and no faster (reference_solver/README.md).
+        """
+        options = llvm.create_pipeline_tuning_options(config.OPT)
+        options.loop_vectorization = options.slp_vectorization = False
+        options.loop_unrolling = options.loop_interleaving = False
+        builder = llvm.create_pass_builder(self._codegen._tm, options)
+        builder.getModulePassManager().run(self._final_module, builder)
 
     def finalize(self) -> None:
         """Link what is called by what is called as well, callers first: what nobody asked for yet is not linked."""
@@ -122,6 +143,24 @@ class Carried(CompilerBase):
         return [with_lowering(self.state, ModuleLowering)]
 
 
+#: Passes that change nothing in kernels, each of which goes through all statements and has the lives of all variables
+#: found anew: kernels have no ``with``, no functions in functions, no expressions of arrays, nothing compiled for a
+#: constant.
+NOT_NEEDED = frozenset(
+    [
+        "WithLifting",
+        "InlineClosureLikes",
+        "RewriteDynamicRaises",
+        "MakeFunctionToJitFunction",
+        "FindLiterallyCalls",
+        "LiteralUnroll",
+        "LiteralPropagationSubPipelinePass",
+        "InlineOverloads",
+        "NopythonRewrites",
+        "DumpParforDiagnostics",
+    ]
+)
+
 #: Objects made between two searches for garbage while a kernel compiles: with Python's own 700 a fifth of the time went
 #: into searches through all that is being compiled (87 s of CPU for the planar located step, 69 s now, 67 s without
 #: any), for .66 GB of memory instead of .55.
@@ -132,23 +171,53 @@ class Whole(CompilerBase):
     """Compiles kernels."""
 
     def compile_extra(self, func: Any) -> Any:
-        """Compile, and all that is called, with few searches for garbage."""
-        thresholds = gc.get_threshold()
-        gc.set_threshold(max(thresholds[0], BETWEEN_COLLECTIONS) if thresholds[0] else 0, *thresholds[1:])
-        try:
+        """Compile, and all that is called, with few searches for garbage and with flags that are soon compared."""
+        with few_collections(), flags_soon_compared():
             return super().compile_extra(func)
-        finally:
-            gc.set_threshold(*thresholds)
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes, the lowering apart."""
         return [with_lowering(self.state, ProgramLowering)]
 
 
+@contextmanager
+def few_collections() -> Iterator[None]:
+    """Have Python search for garbage seldom."""
+    thresholds = gc.get_threshold()
+    gc.set_threshold(max(thresholds[0], BETWEEN_COLLECTIONS) if thresholds[0] else 0, *thresholds[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*thresholds)
+
+
+@contextmanager
+def flags_soon_compared() -> Iterator[None]:
+    """Have numba take flags for equal where the same ones are set to the same, before it looks at what none has set.
+
+    It looks them up for every call in every function, under a hash that is the same for all, and made two tables of
+    some forty options for each comparison: a fifteenth of the time.
+    """
+    compared = Flags.__eq__
+
+    def equal(one: Any, other: Any) -> Any:
+        return (type(one) is type(other) and one._values == other._values) or compared(one, other)
+
+    hashed, same = Flags.__hash__, hash(Flags())
+    Flags.__eq__ = equal
+    Flags.__hash__ = lambda flags: same
+    try:
+        yield
+    finally:
+        Flags.__eq__ = compared
+        Flags.__hash__ = hashed
+
+
 def with_lowering(state: Any, lowering: type) -> Any:
-    """Return numba's passes with another lowering."""
+    """Return numba's passes with another lowering, and without those that kernels do not need."""
     passes = DefaultPassBuilder.define_nopython_pipeline(state)
-    passes.passes = [(lowering, text) if step is NativeLowering else (step, text) for step, text in passes.passes]
+    needed = [(step, text) for step, text in passes.passes if step.__name__ not in NOT_NEEDED]
+    passes.passes = [(lowering, text) if step is NativeLowering else (step, text) for step, text in needed]
     passes._finalized = False
     passes.finalize()
     return passes

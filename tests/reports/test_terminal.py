@@ -138,17 +138,6 @@ def test_an_estimate_for_idle_cores_says_where_they_are_not_idle(monkeypatch, lo
     assert stages._busy() == said
 
 
-def test_a_compilation_is_remembered_by_its_cpu_time(monkeypatch):
-    """Waiting is what a busy machine adds; it must not make the next estimate longer."""
-    import time
-
-    from validation.cells import Slot
-    from validation.running import execution, warming
-
-    monkeypatch.setattr(execution, "execute", lambda slot: time.sleep(0.5))
-    assert warming._compile([Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240).as_dict()]) < 0.25
-
-
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     """The title of a quick suite names forty-six scenes: a screen for every run."""
     store = Store(tmp_path)

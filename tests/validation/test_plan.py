@@ -1,6 +1,7 @@
 """Which slots a run has: profiles are chosen by what they are, not by how they are called."""
 
 import ast
+from dataclasses import replace
 
 import pytest
 
@@ -21,6 +22,27 @@ def test_the_full_suite_runs_the_customary_step_of_the_profile_as_shipped_only(e
     for profile, steps in dts.items():
         shipped = facts.roles.get(profile) == "shipped"
         assert steps == {*FULL_DT, *([facts.customary_dt] if shipped else [])}, profile
+
+
+@pytest.mark.parametrize("scene", ["bounce", "stack"])
+def test_the_full_suite_has_all_variations_at_one_step_and_all_steps_for_those_of_the_quick_suite(scene):
+    wanted = Request([scene], ["chipmunk"], suite="full")
+    full, quick = set(slots(wanted)), set(slots(replace(wanted, suite="quick")))
+    assert quick < full
+    found = {}
+    for slot in full:
+        found.setdefault(replace(slot, dt=plan.QUICK_DT), set()).add(slot.dt)
+    own = {slot for slot in full if slot.dt == plan.QUICK_DT}
+    asked = {slot for slot in own if plan.in_quick_suite(slot)}
+    assert quick <= asked < own == set(found)
+    for slot, steps in found.items():
+        assert steps >= set(FULL_DT) if slot in asked else steps == {plan.QUICK_DT}, slot
+
+
+def test_steps_that_are_asked_for_are_asked_of_all_variations():
+    found = slots(Request(["bounce"], ["chipmunk"], suite="full", dts=[1 / 60]))
+    assert {slot.dt for slot in found} == {1 / 60}
+    assert len({slot.params for slot in found}) == 64
 
 
 @pytest.mark.parametrize(("name", "profile"), [("chipmunk", "default"), ("reference", "classical")])
