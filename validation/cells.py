@@ -274,9 +274,9 @@ def prepare(slot: Slot) -> Prepared:
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     check_size(scene, slot.dt)
-    found, facts = find(slot.engine), registry.facts(slot.engine)
+    found = find(slot.engine)
     if slot.ulp:
-        scene = _nudged(scene, slot.ulp, np.float32 if facts and facts.precision == "single" else np.float64)
+        scene = _nudged(scene, slot.ulp, numbers_of(slot.engine))
     settings: list[Any] = []
     if found.engine is not None:
         settings = settings_of(found.engine, slot, scene)
@@ -325,6 +325,12 @@ def check_size(scene: Scene, dt: float) -> None:
             f"dt: {format_dt(dt)} makes {steps:.3g} steps of {len(scene.bodies)} bodies; "
             f"steps times bodies are at most {MOST_SAMPLES:g}"
         )
+
+
+def numbers_of(engine: str) -> type[np.floating[Any]]:
+    """Return the kind of numbers that an engine counts in: doubles where nothing else is known."""
+    facts = registry.facts(engine)
+    return np.float32 if facts and facts.precision == "single" else np.float64
 
 
 def _nudged(scene: Scene, ulp: int, kind: type[np.floating[Any]]) -> Scene:

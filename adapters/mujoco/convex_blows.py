@@ -85,7 +85,10 @@ def _balls(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None
         if len(touching) > MOST_CONTACTS:
             return None
         if touching:
-            v = _parted(v, lightness, touching, d)
+            parted = _parted(v, lightness, touching, d)
+            if parted is None:
+                return None
+            v = parted
         x = x + dt * v
         poses.append(x)
         speeds.append(v)
@@ -93,8 +96,11 @@ def _balls(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None
     return _told(dt, pose, twist)
 
 
-def _parted(v: Array, lightness: Array, touching: list[tuple[int, int, Array, float]], d: float) -> Array:
-    """Velocities after a step in which these contacts are solved together; ``f >= 0`` by projected sweeps."""
+def _parted(v: Array, lightness: Array, touching: list[tuple[int, int, Array, float]], d: float) -> Array | None:
+    """Velocities after a step in which these contacts are solved together; ``f >= 0`` by projected sweeps.
+
+    None where `SWEEPS` of them do not come to rest: what is not solved predicts nothing.
+    """
     rows = np.zeros((len(touching), *v.shape))
     for row, (i, j, normal, _) in zip(rows, touching, strict=True):
         row[i], row[j] = -normal, normal
@@ -109,8 +115,8 @@ def _parted(v: Array, lightness: Array, touching: list[tuple[int, int, Array, fl
         for k in range(len(f)):
             f[k] = max(0.0, f[k] - (whole[k] @ f - aim[k]) / whole[k, k])
         if np.abs(f - before).max() <= np.finfo(float).eps * np.abs(f).max():
-            break
-    return np.asarray(v + (given.T @ f).reshape(v.shape))
+            return np.asarray(v + (given.T @ f).reshape(v.shape))
+    return None
 
 
 def _rod(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None:

@@ -17,8 +17,9 @@ _PAIRS = "a body gets the mean of what its contacts ask for, each of two another
 
 #: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook. Left out is what
 #: it misses, for which there is no reason yet: of `rolling_spin` the spin by 2 to 200 bands, of `roll_incline` the
-#: turning by 5, of `edge_drop` the spin by 9, of `kane` the gain by 5, of `rocking_block` amplitudes and landings by 7,
-#: and of `galperin` with 31 blows both speeds altogether, though those with 12 are met.
+#: turning by 5, of `edge_drop` the spin by 9, of `kane` the gain by 5, of `rocking_block` amplitudes and landings by 7
+#: (how far it slides was not weighed), and of `galperin` with 31 blows both speeds altogether, though those with 12 are
+#: met.
 MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect")),
     "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),

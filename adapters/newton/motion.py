@@ -186,19 +186,6 @@ def followed(scene: Scene) -> bool:
     return 0 < len(free) <= MOST_BODIES and (balls or box) and flat and told
 
 
-class _Key:
-    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.told = scene, repr(scene)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.told == other.told
-
-    def __hash__(self) -> int:
-        return hash(self.told)
-
-
 def _moved(
     scene: Scene, dt: float, profile: str, single: bool, longer: float, blur: tuple[float, float, float]
 ) -> Trajectory:

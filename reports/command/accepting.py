@@ -41,11 +41,12 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
 
     Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
     every family that would change. Those named by --family are accepted; for the others a terminal is asked.
-    Without one they stay as they are listed, and no cell is run again for them. Rows that a deviation law covers
-    and misses, rows whose receipts do not hold and rows of a profile that promises a solution are refused; what did
-    not run stays as it is listed.
+    Without one, families that are not named stay as they are listed, and no cell is run again for them. Rows that a
+    deviation law covers and misses, rows whose receipts do not hold and rows of a profile that promises a solution
+    are refused; what did not run stays as it is listed.
 
-    Exits with 1 if a row is refused or a family that changed is not accepted. Read the diff before you commit it: a
+    Exits with 1 if a row is refused, a family that changed is not accepted or a row outside those that are named is
+    new or drifted. Read the diff before you commit it: a
     finding is listed to be shown, not to be hidden.
     """
     registry.find(engine)
@@ -69,7 +70,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
         said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
-        click.echo(json.dumps({**said, "refused": len(proposal.refused), "not_accepted": left}, indent=1))
+        counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
+        click.echo(json.dumps({**said, **counts, "not_accepted": left}, indent=1))
     else:
         click.echo(
             f"{engine}: {plural(len(members), 'row')} of {plural(len(listed), 'family')} listed in {folder / MEMBERS}"
@@ -77,7 +79,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)
-    sys.exit(1 if left or proposal.refused else 0)
+    if proposal.left_out:
+        click.echo(f"of no family that is named: {plural(len(proposal.left_out), 'row')} new or drifted", err=True)
+    sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
 
 
 def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:

@@ -191,6 +191,20 @@ def test_what_is_not_asked_about_stays_as_it_is_listed_and_needs_no_moved_starts
     assert [finding.value for finding in accepted(proposal, []).values()] == [0.4]
 
 
+def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law_misses_it(monkeypatch):
+    """Naming one family must not make silence of what the others would have said."""
+    proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
+    assert [row.metric for row in proposal.left_out] == ["creep"]
+    assert not proposal.changes
+    law = Deviation(
+        "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
+    )
+    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+    proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
+    assert not proposal.left_out
+    assert all("misses" in why for _, why in proposal.refused) and proposal.refused
+
+
 def test_starts_of_an_engine_of_singles_are_moved_by_units_of_singles():
     """Moved by units of doubles they would be the same numbers to it, and nothing would scatter."""
     for engine, kind in (("box2d", np.float32), ("mujoco", np.float64)):

@@ -95,18 +95,20 @@ AT_ANY_STEP = {"blows", "stands", "impulse_scatter", "thrown"}
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_all_that_a_bound_allows_is_owed_to_the_step_or_to_round_off(name):
-    """Halving the step widens no bound but by round-off; of a step of 10 ns round-off alone is left."""
+    """Halving the step widens no bound but by round-off; of a step of 1 us a thousandth and round-off are left."""
     canonical = CATALOGUE[name]
     for dimension in canonical.dimensions:
         for variation in canonical.quick:
             scene = canonical.scene(dimension, variation.params)
-            shorter = {dt: {c.metric: c for c in canonical.checks(scene, dt)} for dt in (1 / 480, 1e-8)}
+            shorter = {dt: {c.metric: c for c in canonical.checks(scene, dt)} for dt in (1 / 480, 1e-6)}
             far = max(abs(x) for body in scene.bodies for x in body.pose)
             for check in canonical.checks(scene, 1 / 240):
                 if check.bound is None or check.metric in AT_ANY_STEP:
                     continue
                 half, least = (found[check.metric].bound for found in shorter.values())
                 # Steps that only round add up: as many of them as there are, each by a unit in the last place.
-                rounding = [1e-15 * (1.0 + far) * scene.duration / dt for dt in (1 / 480, 1e-8)]
+                rounding = [1e-15 * (1.0 + far) * scene.duration / dt for dt in (1 / 480, 1e-6)]
                 assert half <= check.bound + rounding[0], (check.metric, variation.params)
                 assert least <= 1e-3 * check.bound + rounding[1], (check.metric, variation.params)
+                # Where that allows all of it, there is no step in it: it is round-off, of places far away as well.
+                assert check.bound > rounding[1] or check.bound < 1e-8 or name == "far_origin", check.metric

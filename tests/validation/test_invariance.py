@@ -199,6 +199,9 @@ def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
     scene = CATALOGUE["bounce"].scene(2)
     posed = BY_NAME["moved"].pose(scene)
     assert unit_of(scene, posed.shift) == np.spacing(posed.shift) > 100.0 * unit_of(scene, 0.0)
+    assert unit_of(scene, 0.0, np.float32) == 2.0**29 * unit_of(scene, 0.0)
+    single, double = (Allowances({"m": 0.0}, last=float(np.finfo(kind).eps)) for kind in (np.float32, np.float64))
+    assert single.of("m", 1.0) == 2.0**29 * double.of("m", 1.0) == 64.0 * 2.0**-23
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -279,7 +282,7 @@ def test_what_scatters_in_the_other_pose_alone_is_a_break_unless_the_map_rounds(
     found = compared(monkeypatch, answers)
     held = {name for name, change in found.items() if change.holds and not change.refused}
     rounding = {relation.name for relation in RELATIONS if relation.rounds}
-    assert rounding == {"turned 33", "boosted", "moved"}
+    assert rounding == {"turned 33", "turned 90", "boosted", "moved"}
     assert held == {"again", *({*found} & rounding)} - {name for name, change in found.items() if change.refused}
 
 

@@ -136,13 +136,14 @@ MEASURED = [(engine, fact) for engine in ("chipmunk", "bullet", "mujoco") for fa
     ("engine", "fact"), [pytest.param(*each, id=f"{each[0]}-{each[1].says}") for each in MEASURED if each[1].scene]
 )
 def test_our_cells_answer_what_was_measured_or_what_contradicts_it(engine, fact, seen):
-    """A fact that is shown stays between its ends; one that is contradicted stays what it was found to be."""
+    """A fact that is shown stays between its ends, and each what it was found to be."""
     observation = seen[fact.slot(engine)]
     assert observation.outcome is Outcome.OK, observation.reason
     value = fact.number_of(observation.metrics)
     assert value is not None
     assert fact.holds(value) is (fact.standing == SHOWN), value
-    assert fact.standing == SHOWN or value == pytest.approx(fact.found, rel=0.01)
+    # What is next to nothing is round-off, and another machine's is another.
+    assert value == pytest.approx(fact.found, rel=0.01, abs=1e-12)
 
 
 @pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco"])

@@ -43,6 +43,10 @@ def test_steps_that_are_asked_for_are_asked_of_all_variations():
     found = slots(Request(["bounce"], ["chipmunk"], suite="full", dts=[1 / 60]))
     assert {slot.dt for slot in found} == {1 / 60}
     assert len({slot.params for slot in found}) == 64
+    (_, *steps) = {slot.dt for slot in slots(Request(["bounce"], ["chipmunk"], suite="full", params={"e": 0.77}))}
+    assert len(steps) >= 4
+    found = slots(Request(["stack"], ["chipmunk"], suite="full", iterations=[7]))
+    assert {slot.dt for slot in found} >= set(FULL_DT)
 
 
 @pytest.mark.parametrize(("name", "profile"), [("chipmunk", "default"), ("reference", "classical")])

@@ -70,6 +70,7 @@ class Proposal:
     changes: tuple[Change, ...]
     kept: Mapping[Key, Finding]
     refused: tuple[tuple[Row, str], ...]
+    left_out: tuple[Row, ...] = ()
 
 
 def slots_to_move(rows: Iterable[Row], engine: str, about: Callable[[Key], bool] = lambda key: True) -> list[Slot]:
@@ -99,11 +100,12 @@ def propose(
     """Compare ``rows`` of a run with what is listed for ``engine``; see `Change` and `Proposal`.
 
     ``rows`` carry their scatter (`Row.floor`), so the run's cells have been run from moved starts as well. What
-    ``about`` does not hold for stays as it is listed.
+    ``about`` does not hold for stays as it is listed; what must not be listed is refused there as well, and rows that
+    are new or drifted are told as left out.
     """
     findings = findings or Findings(engine, {}, (), {})
     changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
-    kept, refused, judged = dict(findings.members), [], set()
+    kept, refused, judged, left_out = dict(findings.members), [], set(), []
     for row in rows:
         slot = slot_from_dict(row.slot)
         if row.engine != engine or not in_quick_suite(slot):
@@ -115,7 +117,9 @@ def propose(
                 refused.append((row, "its receipts or its certificate do not hold"))
             continue
         judged.add(key)
-        if not about(key):
+        if not about(key) and not _must_not_be_listed(row):
+            fails = row.outcome == "diverged" or (row.physics == "fail" and row.standing != "explained")
+            left_out += [row] if fails and (key not in findings.members or row.standing == "drifted") else []
             continue
         why, found = _entry(row)
         family = findings.members[key].family if key in findings.members else findings.family_of(key)
@@ -134,7 +138,7 @@ def propose(
     for key in _no_longer_stated(kept, judged):
         finding = kept.pop(key)
         changes[finding.family.id].gone[key] = finding
-    return Proposal(engine, tuple(changes.values()), kept, tuple(refused))
+    return Proposal(engine, tuple(changes.values()), kept, tuple(refused), tuple(left_out))
 
 
 def _place(change: Change, key: Key, found: Finding, kept: dict[Key, Finding]) -> None:
@@ -155,18 +159,32 @@ def _no_longer_stated(kept: Mapping[Key, Finding], judged: set[Key]) -> list[Key
     return [key for key in kept if key[:6] in cells and key not in judged]
 
 
+def _must_not_be_listed(row: Row) -> str:
+    """Why nobody may list a row, whatever its scatter; nothing if one may."""
+    if _never(row) and row.physics == "fail":
+        return "its profile promises a solution: what fails there is mended, not listed"
+    covered = row.truth is not None and row.tolerance is not None and row.value is not None
+    if (
+        covered
+        and row.outcome == "ok"
+        and row.standing != "explained"
+        and row.physics == "fail"
+        and predictions_of(row)
+    ):
+        return "a deviation law speaks about it and misses: the law or the engine has changed"
+    return ""
+
+
 def _entry(row: Row) -> tuple[str, tuple[float | None, float, bool] | None]:
     """Why a row is refused, or its (value, band, diverged); neither where there is nothing to list."""
-    if _never(row) and row.physics == "fail":
-        return "its profile promises a solution: what fails there is mended, not listed", None
+    if why := _must_not_be_listed(row):
+        return why, None
     if row.outcome == "diverged":
         return "", (None, 0.0, True)
     if row.truth is None or row.tolerance is None or row.standing == "explained":
         return "", None
     if row.value is None:
         return "", (None, 0.0, False)
-    if row.physics == "fail" and predictions_of(row):
-        return "a deviation law speaks about it and misses: the law or the engine has changed", None
     if row.physics == "pass" and not is_marginal(row.value, _check(row)):
         return "", None
     if row.floor is None and not _is_study(row):

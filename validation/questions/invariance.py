@@ -10,7 +10,8 @@ could. Where the map itself rounds coarser (far away), the moved starts are roun
 
 A map that only swaps numbers and signs rounds nothing: an engine that does not see it scatters as much in the other
 pose as in the scene's own, from starts that are the same numbers. Scatter of the other pose alone is the break itself.
-Where every step rounds otherwise (a third of a quarter turn, a speed, a place far away), it counts as well.
+Where the map or every step rounds otherwise (a turn, whose attitudes in space are no swaps even at a right angle; a
+speed; a place far away), it counts as well.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from adapters.shapes import reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from validation.canonical import CanonicalScene
-from validation.cells import Slot, settings_of
+from validation.cells import Slot, numbers_of, settings_of
 from validation.posed import resolve
 from validation.running.apart import Apart
 
@@ -38,8 +40,8 @@ MOVES = (1, 2, 4, 8, 16)
 #: How many times the largest change from moved starts a map may change a metric by.
 FACTOR = 10.0
 #: What is left where moved starts change nothing: last digits of the value itself, or of what it is a small difference
-#: of (`scales`), in units of the machine's.
-LAST_DIGITS = 64.0 * float(np.finfo(float).eps)
+#: of (`scales`), in units of the engine's numbers.
+LAST_DIGITS = 64.0
 #: Share of a check's tolerance below which a change is not seen: a defect of exactly nothing has no last digits.
 INVISIBLE = 1e-3
 #: How far a scene is moved, in its own sizes.
@@ -258,7 +260,7 @@ RELATIONS = (
     Relation("fresh process", "run in a process that has run nothing else", itself, fresh=True),
     Relation("renumbered", "bodies in the opposite order", renumbered),
     Relation("turned 33", "world turned by 33 degrees about the vertical", turned(33.0), rounds=True),
-    Relation("turned 90", "world turned by 90 degrees about the vertical", turned(90.0)),
+    Relation("turned 90", "world turned by 90 degrees about the vertical", turned(90.0), rounds=True),
     Relation("mirrored", "left and right swapped", mirrored),
     Relation("boosted", "everything carried along at one size a second", boosted, rounds=True),
     Relation("moved", "a thousand of its sizes to the side", moved_away, rounds=True),
@@ -394,10 +396,13 @@ def _nudged(scene: Scene, by: float, turn: float = 0.0) -> Scene:
     return replace(scene, bodies=tuple(bodies))
 
 
-def unit_of(scene: Scene, shift: float) -> float:
-    """Unit in the last place of the scene's largest coordinate, or of where a map has moved it to [m]."""
+def unit_of(scene: Scene, shift: float, numbers: type[np.floating[Any]] = np.float64) -> float:
+    """Unit in the last place of the scene's largest coordinate, or of where a map has moved it to [m].
+
+    ``numbers`` are the engine's: moved by less an engine of singles starts at the same place, and nothing scatters.
+    """
     places = [abs(x) for body in scene.bodies for x in body.pose[: scene.dimension]]
-    return float(np.spacing(max([shift, size_of(scene), *places])))
+    return float(np.spacing(numbers(max([shift, size_of(scene), *places]))))
 
 
 def compare(slot: Slot, relations: Sequence[str] = ()) -> list[Change]:
@@ -411,7 +416,7 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     tolerances = {check.metric: check.bound for check in canonical.checks(scene, slot.dt) if check.bound}
-    sizes = scales(canonical, scene, slot.dt)
+    sizes, numbers = scales(canonical, scene, slot.dt), numbers_of(slot.engine)
     base = apart.ask(measured, slot, "again")
     if isinstance(base, str):
         return [Change(each.name, refused=base) for each in wanted]
@@ -428,11 +433,11 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
         if isinstance(posed, str):
             found.append(Change(relation.name, refused=posed))
             continue
-        unit, finest = unit_of(scene, posed.shift), unit_of(scene, 0.0)
+        unit, finest = unit_of(scene, posed.shift, numbers), unit_of(scene, 0.0, numbers)
         if unit not in moved:
             moved[unit] = scatter(base, "again", unit)
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
-        allowances = Allowances(moved[unit], tolerances, sizes, unit / finest)
+        allowances = Allowances(moved[unit], tolerances, sizes, unit / finest, float(np.finfo(numbers).eps))
         change = judged(relation.name, base, answer, allowances)
         # Starts are moved first; what no scatter can mend, or need, is not asked of further ones.
         if not change.holds and not isinstance(answer, str):
@@ -496,12 +501,15 @@ class Allowances:
     coarser
         How much coarser places are rounded by the map: an arm is a difference of places, and has fewer digits where
         they are large, which no moved start shows.
+    last
+        Unit in the last place of one, in the engine's numbers.
     """
 
     floors: Mapping[str, float]
     tolerances: Mapping[str, float] = field(default_factory=dict)
     sizes: Mapping[str, float] = field(default_factory=dict)
     coarser: float = 1.0
+    last: float = float(np.finfo(float).eps)
 
     def wider(self, floors: Mapping[str, float]) -> Allowances:
         """The same with the larger of these floors and those."""
@@ -509,7 +517,7 @@ class Allowances:
 
     def of(self, name: str, value: float) -> float:
         """How much a metric of this value may change by."""
-        digits = LAST_DIGITS * self.coarser * max(abs(value), self.sizes.get(name, 0.0))
+        digits = LAST_DIGITS * self.last * self.coarser * max(abs(value), self.sizes.get(name, 0.0))
         return FACTOR * self.floors[name] + digits + INVISIBLE * self.tolerances.get(name, 0.0)
 
 
