@@ -87,7 +87,6 @@ class Lasting(NamedTuple):
     monitor: Array  # (PLACES_WATCHED, k, MONITORS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
     error: Array  # (1,): of the step made last, see `phase.relative_error`
-    astray: Array  # (1,): speed that friction gives across its slip in the step, at most, see `steady_slip`
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
     lenient: Array  # (1,): 1 where a slip that is all but nothing may be projected away
     spin: Array  # (V,)
@@ -146,7 +145,6 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         monitor=np.zeros((PLACES_WATCHED, k, MONITORS)),
         length=np.zeros(1),
         error=np.zeros(1),
-        astray=np.zeros(1),
         early=np.ones(1),
         lenient=np.zeros(1),
         spin=np.zeros(v),

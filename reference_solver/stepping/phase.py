@@ -67,9 +67,6 @@ ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1
 #: Largest difference of both orders, as a share of what the bodies move in the step: it is 50 to 1000 times the error
 #: that is made, which is 1e-11 of a motion then.
 ERROR = 1e-8
-#: What friction is astray by is an error itself, not fifty times one: it is borne up to the gate of the certificate, a
-#: tenth of `ERROR`.
-ASTRAY = 10.0
 #: Share of the translations that rotations are measured against at least, and the other way round.
 NEXT_TO_NOTHING = 1e-4
 #: Share of the length that the error would allow which is taken.
@@ -202,7 +199,6 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
             lasting.moment[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
     lasting.length[0] = length
-    lasting.astray[0] = 0.0
     weigh_stage(bodies, lasting, 0, length)
     keep_slopes(bodies, lasting, 0)
     lasting.early[0] = 1.0
@@ -256,7 +252,6 @@ def relative_error(lasting: Lasting, length: float) -> float:
     way = max(moved_way, least * max(size * moved_turn, speed))
     turn = max(size * moved_turn, least * max(moved_way, speed))
     worst = 0.0
-    missed_way = max(missed_way, ASTRAY * lasting.astray[0])
     if way > 0.0:
         worst = missed_way / (ERROR * way)
     if turn > 0.0:

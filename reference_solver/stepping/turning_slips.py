@@ -44,8 +44,7 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
     f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
     which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
-    slip does not turn, and off by no more than it turns in that moment, which is kept in `Lasting.astray` and counts as
-    an error of the step. What accelerates along its direction keeps it.
+    slip does not turn, and off by no more than it turns in that moment. What accelerates along its direction keeps it.
     """
     speed, force, size, onward = 0.0, 0.0, 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
@@ -82,12 +81,8 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     size = math.sqrt(size)
     if onward < TURNED * size:  # it has come to its end
         return False
-    across = 0.0
     for t in range(lasting.size[TANGENTS]):
         lasting.direction[k, t] = lasting.wanted[t] / size
-        if speed > NOISE * lasting.speeds[k]:
-            across += (lasting.direction[k, t] - lasting.speed[k, 1 + t] / speed) ** 2
-    lasting.astray[0] = max(lasting.astray[0], lasting.length[0] * force * math.sqrt(across))
     return True
 
 

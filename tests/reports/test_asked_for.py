@@ -38,7 +38,7 @@ def test_an_engine_is_described_with_its_habits_and_versions_that_are_bad():
         "name": "toy", "version": "1.2", "title": "Toy", "status": "installed", "package": "toy", "dimensions": [2],
         "customary_dt": "1/60", "scheme": {"order": "velocity first"}, "profiles": {},
         "quirks": [{"what": "sinks", "what_we_do": "nothing", "source": "its manual"}],
-        "known_bad_versions": {"1.1": "it forgets contacts"},
+        "known_bad_versions": {"1.1": "it forgets contacts"}, "measured": [],
     }  # fmt: skip
     text = shown(data)
     assert "toy 1.2: Toy, installed" in text and "velocity first" in text
