@@ -1,5 +1,6 @@
 """What a command is asked for, and what a bench leaves behind."""
 
+import io
 import json
 
 import pandas as pd
@@ -28,7 +29,7 @@ def test_scenes_of_several_words_add_up_and_stand_once(tmp_path, monkeypatch):
 
 
 def shown(data):
-    console = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    console = Console(width=200, record=True, file=io.StringIO())
     tables._engine(data, console)
     return console.export_text()
 

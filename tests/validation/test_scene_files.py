@@ -13,6 +13,7 @@ from adapters.trajectory import ContactRecord, Trajectory
 from reports.findings import refusals
 from validation.cells import Observation, Outcome, Slot
 from validation.files.scene_files import canonical_from_file, json_schema, load_scene
+from validation.files.scene_text import read_text
 from validation.judging.rows import rows_of
 
 GOOD = """
@@ -251,3 +252,10 @@ def test_a_body_may_have_a_slash_in_its_name():
     assert parts_of("a/b.y", names) == (None, "a/b", "y")
     assert parts_of("a/a/b.fy", names) == ("a", "a/b", "fy")
     assert parts_of("floor/box.fy") == ("floor", "box", "fy")
+
+
+@pytest.mark.parametrize("name", ["none.toml", "none.xml", "none\0.toml", "."])
+def test_what_cannot_be_read_is_told_once(tmp_path, name):
+    with pytest.raises(SceneError) as refused:
+        read_text(tmp_path / name)
+    assert str(refused.value).count("cannot read") == 1

@@ -33,14 +33,17 @@ def read_text(path: Path) -> str:
         One line, if it is not a regular file, too large, unreadable or not UTF-8.
     """
     shown = one_line(path)
+    data = None
     try:
-        if not path.is_file():  # opening a pipe would wait for whoever writes to it
-            reason = "it is not a regular file" if path.exists() else "there is no such file"
-            raise SceneError(f"scene: cannot read {shown}: {reason}")
-        with path.open("rb") as stream:
-            data = stream.read(MOST_BYTES + 1)
+        there = path.exists()
+        if path.is_file():  # opening a pipe would wait for whoever writes to it
+            with path.open("rb") as stream:
+                data = stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise SceneError(f"scene: cannot read {shown}: {getattr(error, 'strerror', None) or error}") from None
+    if data is None:
+        reason = "it is not a regular file" if there else "there is no such file"
+        raise SceneError(f"scene: cannot read {shown}: {reason}")
     if len(data) > MOST_BYTES:
         raise SceneError(f"scene: {shown} is larger than {MOST_BYTES // 2**20} MiB, the most that is read")
     try:
