@@ -14,8 +14,8 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.closing_axis import NO_FACE, lasting_face
 from reference_solver.spatial.points import share_of_gap, write_point
 from reference_solver.spatial.polygon import ON_SIDE, clip_to_rectangle, keep_within_reach, reduce_to_four
-from reference_solver.spatial.state import POINTS, Bodies, Detection, Manifolds
-from reference_solver.spatial.vector import Vector, add_scaled, axis, cross, dot, length, row, scale, sub
+from reference_solver.spatial.state import Bodies, Detection, Manifolds
+from reference_solver.spatial.vector import Vector, add, add_scaled, axis, cross, dot, length, row, scale, sub
 
 #: A face of s must separate better than one of f by this part of the smaller half extent, so that ties of aligned
 #: boxes are always decided the same way and round-off cannot swap the reference face.
@@ -67,16 +67,16 @@ def box_box(
             gap, n = gap_e, normal_e
         face = lasting_face(bodies, f, s, between, n, gap, 2.0 * FACE_ADVANTAGE * extent, ahead)
         if face >= 3:
-            count, normal = _clip_faces(bodies, detection, s, f, face - 3, 36, reach, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, s, f, face - 3, 36, reach, ahead, manifolds, m)
             return count, scale(-1.0, normal)
         if face != NO_FACE:
-            return _clip_faces(bodies, detection, f, s, face, 0, reach, manifolds, m)
+            return _clip_faces(bodies, detection, f, s, face, 0, reach, ahead, manifolds, m)
     if gap_e <= (gap_s if by_s else gap_f) + advantage * extent:
         if by_s:
-            count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, ahead, manifolds, m)
             normal = scale(-1.0, normal)
         else:
-            count, normal = _clip_faces(bodies, detection, f, s, face_f, 0, reach, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, f, s, face_f, 0, reach, ahead, manifolds, m)
         if count > 0:
             return count, normal
     if edges < 0:  # parallel boxes whose overlap is thinner than the reach at every vertex
@@ -174,7 +174,7 @@ def _supporting_edge(bodies: Bodies, i: int, k: int, n: Vector) -> tuple[Vector,
 
 @inner_kernel
 def _clip_faces(
-    bodies: Bodies, detection: Detection, r: int, c: int, k: int, base: int, reach: float, manifolds: Manifolds, m: int
+    bodies: Bodies, detection: Detection, r: int, c: int, k: int, base: int, reach: float, ahead: float, manifolds: Manifolds, m: int
 ) -> tuple[int, Vector]:
     """Clip the face of box c that looks against face +-k of box r; return point count and normal from r to c."""
     between = sub(row(bodies.pose, c, 0), row(bodies.pose, r, 0))
@@ -184,11 +184,11 @@ def _clip_faces(
         n = scale(-1.0, n)
     ku, kv = (k + 1) % 3, (k + 2) % 3
     u, v = axis(bodies.axes, r, ku), axis(bodies.axes, r, kv)
-    face = _project_incident_face(bodies, detection, c, n, u, v, between, bodies.geometry[r, k])
+    face = _project_incident_face(bodies, detection, r, c, n, u, v, between, bodies.geometry[r, k])
     half_u, half_v = bodies.geometry[r, ku], bodies.geometry[r, kv]
-    count = clip_to_rectangle(detection, half_u, half_v)
+    count = clip_to_rectangle(detection, half_u, half_v, ahead)
     count = keep_within_reach(detection, count, reach)
-    if count > POINTS:
+    if ahead == 0.0 and count > 4:  # the textbook's four
         count = reduce_to_four(detection, count, ON_SIDE * (half_u + half_v))
     name = 64 * (base + 6 * (2 * k + (1 if towards else 0)) + face)
     share = share_of_gap(bodies, r, c)
@@ -200,13 +200,51 @@ def _clip_faces(
 
 
 @inner_kernel
+def is_crossing(feature: int) -> bool:
+    """Whether a feature names an edge of the clipped face and a side of the face that clips it."""
+    return feature < EDGES and (feature % 64 // 8 < 4) != (feature % 8 < 4)
+
+
+@inner_kernel
+def crossing_edge(bodies: Bodies, i: int, feature: int, second: bool) -> tuple[Vector, Vector]:
+    """Middle and direction of the edge that body i, the ``second`` of the pair or not, has in a crossing (body axes).
+
+    Faces and lines are numbered as in `_clip_faces` and `polygon`.
+    """
+    faces = feature // 64
+    clips = (faces >= 36) == second
+    number = faces % 36 // 6 if clips else faces % 6
+    arriving, leaving = feature % 64 // 8, feature % 8
+    if clips:
+        line = max(arriving, leaving) - 4
+        across, up = line // 2, line % 2 == 0
+    else:
+        line = min(arriving, leaving)
+        across, up = 1 - line % 2, line == 0 or line == 3
+    k = number // 2
+    first = (k + 1 + across) % 3
+    along = (k + 2 - across) % 3
+    at = bodies.geometry[i, first] * (1.0 if up else -1.0)
+    out = bodies.geometry[i, k] * (1.0 if number % 2 == 1 else -1.0)
+    middle = (
+        at if first == 0 else out if k == 0 else 0.0,
+        at if first == 1 else out if k == 1 else 0.0,
+        at if first == 2 else out if k == 2 else 0.0,
+    )
+    return middle, (1.0 if along == 0 else 0.0, 1.0 if along == 1 else 0.0, 1.0 if along == 2 else 0.0)
+
+
+@inner_kernel
 def _project_incident_face(
-    bodies: Bodies, detection: Detection, c: int, n: Vector, u: Vector, v: Vector, between: Vector, height: float
+    bodies: Bodies, detection: Detection, r: int, c: int, n: Vector, u: Vector, v: Vector, between: Vector, height: float
 ) -> int:
     """Write the face of box c that looks most against n as polygon 0; return its number 0..5.
 
-    Coordinates are (along u, along v, above the reference face); edge i runs from vertex i to vertex i + 1.
+    Coordinates are (along u, along v, above the reference face of box r), and the rates of the first two; edge i runs
+    from vertex i to vertex i + 1.
     """
+    w_r, w_c = row(bodies.twist, r, 3), row(bodies.twist, c, 3)
+    passing = sub(row(bodies.twist, c, 0), row(bodies.twist, r, 0))
     k = 0
     for i in range(1, 3):
         if abs(dot(axis(bodies.axes, c, i), n)) > abs(dot(axis(bodies.axes, c, k), n)) + ON_SIDE:
@@ -219,8 +257,11 @@ def _project_incident_face(
         along = half_e if i == 0 or i == 3 else -half_e
         aside = half_g if i < 2 else -half_g
         vertex = add_scaled(add_scaled(middle, along, e), aside, g)
+        rate = sub(add(passing, cross(w_c, sub(vertex, between))), cross(w_r, vertex))
         detection.polygon[0, i, 0] = dot(vertex, u)
         detection.polygon[0, i, 1] = dot(vertex, v)
         detection.polygon[0, i, 2] = dot(vertex, n) - height
+        detection.polygon[0, i, 3] = dot(rate, u)
+        detection.polygon[0, i, 4] = dot(rate, v)
         detection.polygon_edge[0, i] = i
     return 2 * k + (1 if sign > 0.0 else 0)

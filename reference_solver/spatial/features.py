@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.spatial.box_box import crossing_edge, is_crossing
 from reference_solver.spatial.points import share_of_gap
 from reference_solver.spatial.state import BOX, CAPSULE, HALF_SPACE, POINTS, Bodies, Manifolds
 from reference_solver.spatial.vector import (
@@ -81,8 +82,8 @@ def set_part(lasting: Lasting, k: int, entry: int, side: int, v: Vector) -> None
 def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> bool:
     """Note the features that touch at row c (point c % 4 of manifold c // 4) as contact k; False without a normal.
 
-    A face is taken where the normal is its own and the other body has a point there; else edges that cross; else an
-    edge or a corner against whatever is round.
+    A face is taken where the normal is its own and the other body has a point there that stays over it; else edges that
+    cross; else an edge or a corner against whatever is round.
     """
     m, p = c // POINTS, c % POINTS
     a, b = manifolds.body_a[m], manifolds.body_b[m]
@@ -95,13 +96,18 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
     face_a, face_b = facing(bodies, a, n), facing(bodies, b, scale(-1.0, n))
     core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
     core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
-    if face_a >= 0 and core_b == POINT:
-        if core_a == PLANE or not rolls_off(bodies, manifolds, lasting, c, k, 0, face_a):
-            set_face(bodies, a, face_a, n, lasting, k, 0)
-        return True
-    if face_b >= 0 and core_a == POINT:
-        if core_b == PLANE or not rolls_off(bodies, manifolds, lasting, c, k, 1, face_b):
-            set_face(bodies, b, face_b, scale(-1.0, n), lasting, k, 1)
+    for side in range(2):
+        i, face = (a, face_a) if side == 0 else (b, face_b)
+        own, other = (core_a, core_b) if side == 0 else (core_b, core_a)
+        if face < 0 or other != POINT:
+            continue
+        if own != PLANE and goes_off(bodies, manifolds, lasting, c, k, side, face):
+            if lasting.place[k, RADIUS + 1 - side] > 0.0:
+                return True
+            if cross_over(bodies, manifolds, lasting, c, k):
+                core_a = core_b = LINE
+                break
+        set_face(bodies, i, face, scale(1.0 - 2.0 * side, n), lasting, k, side)
         return True
     if core_a == LINE and core_b == LINE:
         e_a, e_b = (
@@ -115,14 +121,31 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
 
 
 @inner_kernel
-def rolls_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int, face: int) -> bool:
-    """Whether the other body is round, stands where a face of the box on this side ends, and goes on over its edge.
+def cross_over(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> bool:
+    """Take the edges that cross at row c as the cores of contact k; False if there are none."""
+    a, b, feature = lasting.body[k, 0], lasting.body[k, 1], manifolds.feature[c // POINTS, c % POINTS]
+    if bodies.kind[a] != BOX or bodies.kind[b] != BOX or not is_crossing(feature):
+        return False
+    middle_a, along_a = crossing_edge(bodies, a, feature, False)
+    middle_b, along_b = crossing_edge(bodies, b, feature, True)
+    across = cross(times(bodies.axes, a, along_a), times(bodies.axes, b, along_b))
+    if dot(across, across) <= ON_FACE:
+        return False
+    set_part(lasting, k, PLACE, 0, middle_a)
+    set_part(lasting, k, PLACE, 1, middle_b)
+    set_part(lasting, k, DIRECTION, 0, along_a)
+    set_part(lasting, k, DIRECTION, 1, along_b)
+    lasting.kind[k, CORE] = lasting.kind[k, CORE + 1] = LINE
+    return True
 
-    Its core, which is above the point of contact by its radius, moves out of the face.
+
+@inner_kernel
+def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int, face: int) -> bool:
+    """Whether the point of the other body stands where a face of the box on this side ends, and goes on over its edge.
+
+    What is round rolls on over it: its core, which is above the point of contact by its radius, moves out of the face.
     """
     radius = lasting.place[k, RADIUS + 1 - side]
-    if radius == 0.0:
-        return False
     m, p = c // POINTS, c % POINTS
     i, other = lasting.body[k, side], lasting.body[k, 1 - side]
     up = scale(radius * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))

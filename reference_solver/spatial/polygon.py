@@ -1,7 +1,7 @@
-"""Clipping one face by another and keeping at most four vertices.
+"""Clipping one face by another, and keeping at most four vertices where that is asked for.
 
 Polygons live in ``Detection.polygon`` in the frame of a reference face: two coordinates along the face, the third
-above it. ``Detection.polygon_edge`` numbers the line that leaves each vertex: 0..3 the edges of the clipped face,
+above it, and the rates of the two along it. ``Detection.polygon_edge`` numbers the line that leaves each vertex: 0..3 the edges of the clipped face,
 4..7 the sides of the reference face.
 """
 
@@ -17,20 +17,28 @@ from reference_solver.spatial.state import Detection
 ON_SIDE = 1e-8
 
 
+#: Entries of a vertex: coordinates along the face and above it [m], and the rates of the first two [m/s].
+ENTRIES = 5
+
+
 @inner_kernel
-def clip_to_rectangle(detection: Detection, half_u: float, half_v: float) -> int:
-    """Clip the four-sided polygon 0 to |u| <= half_u, |v| <= half_v; the result is polygon 0 again."""
+def clip_to_rectangle(detection: Detection, half_u: float, half_v: float, ahead: float) -> int:
+    """Clip the four-sided polygon 0 to |u| <= half_u, |v| <= half_v; the result is polygon 0 again.
+
+    A vertex on a side that leaves it within ``ahead`` [s] is outside: where a corner slides over an edge, two edges
+    cross from then on. With 0 it is where it is.
+    """
     count = 4
     source = 0
     for side in range(4):
         half = half_u if side < 2 else half_v
-        count = _clip(detection, source, count, side, half)
+        count = _clip(detection, source, count, side, half, ahead)
         source = 1 - source
     return count
 
 
 @inner_kernel
-def _clip(detection: Detection, source: int, count: int, side: int, half: float) -> int:
+def _clip(detection: Detection, source: int, count: int, side: int, half: float, ahead: float) -> int:
     """Keep the part of polygon `source` inside one side (Sutherland and Hodgman, CACM 17, 1974)."""
     target = 1 - source
     coordinate = side // 2
@@ -42,13 +50,14 @@ def _clip(detection: Detection, source: int, count: int, side: int, half: float)
         j = i + 1 if i + 1 < count else 0
         here = sign * polygon[source, i, coordinate] - half
         there = sign * polygon[source, j, coordinate] - half
-        inside = here <= tolerance
+        here_rate, there_rate = sign * polygon[source, i, 3 + coordinate], sign * polygon[source, j, 3 + coordinate]
+        inside = is_inside(here, here_rate, tolerance, ahead)
         if inside:
-            for d in range(3):
+            for d in range(ENTRIES):
                 polygon[target, kept, d] = polygon[source, i, d]
             edge[target, kept] = edge[source, i]
             kept += 1
-        if inside == (there <= tolerance):
+        if inside == is_inside(there, there_rate, tolerance, ahead):
             continue
         if inside and here >= -tolerance:  # the vertex itself lies on the side
             edge[target, kept - 1] = 4 + side
@@ -57,9 +66,21 @@ def _clip(detection: Detection, source: int, count: int, side: int, half: float)
             for d in range(3):
                 start = polygon[source, i, d]
                 polygon[target, kept, d] = start + part * (polygon[source, j, d] - start)
+            part_rate = (here_rate - part * (here_rate - there_rate)) / (here - there)
+            for d in range(2):
+                start, way = polygon[source, i, 3 + d], polygon[source, j, d] - polygon[source, i, d]
+                polygon[target, kept, 3 + d] = (
+                    start + part * (polygon[source, j, 3 + d] - start) + part_rate * way
+                )
             edge[target, kept] = 4 + side if inside else edge[source, i]
             kept += 1
     return kept
+
+
+@inner_kernel
+def is_inside(over: float, rate: float, tolerance: float, ahead: float) -> bool:
+    """Whether a vertex that is ``over`` a side [m], and goes on over it with ``rate`` [m/s], counts as inside."""
+    return over < -tolerance or (over <= tolerance and rate * ahead <= tolerance)
 
 
 @inner_kernel
@@ -72,7 +93,7 @@ def keep_within_reach(detection: Detection, count: int, reach: float) -> int:
     kept = 0
     for i in range(count):
         if polygon[0, i, 2] <= reach:
-            for d in range(3):
+            for d in range(3):  # rates are not asked for again
                 polygon[1, kept, d] = polygon[0, i, d]
             edge[1, kept] = 8 * edge[0, i - 1 if i > 0 else count - 1] + edge[0, i]
             kept += 1

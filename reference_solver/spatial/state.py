@@ -42,8 +42,8 @@ Indices = NDArray[np.int64]
 HALF_SPACE, BOX, SPHERE, CAPSULE = 0, 1, 2, 3
 FIXED, FREE, PRESCRIBED = 0, 1, 2
 
-#: Points per manifold: a plane support needs no more than four to carry any load.
-POINTS = 4
+#: Points per manifold: two rectangles share a polygon of up to eight corners, and each of them can carry load.
+POINTS = 8
 
 #: Most bodies of a world: the numbers of two of them are packed into one key.
 MOST_BODIES = 1 << 31
@@ -176,7 +176,7 @@ class Detection(NamedTuple):
     friction: Array  # (n, n), likewise
     order: Indices  # (n,): bodies by ascending lower x, as of the last sort
     candidate: Indices  # (capacity,): a * n + b, ascending
-    polygon: Array  # (2, 16, 3): two polygons, each made from the other by one clip
+    polygon: Array  # (2, 16, 5): two polygons, each made from the other by one clip
     polygon_edge: Indices  # (2, 16): number of the edge that leaves each vertex
 
 
@@ -232,7 +232,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
         # sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves
         order=np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64),
         candidate=np.zeros(capacity, np.int64),
-        polygon=np.zeros((2, 16, 3)),
+        polygon=np.zeros((2, 16, 5)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
 

@@ -12,7 +12,7 @@ from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_world_points
 from reference_solver.spatial.narrowphase import collide
-from reference_solver.spatial.state import CANDIDATES, POINTS, Bodies, Detection, Manifolds, SubStep
+from reference_solver.spatial.state import CANDIDATES, Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector, dot, row, sub
 from reference_solver.stepping.clock import HELD
@@ -74,7 +74,7 @@ def pair_impact(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, a: int,
     # What holds them may let go, and edges that cross end where one comes to lie along a face: nobody else looks there.
     depth = (DEEP if held else SLIGHT) * min(bodies.extent[a], bodies.extent[b])
     t = overlap_time(sub_step.meeting, a, b, end, depth)
-    if pressed == POINTS or (held and t < end):
+    if pressed >= 4 or (held and t < end):
         return t
     # The normal at the start, where the rows may be those of mid-drift.
     n = row(sub_step.kept.frame[m], 2, 0) if held else row(manifolds.frame[m], 2, 0)
