@@ -1,9 +1,9 @@
 """Block solve: all points of one manifold together, then over-relaxed (E12, E13).
 
-Most blocks of three or four points stick: `stick` solves them at once. Others go to
-`solve_by_newton`; where that finds nothing (friction so large that there may be nothing to find), the points are
-solved one after the other, each exactly with its friction (`coulomb_impulse`). Three or four points of one plane are
-redundant: their impulses are not unique, but the wrench on the bodies, and with it every velocity, is.
+Most blocks of three and more points stick: `stick` solves them at once. Others go to `solve_by_newton`; where that
+finds nothing (friction so large that there may be nothing to find), the points are solved one after the other, each
+exactly with its friction (`coulomb_impulse`). Three and more points of one plane are redundant: their impulses are not
+unique, but the wrench on the bodies, and with it every velocity, is.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def box_box(
     manifolds: Manifolds,
     m: int,
 ) -> tuple[int, Vector]:
-    """Boxes f and s: up to four points of two faces, or one of two edges; ``ahead``, ``advantage`` as in `collide`."""
+    """Boxes f and s: up to eight points of two faces, or one of two edges; ``ahead``, ``advantage`` as in `collide`."""
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
     extent = min(bodies.extent[f], bodies.extent[s])
     face_f, gap_f = best_face(bodies, f, s, between)
@@ -174,7 +174,16 @@ def _supporting_edge(bodies: Bodies, i: int, k: int, n: Vector) -> tuple[Vector,
 
 @inner_kernel
 def _clip_faces(
-    bodies: Bodies, detection: Detection, r: int, c: int, k: int, base: int, reach: float, ahead: float, manifolds: Manifolds, m: int
+    bodies: Bodies,
+    detection: Detection,
+    r: int,
+    c: int,
+    k: int,
+    base: int,
+    reach: float,
+    ahead: float,
+    manifolds: Manifolds,
+    m: int,
 ) -> tuple[int, Vector]:
     """Clip the face of box c that looks against face +-k of box r; return point count and normal from r to c."""
     between = sub(row(bodies.pose, c, 0), row(bodies.pose, r, 0))
@@ -236,7 +245,15 @@ def crossing_edge(bodies: Bodies, i: int, feature: int, second: bool) -> tuple[V
 
 @inner_kernel
 def _project_incident_face(
-    bodies: Bodies, detection: Detection, r: int, c: int, n: Vector, u: Vector, v: Vector, between: Vector, height: float
+    bodies: Bodies,
+    detection: Detection,
+    r: int,
+    c: int,
+    n: Vector,
+    u: Vector,
+    v: Vector,
+    between: Vector,
+    height: float,
 ) -> int:
     """Write the face of box c that looks most against n as polygon 0; return its number 0..5.
 

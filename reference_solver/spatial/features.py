@@ -80,7 +80,7 @@ def set_part(lasting: Lasting, k: int, entry: int, side: int, v: Vector) -> None
 
 @kernel
 def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> bool:
-    """Note the features that touch at row c (point c % 4 of manifold c // 4) as contact k; False without a normal.
+    """Note the features that touch at row c (point c % 8 of manifold c // 8) as contact k; False without a normal.
 
     A face is taken where the normal is its own and the other body has a point there that stays over it; else edges that
     cross; else an edge or a corner against whatever is round.

@@ -80,7 +80,7 @@ def friction_of(bodies: Bodies, detection: Detection, a: int, b: int) -> float:
 
 @inner_kernel
 def sort_points(manifolds: Manifolds, m: int) -> None:
-    """Sort the points of manifold m by feature (insertion sort of at most four)."""
+    """Sort the points of manifold m by feature (insertion sort of at most eight)."""
     for i in range(1, manifolds.points[m]):
         j = i
         while j > 0 and manifolds.feature[m, j] < manifolds.feature[m, j - 1]:

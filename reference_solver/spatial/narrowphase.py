@@ -1,6 +1,6 @@
 """Contact points of one pair of shapes: normal, gap, arms and the number of the touching features.
 
-A pair function gets the bodies in the order of their shape codes (f, s), finds at most four points whose normal
+A pair function gets the bodies in the order of their shape codes (f, s), finds at most eight points whose normal
 leads from f to s, and returns ``(count, normal)``; `collide` turns them so that A has the lower index. Arms are
 measured from the bodies' centres, so that nothing depends on where the origin is. With an immovable partner the
 contact point lies on the free body's own surface (a rolling sphere keeps its radius, whatever the overlap);

@@ -42,7 +42,7 @@ def is_free(bodies: Spatial, i: int) -> bool:
 
 @inner_kernel
 def hold(bodies: Spatial, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> None:
-    """Note the features of point c % 4 of manifold c // 4."""
+    """Note the features of point c % 8 of manifold c // 8."""
     name_features(bodies.record, manifolds, lasting, c, k)
 
 

@@ -69,9 +69,7 @@ def _clip(detection: Detection, source: int, count: int, side: int, half: float,
             part_rate = (here_rate - part * (here_rate - there_rate)) / (here - there)
             for d in range(2):
                 start, way = polygon[source, i, 3 + d], polygon[source, j, d] - polygon[source, i, d]
-                polygon[target, kept, 3 + d] = (
-                    start + part * (polygon[source, j, 3 + d] - start) + part_rate * way
-                )
+                polygon[target, kept, 3 + d] = start + part * (polygon[source, j, 3 + d] - start) + part_rate * way
             edge[target, kept] = 4 + side if inside else edge[source, i]
             kept += 1
     return kept

@@ -3,9 +3,9 @@
 Records rather than one array per field: a kernel call hands over one pointer instead of two hundred numbers,
 which is what compilation time goes with, and the constants of a manifold lie side by side in memory.
 
-Symbols as in ``reference_solver/README.md``. A manifold ``m`` holds the one to four contact points ``s`` of one
+Symbols as in ``reference_solver/README.md``. A manifold ``m`` holds the one to eight contact points ``s`` of one
 pair of bodies, which share a normal; manifolds are sorted by (body_a, body_b), their points by feature.
-Every manifold has room for four points.
+Every manifold has room for eight points.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ MANIFOLD = np.dtype(
     [
         ("body_a", "i8"),
         ("body_b", "i8"),
-        ("points", "i8"),  # number of points, 1..4
+        ("points", "i8"),  # number of points, 1..8
         ("friction", "f8"),  # mu
         ("restitution", "f8"),  # e
         ("frame", "f8", (3, 3)),  # rows t1, t2, n; n points from A to B

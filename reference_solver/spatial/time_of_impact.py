@@ -30,6 +30,8 @@ from reference_solver.stepping.time_of_impact import (
 #: Overlap of bodies held in a phase, as a share of the smaller half width, at which their contact is another one: less
 #: than what a contact that is held may have (`phase.CLOSED`).
 SLIGHT = 2e-10
+#: Points of a face that are its own corners at most: where as many are pressed none is left to come down.
+CORNERS_OF_FACE = 4
 
 
 @kernel
@@ -74,7 +76,7 @@ def pair_impact(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, a: int,
     # What holds them may let go, and edges that cross end where one comes to lie along a face: nobody else looks there.
     depth = (DEEP if held else SLIGHT) * min(bodies.extent[a], bodies.extent[b])
     t = overlap_time(sub_step.meeting, a, b, end, depth)
-    if pressed >= 4 or (held and t < end):
+    if pressed >= CORNERS_OF_FACE or (held and t < end):
         return t
     # The normal at the start, where the rows may be those of mid-drift.
     n = row(sub_step.kept.frame[m], 2, 0) if held else row(manifolds.frame[m], 2, 0)

@@ -15,6 +15,9 @@ from reference_solver.stepping.lasting import BODIES, CONTACTS, OPEN, SLIP, STIC
 INDEPENDENT, REDUNDANT, CONTRADICTORY = 0, 1, 2
 #: A pivot below this share of its scaled row is round-off.
 RANK = 1e-10
+#: The same for its product with the smallest pivot before it, which round-off has been divided by: contacts that are
+#: about to meet have a small one, and what is left of a row that says the same as others is then not small itself.
+GROWN = 1e-13
 #: The same for the square of the matrix.
 RANK_SQUARED = 1e-13
 #: Corrections of a solution of redundant rows; each gains the digits that squaring the matrix cost.
@@ -98,13 +101,16 @@ def eliminate(lasting: Lasting, count: int) -> bool:
         for j in range(count):
             factor[i, j] = lasting.matrix[i, j]
         x[i] = lasting.right[i]
+    least = 1.0
     for j in range(count):
         best = j
         for i in range(j + 1, count):
             if factor[i, j] ** 2 * scale[best] > factor[best, j] ** 2 * scale[i]:
                 best = i
-        if not factor[best, j] ** 2 > RANK**2 * scale[best] * lasting.other[j]:
+        pivot = factor[best, j] ** 2 / (scale[best] * lasting.other[j])
+        if not (pivot > RANK**2 and pivot * least > GROWN**2):
             return False
+        least = min(least, pivot)
         if best != j:
             for c in range(count):
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]

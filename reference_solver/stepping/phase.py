@@ -82,6 +82,8 @@ SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
 SHORTEST = 1e-9
 
+#: Share of a phase in which a feature is looked at that ends where it begins: it may go on to its other end in between.
+LOOK = 1e-2
 #: Share of the time to the end of a slip that turns which is stepped: what is left is a share of it as well.
 BEFORE_END = 0.5
 
@@ -334,17 +336,14 @@ def lowest(lasting: Lasting, place: int) -> float:
 
 
 @inner_kernel
-def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
-    """Change the mode whose monitor was zero at the start and has fallen most; False if there is none."""
+def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
+    """Contact and monitor that was zero at the start and has fallen most; (-1, `LOAD`) if there is none."""
     worst, which, what = -FORCE_NOISE, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
         for m in range(MONITORS):
             if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
                 worst, which, what = lasting.monitor[LAST, k, m], k, m
-    if which < 0:
-        return False
-    end_mode(bodies, lasting, which, what)
-    return True
+    return which, what
 
 
 @inner_kernel
@@ -506,7 +505,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     if not changed:
         go_back(bodies, lasting)
         return 0.0, FAILED
-    length, outcome = left, WHOLE
+    length, outcome, unseen = left, WHOLE, 0.0
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
         if changed:
             if not start_again(bodies, lasting):
@@ -523,8 +522,14 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif switch_at_once(bodies, lasting):
-            changed = True
+        elif fallen_at_once(lasting)[0] >= 0:
+            which, what = fallen_at_once(lasting)
+            if what == FEATURE and unseen == 0.0:
+                unseen, length, outcome = length, LOOK * length, SHORTENED
+                continue
+            end_mode(bodies, lasting, which, what)
+            length, unseen, changed = max(length, unseen), 0.0, True
+            outcome = WHOLE if length == left else SHORTENED
             continue
         elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
             length, outcome = lasting.early[0] * length, SHORTENED

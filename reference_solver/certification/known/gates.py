@@ -51,6 +51,7 @@ MOTIONS: dict[str, Draw] = {
     "ball slipping over an edge": partial(edges.ball_over_a_box, "slips"),
     "smooth ball over an edge": partial(edges.ball_over_a_box, "smooth"),
     "box that spins on its base": partial(rubbing.spinning_boxes, 1),
+    "box over the corner of a table": edges.slides_over_a_corner,
     "rod that crosses a rod": crossing.crossed_rods,
     "ball on a turntable": spatial.turntable,
     "lopsided ball that rolls": spatial.lopsided_ball,

@@ -84,10 +84,11 @@ def test_no_set_of_corners_fits_what_pulls_and_pushes_at_once():
         complementary(np.array([[-1.0]]), np.array([-1.0]))
 
 
-@pytest.mark.xfail(strict=True, reason="a box that slides over the corner of a table is tilted by it: refused")
 def test_a_box_slides_on_over_the_corner_of_a_table():
-    found = [miss(edges.slides_over_a_corner(np.random.default_rng(seed)), 30) for seed in range(3)]
-    assert [each.refused for each in found] == [()] * 3
+    """Corners of its base leave the table, and that of the table leaves its base: pressed polygons of up to six."""
+    found = [miss(edges.slides_over_a_corner(np.random.default_rng(seed)), 30) for seed in range(6, 24)]
+    assert [each.refused for each in found] == [()] * len(found)
+    assert max(each.off for each in found) < 1e-11
 
 
 def test_a_box_that_spins_on_a_light_one_slows_down_as_on_a_floor():

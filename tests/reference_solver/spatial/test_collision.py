@@ -5,11 +5,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given
+from hypothesis import assume, event, example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.spatial.box_box import crossing_edge, is_crossing
+from reference_solver.spatial.state import allocate_bodies
 
 DT = 1.0 / 240.0
 SETTINGS = Settings.fixed_step(DT)
@@ -27,9 +29,9 @@ def body(shape, place, turn=(1.0, 0.0, 0.0, 0.0), **fields):
     return Body(shape, 1.0, (1.0, 1.0, 1.0), (*place, *turn), **fields)
 
 
-def touch(*bodies):
+def touch(*bodies, settings=SETTINGS):
     """Contacts of bodies at rest: one step moves nothing before detection."""
-    simulation = Simulation(Model(3, bodies, (0.0, 0.0, 0.0), 0.0, 0.5), SETTINGS)
+    simulation = Simulation(Model(3, bodies, (0.0, 0.0, 0.0), 0.0, 0.5), settings)
     simulation.advance(1)
     return simulation.contacts()
 
@@ -72,7 +74,7 @@ def test_box_contacts_appear_along_the_axis_of_least_overlap(half_a, half_b, pla
         assert len(contacts) == 0
         return
     assume(best < -1e-9)
-    assert 1 <= len(contacts) <= 4
+    assert 1 <= len(contacts) <= 8
     n = contacts.normal[0]
     assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-14)
     pa, pb = corners(*a) @ n, corners(*b) @ n
@@ -154,14 +156,39 @@ def test_aligned_boxes_touch_on_the_rectangle_they_share(shift):
     assert contacts.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (4, 1)), abs=0)
 
 
-def test_a_square_turned_by_45_degrees_keeps_four_of_its_eight_clipped_corners():
-    """The four kept are vertices of the octagon that both squares share, and their centre is the octagon's."""
+@pytest.mark.parametrize(("settings", "kept"), [(SETTINGS, 8), (Settings.classical(0.01), 4)])
+def test_a_square_turned_by_45_degrees_keeps_the_corners_that_are_shared(settings, kept):
+    """All vertices of the octagon that both squares share, and four of them, about its centre, in the textbook's step."""
     turn = (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
-    contacts = touch(body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.0)), body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.999), turn))
-    assert len(contacts) == 4
+    a, b = body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.0)), body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.999), turn)
+    contacts = touch(a, b, settings=settings)
+    assert len(contacts) == kept
     flat = np.abs(contacts.point[:, :2])
-    assert np.sort(flat, axis=1) == pytest.approx(np.tile([math.sqrt(0.5) - 0.5, 0.5], (4, 1)), abs=1e-12)
+    assert np.sort(flat, axis=1) == pytest.approx(np.tile([math.sqrt(0.5) - 0.5, 0.5], (kept, 1)), abs=1e-12)
     assert contacts.point[:, :2].mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert len(set(map(tuple, contacts.point.round(9)))) == kept
+
+
+@given(halves, halves, st.tuples(numbers, numbers), st.floats(0.05, 1.5), st.booleans(), st.integers(0, 2))
+@hypothesis_settings(max_examples=100, deadline=None)
+def test_a_feature_that_names_two_edges_names_those_that_cross_there(half_a, half_b, place, yaw, below, turned):
+    """The contact lies on both lines: whichever of the faces clips, and whichever axes of the boxes stand upright."""
+    turn_a = [(1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.5, -0.5, -0.5, -0.5)][turned]
+    turn_b = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+    far = (abs(matrix(turn_a).T @ (0.0, 0.0, 1.0)) @ half_a + half_b[2] - 1e-4) * (-1.0 if below else 1.0)
+    a, b = body(Box(half_a), (0.0, 0.0, 0.0), turn_a), body(Box(half_b), (*place, far), turn_b)
+    contacts = touch(a, b)
+    crossings = [c for c in range(len(contacts)) if is_crossing.py_func(int(contacts.feature[c]))]
+    simulation = Simulation(Model(3, (a, b), (0.0, 0.0, 0.0), 0.0, 0.5), SETTINGS)
+    bodies = allocate_bodies(simulation.model, simulation.needs)
+    for c in crossings:
+        for i, each in enumerate((a, b)):
+            middle, along = crossing_edge.py_func(bodies, i, int(contacts.feature[c]), i == 1)
+            r = matrix(each.pose[3:])
+            off = contacts.point[c] - np.array(each.pose[:3]) - r @ middle
+            assert np.linalg.norm(np.cross(r @ along, off)) <= 1e-4
+            assert abs(off @ (r @ along)) <= np.array(along) @ each.shape.half_extents + 1e-9
+    event(f"{len(crossings)} crossings")
 
 
 def test_crossed_edges_touch_where_they_cross():
