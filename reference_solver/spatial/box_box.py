@@ -67,16 +67,16 @@ def box_box(
             gap, n = gap_e, normal_e
         face = lasting_face(bodies, f, s, between, n, gap, 2.0 * FACE_ADVANTAGE * extent, ahead)
         if face >= 3:
-            count, normal = _clip_faces(bodies, detection, s, f, face - 3, 36, reach, ahead, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, s, f, face - 3, reach, ahead, manifolds, m)
             return count, scale(-1.0, normal)
         if face != NO_FACE:
-            return _clip_faces(bodies, detection, f, s, face, 0, reach, ahead, manifolds, m)
+            return _clip_faces(bodies, detection, f, s, face, reach, ahead, manifolds, m)
     if gap_e <= (gap_s if by_s else gap_f) + advantage * extent:
         if by_s:
-            count, normal = _clip_faces(bodies, detection, s, f, face_s, 36, reach, ahead, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, s, f, face_s, reach, ahead, manifolds, m)
             normal = scale(-1.0, normal)
         else:
-            count, normal = _clip_faces(bodies, detection, f, s, face_f, 0, reach, ahead, manifolds, m)
+            count, normal = _clip_faces(bodies, detection, f, s, face_f, reach, ahead, manifolds, m)
         if count > 0:
             return count, normal
     if edges < 0:  # parallel boxes whose overlap is thinner than the reach at every vertex
@@ -179,7 +179,6 @@ def _clip_faces(
     r: int,
     c: int,
     k: int,
-    base: int,
     reach: float,
     ahead: float,
     manifolds: Manifolds,
@@ -199,7 +198,7 @@ def _clip_faces(
     count = keep_within_reach(detection, count, reach)
     if ahead == 0.0 and count > 4:  # the textbook's four
         count = reduce_to_four(detection, count, ON_SIDE * (half_u + half_v))
-    name = 64 * (base + 6 * (2 * k + (1 if towards else 0)) + face)
+    name = 64 * ((0 if r < c else 36) + 6 * (2 * k + (1 if towards else 0)) + face)
     share = share_of_gap(bodies, r, c)
     for p in range(count):
         x, y, gap = detection.polygon[1, p, 0], detection.polygon[1, p, 1], detection.polygon[1, p, 2]

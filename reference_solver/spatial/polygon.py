@@ -1,8 +1,8 @@
 """Clipping one face by another, and keeping at most four vertices where that is asked for.
 
 Polygons live in ``Detection.polygon`` in the frame of a reference face: two coordinates along the face, the third
-above it, and the rates of the two along it. ``Detection.polygon_edge`` numbers the line that leaves each vertex: 0..3 the edges of the clipped face,
-4..7 the sides of the reference face.
+above it, and the rates of the two along it. ``Detection.polygon_edge`` numbers the line that leaves each vertex: 0..3
+the edges of the clipped face, 4..7 the sides of the reference face.
 """
 
 from __future__ import annotations

@@ -158,7 +158,7 @@ def test_aligned_boxes_touch_on_the_rectangle_they_share(shift):
 
 @pytest.mark.parametrize(("settings", "kept"), [(SETTINGS, 8), (Settings.classical(0.01), 4)])
 def test_a_square_turned_by_45_degrees_keeps_the_corners_that_are_shared(settings, kept):
-    """All vertices of the octagon that both squares share, and four of them, about its centre, in the textbook's step."""
+    """All vertices of the octagon that both squares share; in the textbook's step four of them, about its centre."""
     turn = (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
     a, b = body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.0)), body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.999), turn)
     contacts = touch(a, b, settings=settings)
