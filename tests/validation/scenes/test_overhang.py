@@ -75,3 +75,14 @@ def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
         fallen.pose[-1, -1, :2] += [LENGTH, -2.0 * HEIGHT]
         assert ("stands" in failing(canonical, scene, fallen)) is fails
     assert failing(canonical, scene, at_rest(scene)) == {"stands"}
+
+
+def test_a_block_that_leans_on_the_one_below_has_fallen():
+    """Its end stands on the floor: it has turned by .53 rad and sunk by .17 blocks, less than half of one."""
+    canonical, scene = made(n=2.0, margin=-0.05)
+    leaning = at_rest(scene)
+    leaning.pose[-1, -1] += [0.0, -0.17 * HEIGHT, -0.53]
+    assert failing(canonical, scene, leaning) == set()
+    straight = at_rest(scene)
+    straight.pose[-1, -1, 1] -= 0.17 * HEIGHT
+    assert failing(canonical, scene, straight) == {"stands"}
