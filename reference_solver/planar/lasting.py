@@ -29,7 +29,7 @@ from reference_solver.planar.columns import (
 from reference_solver.planar.separating_axis import corner, edge_normal
 from reference_solver.planar.state import FREE, HALF_SPACE, Bodies, Rows
 from reference_solver.stepping import operations
-from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.lasting import FEATURE, Lasting
 from reference_solver.stepping.operations import provide
 
 #: Forms of a contact: two core points; a core point on an edge of A or of B.
@@ -312,35 +312,33 @@ def displacement_curvature(bodies: Bodies, lasting: Lasting, i: int, end: int) -
 
 
 @inner_kernel
-def feature_limit(bodies: Bodies, lasting: Lasting, k: int, normals: bool) -> float:
+def feature_limits(bodies: Bodies, lasting: Lasting, k: int, place: int) -> None:
     """Distance of the core point from the ends of its edge; of a vertex, of its normal from those of its edges [m]."""
-    if normals != (lasting.kind[k, FORM] == POINTS):
-        return math.inf
-    a, b = lasting.body[k, 0], lasting.body[k, 1]
+    monitor = lasting.monitor[place, k]
+    for m in range(FEATURE, len(monitor)):
+        monitor[m] = math.inf
     if lasting.kind[k, FORM] != POINTS:
         along, _ = along_edge(bodies, lasting, k)
-        return min(along - lasting.place[k, LOW], lasting.place[k, HIGH] - along)
+        monitor[FEATURE], monitor[FEATURE + 1] = along - lasting.place[k, LOW], lasting.place[k, HIGH] - along
+        return
+    a, b = lasting.body[k, 0], lasting.body[k, 1]
     nx, ny = lasting.frame[k, 0, 0], lasting.frame[k, 0, 1]
-    left = min(
-        cone_limit(bodies, a, lasting.kind[k, VERTEX_A], nx, ny),
-        cone_limit(bodies, b, lasting.kind[k, VERTEX_B], -nx, -ny),
-    )
-    return left * (bodies.real[a, ROUNDING] + bodies.real[b, ROUNDING])
+    reach = bodies.real[a, ROUNDING] + bodies.real[b, ROUNDING]
+    for step in range(2):
+        monitor[FEATURE + step] = reach * cone_limit(bodies, a, lasting.kind[k, VERTEX_A], step, nx, ny)
+        monitor[FEATURE + 2 + step] = reach * cone_limit(bodies, b, lasting.kind[k, VERTEX_B], step, -nx, -ny)
 
 
 @inner_kernel
-def cone_limit(bodies: Bodies, i: int, vertex: int, nx: float, ny: float) -> float:
-    """How far (nx, ny) is inside the cone of outward normals at a vertex of body i, as a sine."""
+def cone_limit(bodies: Bodies, i: int, vertex: int, step: int, nx: float, ny: float) -> float:
+    """How far (nx, ny) is from the normal of the edge after (``step`` 0) or before a vertex of body i, as a sine."""
     count = bodies.kind[i, VERTICES]
     if count < 2:
         return math.inf
     px, py = corner(bodies, i, vertex)
-    least = math.inf
-    for step in range(2):
-        qx, qy = corner(bodies, i, (vertex + (1 if step == 0 else count - 1)) % count)
-        ex, ey = qx - px, qy - py
-        least = min(least, -(ex * nx + ey * ny) / math.hypot(ex, ey))
-    return least
+    qx, qy = corner(bodies, i, (vertex + (1 if step == 0 else count - 1)) % count)
+    ex, ey = qx - px, qy - py
+    return -(ex * nx + ey * ny) / math.hypot(ex, ey)
 
 
 @inner_kernel
@@ -356,4 +354,4 @@ provide(operations.free_accelerations, Bodies, free_accelerations)
 provide(operations.displace, Bodies, displace)
 provide(operations.displacement_rate, Bodies, displacement_rate)
 provide(operations.displacement_curvature, Bodies, displacement_curvature)
-provide(operations.feature_limit, Bodies, feature_limit)
+provide(operations.feature_limits, Bodies, feature_limits)

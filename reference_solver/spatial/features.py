@@ -43,7 +43,7 @@ from reference_solver.spatial.vector import (
     times,
     times_transposed,
 )
-from reference_solver.stepping.lasting import Lasting
+from reference_solver.stepping.lasting import FEATURE, Lasting
 
 #: Cores.
 POINT, LINE, PLANE = 0, 1, 2
@@ -369,36 +369,35 @@ def set_rows(bodies: Bodies, lasting: Lasting, k: int, arm_a: Vector, arm_b: Vec
 
 
 @kernel
-def distance_to_limit(bodies: Bodies, lasting: Lasting, k: int, normals: bool) -> float:
-    """How far contact k is from where its features end, < 0 beyond, infinite if they have no end [m].
+def distances_to_limits(bodies: Bodies, lasting: Lasting, k: int, place: int) -> None:
+    """How far contact k is from where its features end, < 0 beyond, infinite where there is no end [m].
 
-    A line ends where it is as long as its body, a face at its edges; with ``normals``: an edge or a corner of a box,
-    and the end of a capsule, meets what is round, or another edge, only while the normal looks out of it.
+    A line ends where it is as long as its body, a face at its edges; an edge or a corner of a box, and the end of a
+    capsule, meets what is round, or another edge, only while the normal looks out of it. Both ends along each body axis
+    stand by themselves: what begins at one of them may go on to the other.
     """
-    limit = math.inf
+    monitor = lasting.monitor[place, k]
+    for m in range(FEATURE, len(monitor)):
+        monitor[m] = math.inf
     for side in range(2):
         i, core, other = lasting.body[k, side], lasting.kind[k, CORE + side], lasting.kind[k, CORE + 1 - side]
         if bodies.kind[i] != BOX and bodies.kind[i] != CAPSULE:
             continue
         outward = times_transposed(bodies.axes, i, scale(1.0 - 2.0 * side, row(lasting.frame[k], 0, 0)))
-        arm = lever(lasting, k, side)
-        local = times_transposed(bodies.axes, i, arm)
+        local = times_transposed(bodies.axes, i, lever(lasting, k, side))
         for d in range(3):
             if bodies.kind[i] == CAPSULE and d > 0:
                 continue
-            along = part(lasting, k, DIRECTION, side)[d]
-            at = part(lasting, k, PLACE, side)[d]
-            half = bodies.geometry[i, d]
-            if core == PLANE and along == 0.0 and not normals:
-                limit = min(limit, half - abs(local[d]))
+            along, at = part(lasting, k, DIRECTION, side)[d], part(lasting, k, PLACE, side)[d]
+            half, first = bodies.geometry[i, d], FEATURE + 6 * side + 2 * d
+            if core == PLANE and along == 0.0:
+                monitor[first], monitor[first + 1] = half - local[d], half + local[d]
             elif core == LINE and along != 0.0:
-                if normals:
-                    continue
-                limit = min(limit, half - abs(lasting.place[k, ALONG + side]))
-            elif core != PLANE and other != PLANE and normals:
+                way = lasting.place[k, ALONG + side]
+                monitor[first], monitor[first + 1] = half - way, half + way
+            elif core != PLANE and other != PLANE:
                 reach = half if bodies.kind[i] == BOX else bodies.geometry[i, 1]
-                limit = min(limit, reach * outward[d] * (1.0 if at > 0.0 else -1.0))
-    return limit
+                monitor[first] = reach * outward[d] * (1.0 if at > 0.0 else -1.0)
 
 
 @inner_kernel

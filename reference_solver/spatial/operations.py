@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.spatial.features import distance_to_limit, follow, name_features
+from reference_solver.spatial.features import distances_to_limits, follow, name_features
 from reference_solver.spatial.motion import momentum_of, put_orientation, set_orientation
 from reference_solver.spatial.state import FREE, Manifolds
 from reference_solver.spatial.turning import vector_curvature, vector_rate
@@ -104,9 +104,9 @@ def displacement_curvature(bodies: Spatial, lasting: Lasting, i: int, end: int) 
 
 
 @inner_kernel
-def feature_limit(bodies: Spatial, lasting: Lasting, k: int, normals: bool) -> float:
-    """Least distance of contact k from where its features end [m]."""
-    return distance_to_limit(bodies.record, lasting, k, normals)
+def feature_limits(bodies: Spatial, lasting: Lasting, k: int, place: int) -> None:
+    """Distances of contact k from where its features end [m]."""
+    distances_to_limits(bodies.record, lasting, k, place)
 
 
 operations.provide(operations.is_free, Spatial, is_free)
@@ -116,4 +116,4 @@ operations.provide(operations.free_accelerations, Spatial, free_accelerations)
 operations.provide(operations.displace, Spatial, displace)
 operations.provide(operations.displacement_rate, Spatial, displacement_rate)
 operations.provide(operations.displacement_curvature, Spatial, displacement_curvature)
-operations.provide(operations.feature_limit, Spatial, feature_limit)
+operations.provide(operations.feature_limits, Spatial, feature_limits)

@@ -21,5 +21,5 @@ is the dimension's own ``Bodies``. It imports neither of the two.
 | ``displace(bodies, lasting, i)`` | pose of i: `Lasting.base` moved by `Lasting.displacement` |
 | ``displacement_rate(bodies, lasting, i, stage)`` | `Lasting.rate[stage]`: rate of the displacement at this twist |
 | ``displacement_curvature(bodies, lasting, i, end)`` | `Lasting.bend[end]`: its second derivative |
-| ``feature_limit(bodies, lasting, k, normals)`` | how far the noted features still are from their ends [m] |
+| ``feature_limits(bodies, lasting, k, place)`` | how far the noted features still are from each of their ends [m] |
 """

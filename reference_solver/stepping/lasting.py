@@ -23,10 +23,12 @@ MOST_ROWS = 64
 HOPS, GONE = 1, 2
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
-#: Entries of `Lasting.monitor`: load, friction left, slip onward, distance from the end of a line or a face, how far
-#: the normal looks out of an edge or a corner. What comes over an edge starts at the one, and may pass the other.
-LOAD, GRIP, ONWARD, FEATURE, OUTLOOK = 0, 1, 2, 3, 4
-MONITORS = 5
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, and from `FEATURE` on how far the contact is from each
+#: end of its features (`operations.feature_limits`). What comes over an edge starts at one end, and may pass another.
+LOAD, GRIP, ONWARD, FEATURE = 0, 1, 2, 3
+#: Ends of the features of a contact by dimension. In the plane: both of an edge, two normals at each of two corners; in
+#: space: both ends, or the normal of a face, along each body axis.
+LIMITS = {2: 4, 3: 12}
 #: Places in `Lasting.monitor`: start of the phase; near and far end of a search; the step made last; its stages.
 START, NEAR, FAR, LAST, BETWEEN = 0, 1, 2, 3, 4
 PLACES_WATCHED = 5
@@ -84,7 +86,7 @@ class Lasting(NamedTuple):
     wanted: Array  # (T,)
     order: Indices  # (R,)
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
-    monitor: Array  # (PLACES_WATCHED, k, MONITORS): what must not fall below zero while modes are held
+    monitor: Array  # (PLACES_WATCHED, k, FEATURE + LIMITS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
     error: Array  # (1,): of the step made last, see `phase.relative_error`
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
@@ -142,7 +144,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         wanted=np.zeros(t),
         order=np.zeros(r, np.int64),
         unknown=np.zeros((r, 2), np.int64),
-        monitor=np.zeros((PLACES_WATCHED, k, MONITORS)),
+        monitor=np.zeros((PLACES_WATCHED, k, FEATURE + LIMITS[dimension])),
         length=np.zeros(1),
         error=np.zeros(1),
         early=np.ones(1),

@@ -94,10 +94,11 @@ def displacement_curvature(bodies: Any, lasting: Any, i: int, end: int) -> None:
 
 
 @operation
-def feature_limit(bodies: Any, lasting: Any, k: int, normals: bool) -> float:
-    """Least distance of contact k from where its features end: positive within, infinite where they have no end [m].
+def feature_limits(bodies: Any, lasting: Any, k: int, place: int) -> None:
+    """Fill ``lasting.monitor[place, k, FEATURE:]``: distances of contact k from where its features end [m].
 
-    ``normals``: from where the normal looks out of an edge or a corner no more; else from the ends of lines and faces.
+    Positive within, infinite where there is no such end. From the ends of lines and faces, and from where the normal
+    looks out of an edge or a corner no more.
     """
     raise NotImplementedError
 

@@ -22,11 +22,9 @@ from reference_solver.stepping.lasting import (
     HOPS,
     LAST,
     LOAD,
-    MONITORS,
     NEAR,
     ONWARD,
     OPEN,
-    OUTLOOK,
     SLIP,
     STAGES,
     START,
@@ -43,7 +41,7 @@ from reference_solver.stepping.operations import (
     displacement_curvature,
     displacement_rate,
     evaluate,
-    feature_limit,
+    feature_limits,
     free_accelerations,
 )
 from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
@@ -82,8 +80,6 @@ SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
 SHORTEST = 1e-9
 
-#: Share of a phase in which a feature is looked at that ends where it begins: it may go on to its other end in between.
-LOOK = 1e-2
 #: Share of the time to the end of a slip that turns which is stepped: what is left is a share of it as well.
 BEFORE_END = 0.5
 
@@ -288,7 +284,7 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
     """Monitors of the evaluated state: none may fall below zero while modes are what they are."""
     for k in range(lasting.size[CONTACTS]):
         monitor = lasting.monitor[place, k]
-        for m in range(MONITORS):
+        for m in range(len(monitor)):
             monitor[m] = math.inf
         if lasting.mode[k] == OPEN:
             continue
@@ -301,25 +297,31 @@ def watch(bodies: Bodies, lasting: Lasting, place: int) -> None:
             for t in range(lasting.size[TANGENTS]):
                 along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
             monitor[ONWARD] = along / lasting.speeds[k]
-        monitor[FEATURE] = feature_limit(bodies, lasting, k, False) / lasting.extent[k]
-        monitor[OUTLOOK] = feature_limit(bodies, lasting, k, True) / lasting.extent[k]
+        weigh_limits(bodies, lasting, k, place)
+
+
+@inner_kernel
+def weigh_limits(bodies: Bodies, lasting: Lasting, k: int, place: int) -> None:
+    """Monitors of the ends of features of contact k, as shares of its extent."""
+    feature_limits(bodies, lasting, k, place)
+    for m in range(FEATURE, lasting.monitor.shape[2]):
+        lasting.monitor[place, k, m] /= lasting.extent[k]
 
 
 @inner_kernel
 def keep_limits(bodies: Bodies, lasting: Lasting) -> None:
     """Keep how far all contacts are from where their features end, at the start of a path."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(FEATURE, OUTLOOK + 1):
-            lasting.monitor[START, k, m] = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
+        weigh_limits(bodies, lasting, k, START)
 
 
 @inner_kernel
 def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
     """Whether the features of any contact end between there and here: it goes on with others, or parts."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(FEATURE, OUTLOOK + 1):
-            limit = feature_limit(bodies, lasting, k, m == OUTLOOK) / lasting.extent[k]
-            if lasting.monitor[START, k, m] >= -FORCE_NOISE and limit < -FORCE_NOISE:
+        weigh_limits(bodies, lasting, k, BETWEEN)
+        for m in range(FEATURE, lasting.monitor.shape[2]):
+            if lasting.monitor[START, k, m] >= -FORCE_NOISE and lasting.monitor[BETWEEN, k, m] < -FORCE_NOISE:
                 return True
     return False
 
@@ -329,21 +331,24 @@ def lowest(lasting: Lasting, place: int) -> float:
     """Least monitor of those that were above zero at the start."""
     least = math.inf
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             if lasting.monitor[START, k, m] > FORCE_NOISE:
                 least = min(least, lasting.monitor[place, k, m])
     return least
 
 
 @inner_kernel
-def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
-    """Contact and monitor that was zero at the start and has fallen most; (-1, `LOAD`) if there is none."""
+def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
+    """Change the mode whose monitor was zero at the start and has fallen most; False if there is none."""
     worst, which, what = -FORCE_NOISE, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
                 worst, which, what = lasting.monitor[LAST, k, m], k, m
-    return which, what
+    if which < 0:
+        return False
+    end_mode(bodies, lasting, which, what)
+    return True
 
 
 @inner_kernel
@@ -367,7 +372,7 @@ def end_first(bodies: Bodies, lasting: Lasting) -> None:
     """Change the mode that ends as soon as the phase has begun: gaps that were open by round-off are closed by then."""
     worst, which, what = 0.0, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             if lasting.monitor[START, k, m] > FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
                 worst, which, what = lasting.monitor[LAST, k, m], k, m
     if which >= 0:
@@ -394,7 +399,7 @@ def predict(lasting: Lasting, near: float, far: float) -> float:
     """First zero of the monitors that are below zero at the far end, along their chords."""
     first = far
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             before, after = lasting.monitor[NEAR, k, m], lasting.monitor[FAR, k, m]
             if lasting.monitor[START, k, m] > FORCE_NOISE and after < 0.0:
                 first = min(first, near + (far - near) * max(before, 0.0) / (max(before, 0.0) - after))
@@ -405,7 +410,7 @@ def predict(lasting: Lasting, near: float, far: float) -> float:
 def keep_monitors(lasting: Lasting, source: int, target: int) -> None:
     """Copy all monitors."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             lasting.monitor[target, k, m] = lasting.monitor[source, k, m]
 
 
@@ -455,7 +460,7 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
 def soften(lasting: Lasting, place: int) -> None:
     """Halve what is kept of one end of a bracket."""
     for k in range(lasting.size[CONTACTS]):
-        for m in range(MONITORS):
+        for m in range(lasting.monitor.shape[2]):
             lasting.monitor[place, k, m] *= 0.5
 
 
@@ -505,7 +510,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     if not changed:
         go_back(bodies, lasting)
         return 0.0, FAILED
-    length, outcome, unseen = left, WHOLE, 0.0
+    length, outcome = left, WHOLE
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
         if changed:
             if not start_again(bodies, lasting):
@@ -522,14 +527,8 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif fallen_at_once(lasting)[0] >= 0:
-            which, what = fallen_at_once(lasting)
-            if what == FEATURE and unseen == 0.0:
-                unseen, length, outcome = length, LOOK * length, SHORTENED
-                continue
-            end_mode(bodies, lasting, which, what)
-            length, unseen, changed = max(length, unseen), 0.0, True
-            outcome = WHOLE if length == left else SHORTENED
+        elif switch_at_once(bodies, lasting):
+            changed = True
             continue
         elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
             length, outcome = lasting.early[0] * length, SHORTENED
