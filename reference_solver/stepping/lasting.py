@@ -23,8 +23,8 @@ MOST_ROWS = 64
 HOPS, GONE = 1, 2
 #: Contacts of a phase: each pressed one has a row at least.
 MOST_CONTACTS = MOST_ROWS
-#: Entries of `Lasting.monitor`: load, friction left, slip onward, and from `FEATURE` on how far the contact is from each
-#: end of its features (`operations.feature_limits`). What comes over an edge starts at one end, and may pass another.
+#: Entries of `Lasting.monitor`: load, friction left, slip onward, and from `FEATURE` on how far the contact is from
+#: each end of its features (`operations.feature_limits`): what comes over an edge starts at one, and may pass another.
 LOAD, GRIP, ONWARD, FEATURE = 0, 1, 2, 3
 #: Ends of the features of a contact by dimension. In the plane: both of an edge, two normals at each of two corners; in
 #: space: both ends, or the normal of a face, along each body axis.

@@ -80,6 +80,9 @@ SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
 SHORTEST = 1e-9
 
+#: Share of a phase after which the end of a feature is looked at for whether it comes nearer, and the share of the extent
+#: by which it must be farther then: a hundred roundings.
+GLANCE, GROWS = 1e-4, 1e-14
 #: Share of the time to the end of a slip that turns which is stepped: what is left is a share of it as well.
 BEFORE_END = 0.5
 
@@ -338,17 +341,31 @@ def lowest(lasting: Lasting, place: int) -> float:
 
 
 @inner_kernel
-def switch_at_once(bodies: Bodies, lasting: Lasting) -> bool:
-    """Change the mode whose monitor was zero at the start and has fallen most; False if there is none."""
+def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
+    """Contact and monitor that was zero at the start and has fallen most; (-1, `LOAD`) if there is none."""
     worst, which, what = -FORCE_NOISE, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
         for m in range(lasting.monitor.shape[2]):
             if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
                 worst, which, what = lasting.monitor[LAST, k, m], k, m
-    if which < 0:
-        return False
-    end_mode(bodies, lasting, which, what)
-    return True
+    return which, what
+
+
+@inner_kernel
+def rises_first(bodies: Bodies, lasting: Lasting, which: int, what: int, length: float) -> bool:
+    """Whether the way to an end of a feature that has fallen below zero grows where the phase begins.
+
+    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Bodies are left where
+    they are `GLANCE` of the phase later.
+    """
+    go_back(bodies, lasting)
+    for i in range(lasting.size[BODIES]):
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.displacement[i, d] = GLANCE * length * lasting.rate[0, i, d]
+        displace(bodies, lasting, i)
+    evaluate(bodies, lasting)
+    weigh_limits(bodies, lasting, which, BETWEEN)
+    return bool(lasting.monitor[BETWEEN, which, what] > max(lasting.monitor[START, which, what], 0.0) + GROWS)
 
 
 @inner_kernel
@@ -527,7 +544,12 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif switch_at_once(bodies, lasting):
+        elif fallen_at_once(lasting)[0] >= 0:
+            which, what = fallen_at_once(lasting)
+            if what >= FEATURE and length > SHORTEST * left and rises_first(bodies, lasting, which, what, length):
+                length, outcome = 0.25 * length, SHORTENED
+                continue
+            end_mode(bodies, lasting, which, what)
             changed = True
             continue
         elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
