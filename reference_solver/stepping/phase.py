@@ -80,8 +80,8 @@ SAME_TIME = 1e-15
 #: Shortest part of what is left that is stepped by this scheme: what needs shorter ones jams.
 SHORTEST = 1e-9
 
-#: Share of a phase after which the end of a feature is looked at for whether it comes nearer, and the share of the extent
-#: by which it must be farther then: a hundred roundings.
+#: Share of a phase after which the end of a feature is looked at for whether it comes nearer, and the share of the
+#: extent by which it must be farther then: a hundred roundings.
 GLANCE, GROWS = 1e-4, 1e-14
 #: Share of the time to the end of a slip that turns which is stepped: what is left is a share of it as well.
 BEFORE_END = 0.5
