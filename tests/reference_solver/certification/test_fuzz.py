@@ -22,6 +22,14 @@ ONCE_REFUSED = [(2, 0), (2, 16), (2, 46), (2, 54), (2, 63), (2, 69), (3, 18), (3
 SAMPLE = {2: range(100, 106), 3: range(100, 104)}
 
 
+def test_a_box_that_comes_to_lie_by_rocking_needs_no_step_of_lower_order():
+    """It leaves the edge that it rocked on by next to nothing and comes back to it: the crossing there does not end."""
+    drawn = scene(7017, 3)
+    simulation = Simulation(drawn.model, Settings.reference(1.0 / drawn.rate))
+    simulation.advance(30)
+    assert simulation.certificate["held_steps"] == 0 and simulation.certificate["events"] > 10
+
+
 class TestScenes:
     @pytest.mark.parametrize("dimension", [2, 3])
     def test_no_bodies_overlap_at_the_start_and_what_is_laid_down_touches(self, dimension):
