@@ -105,7 +105,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
         units = timed_units(wanted, store.observations(run))
         _time(store, run, request.scenes, units, limits, seed, console)
     store.finish(run)
-    _show(store, run, out, as_json, brief, console)
+    _show(store, run, out, as_json, brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(statuses.verdict(not agrees, not absent))

@@ -96,9 +96,11 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         brief.keep(out, done.id, observations, rows)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     store.close()
-    _show(rows, out, as_json, console, options)
+    # The answer goes where a pipe or a file takes it; with --json that place is taken.
+    answer = console if as_json else terminal()
+    _show(rows, out, as_json, answer, options)
     for line in spread_lines(apart):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        answer.print(line, markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)

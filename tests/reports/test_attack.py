@@ -73,7 +73,7 @@ def test_a_fault_of_two_per_cent_cannot_be_accepted(attacked):
     cells = ["stack", "--param", "n=1", "--engine", "attacked", "--profile", "tuned", "--dim", "2", "--jobs", "1"]
     ran = call(main, ["run", *cells, "--out", out])
     assert ran.exit_code == 1, ran.output
-    assert "INVALID" in ran.stderr
+    assert "INVALID" in ran.stdout
     accept = ["accept", "--engine", "attacked", "--jobs", "1", "--out", out]
     for family in ("impact", "stack", "incline"):
         accept += ["--family", family]
