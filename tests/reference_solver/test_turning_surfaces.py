@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from reference_solver import Model, Settings, Simulation
 from reference_solver.certification.geometry import rotation
@@ -90,3 +91,26 @@ def test_what_a_turning_plank_gives_is_what_its_ball_gains(space, friction):
         assert certificate["load_work"] == pytest.approx(-MASS * GRAVITY * height, rel=1e-12)
     else:
         assert certificate["contact_work"] < -1e-4  # it slips in the end
+
+
+@pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
+def test_a_ball_that_flies_along_a_plane_is_met_by_it_as_it_turns(space):
+    """Seen from the plane the ball falls with ``2 W v``: it meets it within a step, though it starts on its way off."""
+    spin, dt, radius = 5.0, 1.0 / 60.0, 0.01
+    start, velocity = np.array([0.0, 0.02]), np.array([20.0, 0.5])
+
+    def normal(t):
+        return np.array([-math.sin(spin * t), math.cos(spin * t)])
+
+    when = brentq(lambda t: normal(t) @ (start + t * velocity) - radius, 0.0, dt, xtol=1e-15)
+    place, n = start + when * velocity, normal(when)
+    approach = n @ (velocity - spin * np.array([-place[1], place[0]]))
+    after = velocity - 2.0 * approach * n
+    plane = space.floor(motion="prescribed", twist=space.twist(0.0, 0.0, spin))
+    ball = space.ball(*start, space.twist(*velocity), radius)
+    simulation = space.simulation([plane, ball], Settings.reference(dt), restitution=1.0)
+    simulation.advance(1)
+    d = space.dimension
+    assert when < dt and approach < -1.0
+    assert simulation.twist[1, :d] == pytest.approx(np.array(space.vector(*after)), abs=1e-11)
+    assert simulation.pose[1, :d] == pytest.approx(np.array(space.vector(*(place + (dt - when) * after))), abs=1e-12)
