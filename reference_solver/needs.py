@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference_solver.model import Array, Box, Capsule, Model, Polygon
+from reference_solver.model import Array, Body, Box, Capsule, Model, Polygon
 
 #: Up to this many bodies all pairs are tested; sorting pays off beyond (performance notes: indifferent to ~100).
 ALL_PAIRS_LIMIT = 64
@@ -33,19 +33,26 @@ def needs(model: Model) -> Needs:
     """Derive what the model needs from its bodies and pair tables.
 
     Rotation is the response of spins to impulses and torques: a frictionless contact acts through the centre of
-    a disc or sphere, so that without torque its spin stays what it was.
+    a disc or sphere, so that without torque its spin stays what it was. In space only if its moments are equal: else
+    its angular momentum stays, and its spin does not. There a surface that turns needs it as well.
     """
     friction = _acts(model.friction, model)
-    turned = any(
-        body.motion == "free" and (isinstance(body.shape, Box | Capsule | Polygon) or np.any(np.asarray(body.torque)))
-        for body in model.bodies
-    )
+    turned = any(_turns(body, model.dimension) for body in model.bodies)
     return Needs(
         rotation=friction or turned,
         friction=friction,
         restitution=_acts(model.restitution, model),
         broadphase=len(model.bodies) > ALL_PAIRS_LIMIT,
     )
+
+
+def _turns(body: Body, dimension: int) -> bool:
+    """Whether how a body turns depends on more than the spin that it starts with."""
+    if body.motion != "free":
+        return dimension == 3 and body.motion == "prescribed" and bool(np.any(np.asarray(body.twist)[3:]))
+    if isinstance(body.shape, Box | Capsule | Polygon) or np.any(np.asarray(body.torque)):
+        return True
+    return dimension == 3 and len(set(np.asarray(body.inertia).tolist())) > 1
 
 
 def _acts(table: Array, model: Model) -> bool:

@@ -93,16 +93,7 @@ def test_what_a_turning_plank_gives_is_what_its_ball_gains(space, friction):
         assert certificate["contact_work"] < -1e-4  # it slips in the end
 
 
-LEFT_OUT = "rotation is left out where free bodies are smooth balls: in space a prescribed surface then has no spin"
-
-
-@pytest.mark.parametrize(
-    "space",
-    [
-        pytest.param(SPACES[0], id="planar"),
-        pytest.param(SPACES[1], id="spatial", marks=pytest.mark.xfail(strict=True, reason=LEFT_OUT)),
-    ],
-)
+@pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 def test_a_ball_that_flies_along_a_plane_is_met_by_it_as_it_turns(space):
     """Seen from the plane the ball falls with ``2 W v``: it meets it within a step, though it starts on its way off."""
     spin, dt, radius = 5.0, 1.0 / 60.0, 0.01
