@@ -201,7 +201,7 @@ def test_scenes_of_which_the_recurrence_knows_nothing_are_left_alone():
 
 @pytest.mark.parametrize(("profile", "dimension"), [("default", 2), ("tuned", 3)])
 def test_what_a_column_s_contacts_tell_is_the_mean_that_two_bodies_make_of_it(dimension, profile):
-    """Boxes with c contacts each get 1/c of what these ask for, so that below box k they ask for the sum of c m g above.
+    """Boxes with c contacts get 1/c of what these ask for each, so that below a box they ask for all c m g above it.
 
     Told is that by the mean number of both: 2/3 of the weight at the top, 3/4, 5/6, 7/8, and 9/10 at the floor, where a
     box alone has 8. Sweeps that end below 0.1 mm/s are told and not kept, which two in a step may do.
