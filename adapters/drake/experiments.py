@@ -26,17 +26,27 @@ _STICKS: _Settings = {"stiction_tolerance": 1e-6}
 _SOFT: _Settings = {"modulus": 1e6}
 _HARD: _Settings = {"modulus": 1e8}
 _HARDEST: _Settings = {"modulus": 1e10}
+_HARD_AND_IMPLICIT: _Settings = {**_HARDEST, **_IMPLICIT}
 #: SAP's contacts dissipate nothing beyond what a step does.
 _AT_ONCE: _Settings = {"relaxation_time": 0.0}
+#: What overlaps is pushed out at a micrometre per second at most.
+_SLOWLY: _Settings = {"dissipation": 1e6}
+#: Hunt's and Crossley's dissipation in SAP's convex step.
+_BOUNDED: _Settings = {"approximation": "similar"}
 
 _SAYS = {
+    "relaxes-and-sinks": "where Hunt and Crossley bound what parts, and a heavy box finds harder ones, it passes",
+    "glides-and-creeps": "where friction goes by the load of the step, and only slower slips are viscous, it stays",
+    "lands-on-a-face": "where boxes are harder, and friction goes by the load of the step, it passes",
     "glides": "where friction goes by the load of the step it passes",
     "friction-by-an-earlier-load": "where friction goes by the load of the step it passes",
     "viscous-friction": "where only slower slips are viscous it stays",
     "relaxes": "where contacts have no relaxation time it passes",
-    "throws": "where Hunt and Crossley bound the speed of parting it passes",
+    "throws": "where Hunt and Crossley bound the speed of parting, or bound it lower, it passes",
     "sinks": "where boxes are harder it passes",
 }
+#: A slim block that is let go from far out.
+_SLIM: dict[str, float] = {"aspect": 0.5, "tilt": 0.7}
 #: Family, profile, dimension, metric and parameters of a row; the settings that cure it, and those that must not.
 _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Settings, ...]], ...] = (
     ("far-origin-glides", "sap", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
@@ -53,6 +63,43 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("hilltop-friction-by-an-earlier-load", "default", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_STICKS,)),
     ("hilltop-glides", "sap", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
     ("hilltop-glides", "similar", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
+    ("heavy-on-light-relaxes-and-sinks", "sap", 2, "penetration", {}, _BOUNDED, (_AT_ONCE, _HARDEST)),
+    (
+        "heavy-on-light-relaxes-and-sinks",
+        "sap",
+        2,
+        "penetration",
+        {"ratio": 1e4},
+        {**_BOUNDED, **_HARDEST},
+        (_BOUNDED, _HARDEST, _AT_ONCE),
+    ),
+    ("heavy-on-light-relaxes-and-sinks", "sap", 2, "interface_impulse[1]", {"ratio": 1e4}, _BOUNDED, (_HARDEST,)),
+    ("incline-glides", "sap", 2, "threshold", {}, _IMPLICIT, (_SOFT,)),
+    ("overhang-throws", "default", 2, "kinetic_energy", {}, _SLOWLY, (_STICKS, _HARD)),
+    ("overhang-throws", "default", 2, "drift", {}, _SLOWLY, (_STICKS, _HARD)),
+    ("overhang-throws", "default", 2, "stands", {"margin": 0.02}, _SLOWLY, ()),
+    ("overhang-throws", "tamsi", 2, "penetration", {}, _SLOWLY, ()),
+    ("overhang-throws", "similar", 2, "impulse_scatter", {}, _SLOWLY, ()),
+    ("overhang-throws", "sap", 2, "penetration", {}, {**_BOUNDED, **_SLOWLY}, (_BOUNDED, _AT_ONCE)),
+    ("pinch-glides-and-creeps", "similar", 2, "creep", {}, _STICKS, (_SOFT, _HARD)),
+    (
+        "pinch-glides-and-creeps",
+        "similar",
+        2,
+        "creep",
+        {"margin": 1.05},
+        {**_IMPLICIT, **_STICKS},
+        (_IMPLICIT, _STICKS),
+    ),
+    ("rocking-block-lands-on-a-face", "tamsi", 2, "amplitude[1]", _SLIM, _HARDEST, (_STICKS,)),
+    ("rocking-block-lands-on-a-face", "default", 2, "amplitude[2]", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST, _IMPLICIT)),
+    ("rocking-block-lands-on-a-face", "default", 2, "slid", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST,)),
+    ("rocking-block-lands-on-a-face", "sap", 2, "landing[2]", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST, _IMPLICIT)),
+    ("rocking-block-lands-on-a-face", "similar", 2, "amplitude[1]", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST, _IMPLICIT)),
+    ("stack-relaxes", "sap", 2, "settle_time", {"n": 20.0}, _AT_ONCE, (_HARD,)),
+    ("tilt-table-sinks", "tamsi", 3, "edge_moved", {"ratio": 1.1}, _HARD, (_STICKS,)),
+    ("tilt-table-sinks", "default", 2, "moved", {"aspect": 1.0}, _IMPLICIT, (_STICKS, _HARD)),
+    ("tilt-table-sinks", "similar", 2, "moved", {"aspect": 1.0}, _IMPLICIT, (_STICKS, _HARD)),
     ("incline-friction-by-an-earlier-load", "default", 2, "acceleration", {"ratio": 1.1}, _IMPLICIT, (_STICKS,)),
     ("incline-glides", "sap", 2, "acceleration", {"ratio": 1.001}, _IMPLICIT, (_SOFT,)),
     ("incline-glides", "similar", 2, "creep", {}, _IMPLICIT, (_SOFT,)),

@@ -25,6 +25,9 @@ _SLIPS_ALONE: _Settings = {"torsional": 0.0, "rolling": 0.0}
 #: Contacts are made ten times as far ahead.
 _AHEAD: _Settings = {"gap": 1.0}
 
+#: Sweeps until little is left of an overlap.
+_SWEPT: _Settings = {"iterations": 100}
+
 _IDLE = (_SLIPS_ALONE, _AHEAD)
 _MEANS = "where each contact gives a body all that it asks for it passes"
 EXPERIMENTS: tuple[Experiment, ...] = tuple(
@@ -42,4 +45,22 @@ EXPERIMENTS += tuple(
         {"rolling": 0.0}, params, idle=(_WHOLE, _AHEAD),
     )
     for params in ({}, {"tilt": 5.0})
+)  # fmt: skip
+_SWEPT_OUT = "where a hundred sweeps leave little of an overlap it passes"
+_SMOOTH = "where what rubs resists neither rolling nor spinning it passes"
+EXPERIMENTS += tuple(
+    Experiment(family, _SWEPT_OUT, "default", scene, metric, _SWEPT, params, idle=(_SLIPS_ALONE, *more))
+    for family, scene, metric, params, more in (
+        ("rocking-block-few-sweeps", "rocking_block", "amplitude[1]", {}, (_AHEAD,)),
+        ("rocking-block-few-sweeps", "rocking_block", "landing[2]", {}, ()),
+        ("rocking-block-few-sweeps", "rocking_block", "slid", {"aspect": 0.5, "tilt": 0.7}, (_WHOLE,)),
+        ("conveyor-few-sweeps", "conveyor", "hop", {}, (_AHEAD,)),
+        ("conveyor-few-sweeps", "conveyor", "turned", {}, ()),
+    )
+)
+EXPERIMENTS += (
+    Experiment(
+        "roll-incline-friction-about-the-normal", _SMOOTH, "default", "roll_incline", "turning", _SLIPS_ALONE,
+        {"ratio": 1.5}, idle=(_WHOLE, _SWEPT),
+    ),
 )  # fmt: skip

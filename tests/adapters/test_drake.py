@@ -137,6 +137,29 @@ def test_a_box_slides_on_its_face_by_a_surface_and_tips_on_a_point():
     assert level < 1e-5 and tipped > 1e-2
 
 
+@pytest.mark.parametrize(
+    ("params", "changes"),
+    [({}, {"dissipation": 0.0}), ({"angle": 60.0}, {"dissipation": 0.0}), ({"ratio": 20.0}, {}),
+     ({"angle": 60.0, "ratio": 20.0}, {})],
+    ids=str,
+)  # fmt: skip
+def test_an_edge_that_slides_down_a_compliant_face_is_held_back_by_the_slant_between_them(params, changes):
+    """Pressure falls from 10 MPa half-way through a box to 0 at its face: where two are equal lies a slanted surface.
+
+    Its part that approaches while the edge slides carries all, ``slant`` below the face's own normal. Newton's law:
+    down = m g sin a/(m + M cos a cos(a - slant)/cos slant). Where the edge is fast and contacts dissipate it parts.
+    """
+    shove = CATALOGUE["shove"]
+    scene = shove.scene(2, params)
+    p, a = scene.params, math.radians(scene.params["angle"])
+    steep = [1.0 / min(body.shape.half_extents) for body in scene.bodies[2:]]
+    slant = math.atan2(steep[0] * math.sin(a), steep[1] + steep[0] * math.cos(a))
+    held = p["ratio"] * math.cos(a) * math.cos(a - slant) / math.cos(slant)
+    told, true = p["g"] * math.sin(a) / (1.0 + held), shove.exact(scene)["down"]
+    found = shove.measure(scene, run(ENGINE, scene, DT, settings(scene, **changes), shove.sampling(scene)))["down"][0]
+    assert found == pytest.approx(told, rel=0.02) and abs(true / told - 1.0) > 0.25
+
+
 def test_loads_act_in_every_step_and_contacts_carry_the_weight():
     pushed = replace(resting(0.0, force=(3.0, 0.0, 0.0)), pairs=(Pair(),))
     found = drive(pushed, "tamsi")

@@ -197,3 +197,21 @@ def test_scenes_of_which_the_recurrence_knows_nothing_are_left_alone():
     two = Scene("two", 1, 3, (FLOOR, BOX, replace(BOX, name="upper", pose=(0, 0, 0.75, *UPRIGHT))), (Pair(),),
                 (0.0, 0.0, -9.81), 0.1)  # fmt: skip
     assert followed(resting()) and not followed(two) and moved(two, DT, "default") is None
+
+
+@pytest.mark.parametrize(("profile", "dimension"), [("default", 2), ("tuned", 3)])
+def test_what_a_column_s_contacts_tell_is_the_mean_that_two_bodies_make_of_it(dimension, profile):
+    """Boxes with c contacts get 1/c of what these ask for each, so that below a box they ask for all c m g above it.
+
+    Told is that by the mean number of both: 2/3 of the weight at the top, 3/4, 5/6, 7/8, and 9/10 at the floor, where a
+    box alone has 8. Sweeps that end below 0.1 mm/s are told and not kept, which two in a step may do.
+    """
+    stack = CATALOGUE["stack"]
+    scene = stack.scene(dimension, {})
+    found = stack.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), stack.sampling(scene)))
+    many = [8, 8, 8, 8, 4]
+    for k in range(5):
+        asked, above = sum(many[k:]), 5 - k
+        told = asked / many[0] if k == 0 else 2.0 * asked / (many[k - 1] + many[k])
+        off = abs(found[f"interface_impulse[{k + 1}]"][0] - told / above)
+        assert off <= 2.0 * STOPPED / (9.81 * DT) < abs(1.0 - told / above)

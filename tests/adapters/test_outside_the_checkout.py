@@ -70,7 +70,7 @@ def call(folder, *command, **more):
     """Run a command as a user would; returns what it said, or fails with it."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "CROSSCHECK", "VIRTUAL_ENV"))}
     done = subprocess.run(
-        [str(part) for part in command], cwd=folder, env=kept, capture_output=True, text=True, timeout=300
+        [str(part) for part in command], cwd=folder, env=kept, capture_output=True, text=True, timeout=900
     )
     assert done.returncode == more.get("status", 0), done.stdout + done.stderr
     return done.stdout + done.stderr
@@ -94,7 +94,7 @@ def site(tmp_path_factory):
     return folder, python, pip
 
 
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 def test_an_engine_made_by_the_recipe_works_at_the_first_try_with_a_law_and_a_finding_of_its_own(site):
     folder, python, pip = site
     begun, crosscheck = time.monotonic(), python.parent / "crosscheck"

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from adapters.scene import SceneError
 from reports import exports
 from reports.command import main
-from validation.cells import Observation, Outcome, Slot, prepare
+from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.records.store import Store, StoreError
 from validation.workers import LimitError
 from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _Driver, checked, run_cells_on
@@ -24,7 +24,8 @@ from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _Driver
 pytest.importorskip("distributed", reason="pip install 'contact-crosscheck[dask]'")
 pytest.importorskip("pymunk")
 ROOT = Path(__file__).resolve().parents[2]
-SWEEP = ["sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--grid", "v=1:20:40"]
+STUDY = ["sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2"]
+SWEEP = [*STUDY, "--grid", "v=1:20:40"]
 #: Fields of a row that say when it was made, not what came out.
 VOLATILE = ("run", "wall_time_s")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="kills processes and reads /proc")
@@ -109,6 +110,21 @@ def undisturbed(tmp_path_factory):
     done = CliRunner().invoke(main, [*SWEEP, "--jobs", "1", "--out", str(out)])
     assert done.exit_code == 0, done.output
     return bits(out)
+
+
+def test_a_study_has_the_rows_of_the_local_pool_and_runs_no_cell_twice(tmp_path):
+    """As many batches as workers, and more; all 5000 cells under `make soak`'s switch."""
+    count = 5000 if os.environ.get("CROSSCHECK_SOAK") else 120
+    here, there = tmp_path / "here", tmp_path / "there"
+    for out, where in ((here, ("--jobs", "2")), (there, ("--cluster", "local:2"))):
+        done = CliRunner().invoke(main, [*STUDY, "--grid", f"v=1:20:{count}", *where, "--out", str(out)])
+        assert done.exit_code == 0, done.output
+    rows = bits(here)
+    asked = {slot_from_dict(row["slot"]).key() for row in rows}
+    assert len(asked) == count and bits(there) == rows
+    events = journal(there)
+    ran = sorted(cell for event in events if event["event"] == "begun" for cell in event["cells"])
+    assert ran == sorted(asked) and {event["event"] for event in events} == {"begun", "ended"}
 
 
 def test_a_worker_that_dies_takes_nothing_along_and_every_cell_is_accounted_for(cluster, undisturbed, tmp_path):
