@@ -181,6 +181,7 @@ def test_a_fault_of_what_is_read_leaves_what_is_built_alone(fault):
     engine = registry.load("chipmunk")
     settings = {s.name: s.value for s in engine.settings("tuned", needs(scene), DT)}
     right, wrong = (e.build(scene, DT, settings) for e in (engine, Planted(engine, fault, size)))
+    start = right.pose().copy()
     for simulation in (right, wrong):
         simulation.advance(steps)
     off_pose, off_twist = wrong.pose() - right.pose(), wrong.twist() - right.twist()
@@ -193,6 +194,8 @@ def test_a_fault_of_what_is_read_leaves_what_is_built_alone(fault):
     if fault == "pull":  # the box comes down to the middle between it and the floor, which comes up
         expected_pose[:, 1] = size * steps * DT * np.array([1.0, -1.0])
         expected_twist[:, 1] = size * np.array([1.0, -1.0])
+    if fault == "late":  # 0.125 s ago, or at the start, nothing moved
+        expected_pose[:, :2] = (start - right.pose())[:, :2]
     if fault == "order":
         expected_twist[1] = -size * right.twist()[1]
     if fault == "twirl":
@@ -200,7 +203,9 @@ def test_a_fault_of_what_is_read_leaves_what_is_built_alone(fault):
     if fault in ("velocity", "damping"):
         share = -size if fault == "velocity" else (1.0 - size) ** (steps * DT) - 1.0
         expected_twist = share * right.twist()
-    assert off_pose == pytest.approx(expected_pose, abs=1e-15) and off_twist == pytest.approx(expected_twist, abs=1e-15)
+    # The box of a column has moved by 1e-11 m to the side, which turns the way to the middle by as much.
+    near = 1e-11 if fault == "pull" else 1e-15
+    assert off_pose == pytest.approx(expected_pose, abs=near) and off_twist == pytest.approx(expected_twist, abs=near)
     share = {"impulse": 1.0 - size, "flicker": 1.0 + size}.get(fault, 1.0)
     assert wrong.contacts().impulse == pytest.approx(share * right.contacts().impulse, abs=1e-15)
     wrong.advance(1)
