@@ -7,6 +7,7 @@ with what must catch each, stand in `adapters.conformance.faults`.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -20,7 +21,9 @@ from adapters.scene import Body, Box, Capsule, Cylinder, Disc, Hull, Polygon, Sc
 #: Faults of a given size that any engine can be given from outside, in what it is told...
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
 #: ... or in what it reports.
-REPORTED = ("velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker")
+REPORTED = (
+    "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "late", "pull", "order",
+)  # fmt: skip
 SIZED = TOLD + REPORTED
 
 
@@ -101,10 +104,22 @@ class _Misread(Simulation):
         self.size = 1.0 - factor
         self.steps = 0
         self.initial_change = inner.initial_change
+        #: Places and velocities of the last steps, newest last, as far back as what comes late may have been due.
+        self.past: deque[tuple[Array, Array]] = deque(maxlen=math.ceil(self.size / dt) + 1)
+        self._keep()
 
     def advance(self, steps: int) -> None:
-        self.inner.advance(steps)
         self.steps += steps
+        if self.fault != "late":
+            self.inner.advance(steps)
+            return
+        for _ in range(steps):
+            self.inner.advance(1)
+            self._keep()
+
+    def _keep(self) -> None:
+        if self.fault == "late":
+            self.past.append((self.inner.pose().copy(), self.inner.twist().copy()))
 
     def pose(self) -> Array:
         pose = self.inner.pose()
@@ -112,7 +127,24 @@ class _Misread(Simulation):
             pose = pose.copy()
             up = 1 if pose.shape[1] == 3 else 2
             pose[:, 0 if self.fault == "drift" else up] += self.size * self.dt * self.steps
+        if self.fault == "late":
+            return self._late(pose)
+        if self.fault == "pull":
+            pose = pose.copy()
+            pose[:, : _axes(pose)] += self.size * self.dt * self.steps * _inwards(pose)
         return _turned(pose, self.size * self.dt * self.steps) if self.fault == "twirl" else pose
+
+    def _late(self, pose: Array) -> Array:
+        """Places to which the velocities of ``size`` seconds ago lead; between two steps it is the mean of both."""
+        d, lag = _axes(pose), min(self.size / self.dt, float(self.steps))
+        whole = math.floor(lag)
+        led = [
+            self.past[-1 - back][0][:, :d] + back * self.dt * self.past[-1 - back][1][:, :d]
+            for back in (whole, math.ceil(lag))
+        ]
+        late = pose.copy()
+        late[:, :d] = led[0] + (lag - whole) * (led[1] - led[0])
+        return late
 
     def twist(self) -> Array:
         twist = self.inner.twist()
@@ -123,6 +155,13 @@ class _Misread(Simulation):
         if self.fault == "tremble":
             twist = twist.copy()
             twist[:, 0] += self._turn() * self.size
+        if self.fault == "pull":
+            pose = self.inner.pose()
+            twist = twist.copy()
+            twist[:, : _axes(pose)] += self.size * _inwards(pose)
+        if self.fault == "order":
+            last = max(1, len(twist) - 1)
+            twist = twist * (1.0 - self.size * np.arange(len(twist)) / last)[:, None]
         if self.fault == "twirl":
             twist = twist.copy()
             if twist.shape[1] == 3:
@@ -148,6 +187,18 @@ class _Misread(Simulation):
 
     def close(self) -> None:
         self.inner.close()
+
+
+def _axes(pose: Array) -> int:
+    """How many of a pose's columns are a place: two in the plane, three in space."""
+    return 2 if pose.shape[1] == 3 else 3
+
+
+def _inwards(pose: Array) -> Array:
+    """Unit vectors (n, axes) from each body to the middle between all of them; zero of a body that is there."""
+    way = pose[:, : _axes(pose)].mean(axis=0) - pose[:, : _axes(pose)]
+    far = np.linalg.norm(way, axis=1, keepdims=True)
+    return np.divide(way, far, out=np.zeros_like(way), where=far > 0.0)
 
 
 def _turned(pose: Array, angle: float) -> Array:

@@ -77,6 +77,8 @@ def flattened(row: Plain) -> dict[str, Any]:
 
 
 def _flat(value: Any) -> Any:
+    if value is None or isinstance(value, str | float):  # most of them; the question whether it is a table is dear
+        return value
     if isinstance(value, Mapping):
         return " ".join(f"{k}={v:.12g}" for k, v in value.items())
     return ";".join(str(item) for item in value) if isinstance(value, list) else value

@@ -197,19 +197,23 @@ def sensitivity(
         console.print(Text(f"{fault}: no check of these scenes sees it; the cell is INVALID by {', '.join(receipts)}"))
     for line in (
         "faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:",
-        "drift along x, climb upwards, tremble to and fro along x at every step; of twirl it is a turn of 0.01 rad/s.",
-        "1 % of flicker: impulses 1 % too high and too low in turn; of damping: speeds lose 1 % in a second",
+        "drift along x, climb upwards, tremble to and fro along x at every step, pull towards the middle of all",
+        "bodies; of twirl it is a turn of 0.01 rad/s. 1 % of flicker: impulses 1 % too high and too low in turn;",
+        "of damping: speeds lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last",
+        "body of the scene is 1 % too slow, and those before it less, by their place in the order",
     ):
         console.print(Text(line))
     _heading("Primary quantities that hang on a parameter and do not see 1 % of it,", console)
     for line in (
-        "because it changes them by less than one step may miss, which their check must allow. Seen from:",
-        "the fault that would change them by as much. Seen by: other checks of the scene that see 1 %.",
+        "because it changes them by less than one step may miss, which their check must allow. Seen from: the",
+        "fault that would change them by as much. At steps of: the longest, by halves, at which the same check sees",
+        "1 %, planted and run there: it is the step that hides it. Seen by: other checks of the scene that see 1 %.",
     ):
         console.print(Text(line))
-    table = grid("quantity", "1 % of", "changes it by", "a step may miss", "seen from", "seen by")
+    table = grid("quantity", "1 % of", "changes it by", "a step may miss", "seen from", "at steps of", "seen by")
     for spot in blind:
-        numbers = (number(spot.moved), number(spot.allowed), f"{spot.seen_from:.1f} %")
+        at = "no step" if spot.seen_at is None else f"1/{round(1.0 / spot.seen_at)} s"
+        numbers = (number(spot.moved), number(spot.allowed), f"{spot.seen_from:.1f} %", at)
         others = ", ".join(spot.seen_by) or "receipts only"
         table.add_row(*(Text(cell) for cell in (f"{spot.scene}/{spot.metric}", spot.fault, *numbers, others)))
     console.print(table)

@@ -33,8 +33,8 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     """List scenes, engines, checks, or the runs in OUT.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
-    receipt; takes two minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an engine that
-    is named gets only its own.
+    receipt; takes three minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an engine
+    that is named gets only its own.
     """
     data: list[Any]
     found = Detected([], [])

@@ -12,7 +12,7 @@ import time
 import pytest
 
 from validation.cells import Outcome, Slot
-from validation.workers import limits, run_cells
+from validation.workers import limits, run_cells, state
 
 DT = 1 / 240
 
@@ -150,3 +150,27 @@ def alive(pid):
             return stream.read().rsplit(")", 1)[1].split()[0] not in ("Z", "X")
     except OSError:
         return False
+
+
+def test_one_look_at_a_process_serves_until_names_or_modules_have_come(monkeypatch):
+    """What a cell has replaced is seen against an old look as well as against a new one."""
+    before = state.taken()
+    assert state.still(before) is before and state.changed(state.still(before)) == ""
+    monkeypatch.setattr(limits, "come_since", len, raising=False)
+    later = state.still(before)
+    assert later is not before
+    monkeypatch.setattr(limits, "come_since", max)
+    assert "limits.come_since" in state.changed(later) and state.changed(before) == ""
+    monkeypatch.setattr(limits, "workers", max)
+    assert "limits.workers" in state.changed(before)
+    monkeypatch.setitem(sys.modules, "a_module_that_came", sys)
+    assert state.still(later) is not later
+
+
+def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():
+    """It does not wait for what is kept of that: of three cells two have been handed out with the first answer."""
+    slots = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (1.0, 2.0, 3.0)]
+    handed = []
+    cells = run_cells(slots, jobs=1, keep=lambda slot: handed.append(slot))
+    assert next(cells).slot == slots[0] and handed == slots[:2]
+    assert [found.slot for found in cells] == slots[1:] and handed == slots

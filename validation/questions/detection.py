@@ -34,6 +34,9 @@ ONE_PER_CENT = 0.01
 #: A quantity hangs on a parameter if one per cent of it changes it by this share of what its check allows: what moves
 #: less would have to be off by more than all of itself.
 HANGS_ON = 0.01
+#: Shortest step at which a blind spot is asked again, as a share of the step at which it is one. What changes a
+#: quantity by a hundredth of what is allowed (`HANGS_ON`) is seen at a hundredth of the step; 128 is the next half.
+FINEST = 1.0 / 128.0
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,9 @@ class BlindSpot:
     """A primary quantity that does not see one per cent of a parameter: the fault changes it by ``moved``.
 
     ``allowed`` is what its check allows, in the same unit: by how far one step of ``dt`` may miss. ``seen_by`` are
-    checks of the same scene that do see it.
+    checks of the same scene that do see it. ``seen_at`` is the longest step [s], by halves of ``dt``, at which the same
+    check sees it: planted once more, and run there; None if no step down to `FINEST` of ``dt`` does. It is the proof
+    that what hides the fault is the step's own error, and no room that the check has beyond that.
     """
 
     scene: str
@@ -60,6 +65,7 @@ class BlindSpot:
     moved: float
     allowed: float
     seen_by: tuple[str, ...]
+    seen_at: float | None = None
 
     @property
     def seen_from(self) -> float:
@@ -106,7 +112,7 @@ def detection(
     One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault; and the blind spots.
     """
     seen: dict[tuple[str, str, str], float | None] = {}
-    missed: dict[tuple[str, str, str], tuple[float, float]] = {}
+    missed: dict[tuple[str, str, str], _Missed] = {}
     candidates = [(engine, profile), *others]
     there = {name: canonical for name, canonical in CATALOGUE.items() if dimension in canonical.dimensions}
     cells = [(name, params) for name, canonical in there.items() for params in canonical.planted]
@@ -124,16 +130,34 @@ def detection(
                 faulty = _watchers(Planted(taken, fault, size), own_profile, scene, params, dimension, dt)
                 smallest |= {name: size for name, own in healthy.items() if own.holds and not faulty[name].holds}
                 if size == ONE_PER_CENT and fault in ASKED:
-                    for name, found in _missed(primary, healthy, faulty):
+                    for name, moved, allowed in _missed(primary, healthy, faulty):
                         key = (scene, name.partition("[")[0], fault)
-                        missed[key] = max(missed.get(key, found), found, key=lambda each: each[0] / each[1])
+                        found = _Missed(moved, allowed, name, params, taken, own_profile)
+                        missed[key] = max(missed.get(key, found), found, key=lambda each: each.share)
             for name, own in healthy.items():
                 if own.holds:
                     watched = "any" if name.startswith("receipt ") else scene  # probes are the same for every scene
                     key = (watched, name.partition("[")[0], fault)
                     sizes = [s for s in (seen.get(key), smallest.get(name)) if s is not None]
                     seen[key] = min(sizes, default=None)
-    return Detected([Seen(*key, size) for key, size in seen.items()], list(_blind(seen, missed)))
+    return Detected([Seen(*key, size) for key, size in seen.items()], list(_blind(seen, missed, dimension, dt)))
+
+
+@dataclass(frozen=True)
+class _Missed:
+    """A primary quantity that holds with one per cent of a fault and without it, in one cell, and by how much."""
+
+    moved: float
+    allowed: float
+    name: str
+    params: Params
+    engine: Engine
+    profile: str
+
+    @property
+    def share(self) -> float:
+        """What the fault changes, of what is allowed."""
+        return self.moved / self.allowed
 
 
 def _can_pose(engine: Engine, scene: Scene) -> bool:
@@ -145,27 +169,50 @@ def _can_pose(engine: Engine, scene: Scene) -> bool:
     return True
 
 
-def _missed(primary: Iterable[str], healthy: Watchers, faulty: Watchers) -> Iterator[tuple[str, tuple[float, float]]]:
+def _missed(primary: Iterable[str], healthy: Watchers, faulty: Watchers) -> Iterator[tuple[str, float, float]]:
     """Primary quantities that hold with the fault and without it though it changes them: by how much, and the bound."""
     for name in primary:
         own, other = healthy[name], faulty[name]
         if own.holds and other.holds and own.value is not None and other.value is not None and own.allowed:
             moved = abs(other.value - own.value)
             if moved > HANGS_ON * own.allowed:
-                yield name, (moved, own.allowed)
+                yield name, moved, own.allowed
 
 
 def _blind(
-    seen: Mapping[tuple[str, str, str], float | None], missed: Mapping[tuple[str, str, str], tuple[float, float]]
+    seen: Mapping[tuple[str, str, str], float | None],
+    missed: Mapping[tuple[str, str, str], _Missed],
+    dimension: int,
+    dt: float,
 ) -> Iterator[BlindSpot]:
     """Quantities that no cell of their scene sees by one per cent, each with the checks of the scene that do."""
     sharp = {key for key, size in seen.items() if size is not None and size <= ONE_PER_CENT}
-    for (scene, metric, fault), (moved, allowed) in missed.items():
+    for (scene, metric, fault), found in missed.items():
         if (scene, metric, fault) not in sharp:
             by = tuple(
                 name for where, name, what in seen if (where, what) == (scene, fault) and (where, name, what) in sharp
             )
-            yield BlindSpot(scene, metric, fault, moved, allowed, by)
+            at = _seen_at(found, scene, fault, dimension, dt)
+            yield BlindSpot(scene, metric, fault, found.moved, found.allowed, by, at)
+
+
+def _seen_at(found: _Missed, scene: str, fault: str, dimension: int, dt: float) -> float | None:
+    """Longest half, quarter, ... of ``dt`` at which the check sees one per cent of the fault; None: none of them.
+
+    What the fault changes is the law's, of an engine without an error of its own: only steps at which the check allows
+    less than that are run.
+    """
+    canonical = CATALOGUE[scene]
+    made, shorter = canonical.scene(dimension, found.params), 0.5 * dt
+    planted = Planted(found.engine, fault, ONE_PER_CENT)
+    while shorter >= FINEST * dt:
+        (allowed,) = (check.bound for check in canonical.checks(made, shorter) if check.metric == found.name)
+        if allowed is not None and allowed < 2.0 * found.moved:
+            asked = (found.profile, scene, found.params, dimension, shorter)
+            if _checks(found.engine, *asked)[found.name].holds and not _checks(planted, *asked)[found.name].holds:
+                return shorter
+        shorter *= 0.5
+    return None
 
 
 def _primary(scene: str, params: Params, dimension: int, dt: float, healthy: Watchers) -> list[str]:
@@ -196,13 +243,19 @@ class _Asked(dict[str, Measured]):
 
 def _watchers(engine: Engine, profile: str, scene: str, params: Params, dimension: int, dt: float) -> Watchers:
     """Every receipt and every check of one cell."""
+    wanted = needs(CATALOGUE[scene].scene(dimension, params))
+    found = {f"receipt {slip.quantity}": Watched(slip.holds) for slip in receipts(engine, profile, wanted, dt)}
+    return found | _checks(engine, profile, scene, params, dimension, dt)
+
+
+def _checks(engine: Engine, profile: str, scene: str, params: Params, dimension: int, dt: float) -> Watchers:
+    """Every check of one cell."""
     canonical = CATALOGUE[scene]
     made = canonical.scene(dimension, params)
-    wanted = needs(made)
-    settings = {setting.name: setting.value for setting in engine.settings(profile, wanted, dt)}
-    found = {f"receipt {slip.quantity}": Watched(slip.holds) for slip in receipts(engine, profile, wanted, dt)}
+    settings = {setting.name: setting.value for setting in engine.settings(profile, needs(made), dt)}
     trajectory = run(engine, made, dt, settings, canonical.sampling(made))
     measured = canonical.measure(made, trajectory) if trajectory.finish == "completed" else {}
+    found = {}
     for check in canonical.checks(made, dt):
         value = measured.get(check.metric, (None, ""))[0]
         found[check.metric] = Watched(judge_physics(value, check) is Physics.PASS, value, check.bound)

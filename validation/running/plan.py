@@ -116,11 +116,13 @@ def in_quick_suite(slot: Slot) -> bool:
     """Whether the quick suite runs this slot: its FAILs are listed row by row."""
     if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
         return False
-    canonical = CATALOGUE[slot.scene]
+    canonical, own = CATALOGUE[slot.scene], dict(slot.params).items()
     return any(
-        slot.params == canonical.minimal(variation.params)
+        # What differs from the defaults is stated by the variation: most are told apart by that, before any is checked.
+        own <= variation.params.items()
         and slot.iterations in variation.iterations
         and variation.runs_in(slot.dimension)
+        and slot.params == canonical.minimal(variation.params)
         for variation in canonical.variations("quick")
     ) or (slot.iterations is None and not slot.params)
 

@@ -125,7 +125,7 @@ SCENE = CanonicalScene(
     sampling=states,
     quick=(Variation({}), Variation({"depth": 0.01, "ratio": 100.0})),
     full=tuple(Variation({"depth": a, "ratio": r}) for a in (1e-3, 0.01, 0.1, 0.5) for r in (1.0, 100.0)),
-    planted=({},),
+    planted=({}, {"depth": 1e-3}),
     primary=Primary(
         "thrown",
         "depth/dt",

@@ -96,7 +96,7 @@ SCENE = CanonicalScene(
     sampling=states,
     quick=(Variation({}, dimensions=(2,)), Variation({"depth": 0.01}, dimensions=(2,))),
     full=tuple(Variation({"depth": a}) for a in (1e-3, 0.01, 0.1, 0.3)),
-    planted=({},),
+    planted=({}, {"depth": 1e-3}),
     primary=Primary(
         "launch",
         "depth",

@@ -94,12 +94,16 @@ def run_cells(
     seats = [_Seat() for _ in range(jobs)]
     try:
         yield from _never_started(waiting)
+
+        def ask(seat: _Seat) -> None:
+            _next(seat, seats, waiting, timeouts, leave, memory)
+            if seat.slot is not None:
+                _ask(seat, seat.slot, texts, timeout, keep(seat.slot), seat.slot in shown)
+
         while True:
             for seat in seats:
                 if seat.slot is None:
-                    _next(seat, seats, waiting, timeouts, leave, memory)
-                    if seat.slot is not None:
-                        _ask(seat, seat.slot, texts, timeout, keep(seat.slot), seat.slot in shown)
+                    ask(seat)
             busy = [seat for seat in seats if seat.slot is not None]
             if not busy:
                 return
@@ -107,10 +111,12 @@ def run_cells(
                 slot = seat.slot
                 assert slot is not None
                 observation, recording = _collect(seat, slot, timeout)
-                if recording is not None:
-                    record(slot, recording)
                 if observation.outcome is Outcome.TIMED_OUT:
                     timeouts[slot.engine, slot.scene] += 1
+                if seat.child is not None and waiting.get(seat.engine):
+                    ask(seat)  # before anyone looks at the answer: a worker does not wait for what is kept of it
+                if recording is not None:
+                    record(slot, recording)
                 yield observation
     finally:
         for seat in seats:

@@ -27,21 +27,27 @@ def serve(connection: Connection) -> None:
 
     registry.load_engines_here()
     connection.send_bytes(READY)
+    before: state.State | None = None
     while True:
         try:
             job = json.loads(connection.recv_bytes())
         except EOFError:
             return
-        connection.send_bytes(json.dumps(_answer(job)).encode())
+        answer, before = _answer(job, before)
+        connection.send_bytes(json.dumps(answer).encode())
 
 
-def _answer(job: Mapping[str, Any]) -> dict[str, Any]:
+def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[str, Any], state.State | None]:
+    """Answer of one cell, and the look at this process that the next one is compared with, if this one left it alone.
+
+    A process that a cell has changed gets no other.
+    """
     slot, recording, changed, unwritten = slot_from_dict(job["slot"]), None, "", None
     try:
         posed.remember(job["scenes"])
         posed.hand_over(job["stated"])
         found = registry.find(slot.engine)
-        before = state.taken()
+        before = state.taken() if before is None else state.still(before)
         try:
             observation, recording = _cell(slot, job)
         finally:
@@ -56,7 +62,8 @@ def _answer(job: Mapping[str, Any]) -> dict[str, Any]:
     except BaseException as error:  # an exit or an interrupt that an engine raises is a crash of its cell
         observation = Observation(slot, "", 0, "", Outcome.CRASHED, said_by(error))
         changed = changed or "what was raised"
-    return {"observation": observation.as_dict(), "recording": recording, "changed": changed, "unwritten": unwritten}
+    told = observation.as_dict()
+    return {"observation": told, "recording": recording, "changed": changed, "unwritten": unwritten}, before
 
 
 def _cell(slot: Slot, job: Mapping[str, Any]) -> tuple[Observation, str | None]:
