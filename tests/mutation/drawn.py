@@ -93,10 +93,12 @@ def table(rows: list[Drawn]) -> list[str]:
         lines.append(f"| {package} | {len(own)} | {' | '.join(map(str, each))} |")
     missed = [row for row in rows if row.verdict not in NOTICED]
     because = sum(bool(row.reason) for row in missed)
-    lines += ["", f"Of the {len(missed)} that are not noticed {because} have a reason: they change words only, or "
-              "nothing that can be seen. They count as not noticed all the same. *Since* is what tests that were written for "
-              "them make of the others:", "",
-              "| function | change | verdict | since | reason |", "|---|---|---|---|---|"]  # fmt: skip
+    lines += [
+        "", f"Of the {len(missed)} that are not noticed {because} have a reason: they change words only, or nothing "
+        "that can be seen. They count as not noticed all the same. *Since* is what tests that were written for them "
+        "make of the others:", "",
+        "| function | change | verdict | since | reason |", "|---|---|---|---|---|",
+    ]  # fmt: skip
     for row in rows:
         if row.verdict not in NOTICED:
             change = row.change.replace("|", "\\|")
