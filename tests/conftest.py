@@ -10,6 +10,7 @@ from hypothesis import settings
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.isolation import IsolationError, Lost
 from adapters.shapes import SceneError
 from validation.findings import FindingsError
 from validation.records.store import StoreError
@@ -29,7 +30,7 @@ def pytest_configure():
 
 
 #: Errors that a user reads: what is wrong stands in one line.
-SAID = (SceneError, EngineError, FindingsError, StoreError, LimitError)
+SAID = (SceneError, EngineError, FindingsError, StoreError, LimitError, IsolationError, Lost)
 
 
 @pytest.fixture(scope="session", autouse=True)
