@@ -92,6 +92,10 @@ def test_whatever_is_wrong_with_an_engine_it_is_found_under_its_name_and_one_wit
     for found in map(registry.find, registry.names()):
         assert (found.engine is None) == bool(found.reason), found
     assert [registry.find(name).name for name in registry.names()] == registry.names()
+    # So it is where it is loaded here, as in the process that is asked about it.
+    for name in registry.names():
+        here = registry.loaded(registry.entry(name))
+        assert (here.name, here.engine is None) == (name, registry.find(name).engine is None)
     listed = {entry["name"]: entry for entry in engines()}
     assert list(listed) == registry.names()
     for name, entry in listed.items():
