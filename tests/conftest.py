@@ -10,6 +10,11 @@ from hypothesis import settings
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.isolation import IsolationError, Lost
+from adapters.shapes import SceneError
+from validation.findings import FindingsError
+from validation.records.store import StoreError
+from validation.workers.limits import LimitError
 
 # Hypothesis fails an example that takes 200 ms: on a busy machine that says nothing of the code.
 settings.register_profile("without_deadline", deadline=None)
@@ -22,6 +27,30 @@ def pytest_configure():
         registry.check_required()
     except EngineError as error:
         raise pytest.UsageError(str(error)) from None
+
+
+#: Errors that a user reads: what is wrong stands in one line.
+SAID = (SceneError, EngineError, FindingsError, StoreError, LimitError, IsolationError, Lost)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def errors_say_one_line():
+    """Whatever test provokes an error that a user reads, it says something, as text, in one line.
+
+    Engines are spoilt on purpose, so that theirs have more lines: the conformance kit is asked about that.
+    """
+
+    def checked(error, *said):
+        ValueError.__init__(error, *said) if isinstance(error, ValueError) else RuntimeError.__init__(error, *said)
+        assert len(said) == 1, said
+        assert isinstance(said[0], str), said
+        assert said[0].strip(), said
+        assert "\n" not in said[0].strip() or isinstance(error, EngineError), said
+
+    with pytest.MonkeyPatch.context() as patch:
+        for error in SAID:
+            patch.setattr(error, "__init__", checked, raising=False)
+        yield
 
 
 EVIL = '''

@@ -126,6 +126,15 @@ def test_hostile_and_wrong_models_are_one_line(text, said):
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
 
 
+@pytest.mark.parametrize("what", ["damping", "armature"])
+@pytest.mark.parametrize("bad", [0, 1, 2])
+def test_of_several_bodies_the_one_is_named_whose_joint_is_no_free_flight(what, bad):
+    bodies = [BALL.replace('"ball" pos="0 0 1"', f'"{name}" pos="0 0 {k + 1}"') for k, name in enumerate("abc")]
+    bodies[bad] = bodies[bad].replace("<freejoint/>", f'<joint type="free" {what}="1"/>')
+    with pytest.raises(SceneError, match=f"<body> '{'abc'[bad]}': .*{what}"):
+        reading.read(model_of("".join(bodies)), False)
+
+
 def test_names_that_steer_a_terminal_never_reach_one():
     text = model_of(BALL.replace('name="ball"', 'name="a&#x9;b"'))
     with pytest.raises(SceneError, match="cannot be a name"):

@@ -12,6 +12,7 @@ import pytest
 
 from adapters import registry
 from adapters.engine import EngineError
+from reports.listing import engines
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,6 +86,22 @@ def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_our_engines_come_first_and_others_by_name(plugins: None) -> None:
     names = registry.names()
     assert names == sorted(names) and len(names) == 12  # an engine of others under a name of ours is none of ours
+
+
+def test_whatever_is_wrong_with_an_engine_it_is_found_under_its_name_and_one_without_reason_is_there(plugins) -> None:
+    for found in map(registry.find, registry.names()):
+        assert (found.engine is None) == bool(found.reason), found
+    assert [registry.find(name).name for name in registry.names()] == registry.names()
+    # So it is where it is loaded here, as in the process that is asked about it.
+    for name in registry.names():
+        here = registry.loaded(registry.entry(name))
+        assert (here.name, here.engine is None) == (name, registry.find(name).engine is None)
+    listed = {entry["name"]: entry for entry in engines()}
+    assert list(listed) == registry.names()
+    for name, entry in listed.items():
+        there = registry.find(name).engine is not None
+        assert entry["status"] == ("installed" if there else "not installed") and bool(entry["reason"]) is not there
+    assert {entry["status"] for entry in listed.values()} == {"installed", "not installed"}
 
 
 def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:

@@ -72,10 +72,20 @@ ARM = (
     '<joint name="tip" type="fixed"><parent link="arm"/><child link="hand"/></joint>'
     f'<link name="hand">{INERTIA}</link>'
 )
+#: A link that has no place hangs in the world by a joint of its own, beside one that has.
+CROWD = (
+    f'<link name="world"/>{BALL}'
+    '<joint name="f" type="floating"><parent link="world"/><child link="ball"/></joint>'
+    '<joint name="g" type="floating"><parent link="world"/><child link="crowd"/></joint>'
+    + BALL.replace('"ball"', '"crowd"').replace(
+        "</link>", '<collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+    )
+)
 #: What is refused, and what is left with ``--drop``: names of the bodies.
 REFUSED = [
     ((MODELS / "refused_arm.urdf").read_text(), "line 3: <joint> 'shoulder': a revolute joint", None),
     (robot(ARM), "<joint> 'hinge': a revolute joint holds a link", ["ball"]),
+    (robot(CROWD), "<link> 'crowd': has several geoms", ["ball"]),
     (robot(BALL.replace("</link>", '<contact><lateral_friction value=".1"/></contact></link>')), "<contact>", ["ball"]),
     (robot(BALL + '<gazebo reference="ball"><mu1>0.2</mu1></gazebo>'), "<gazebo>: what Gazebo alone reads", ["ball"]),
     (robot(BALL + '<mujoco><option timestep="1"/></mujoco>'), "<mujoco>: what MuJoCo alone reads", ["ball"]),

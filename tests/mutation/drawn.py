@@ -14,8 +14,10 @@ DRAWN = Path(__file__).resolve().parent / "sample.csv"
 APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx", "newton"))
 #: Seconds of CPU of a test file that are recorded, and of tests that are run against one mutant.
 RECORDED, SPENT = 6.0, 15.0
-#: Test files whose record ended early that are run whole against what survives, and seconds of CPU of each.
-WHOLE_FILES, LONGEST = 1, 20.0
+#: Seconds of CPU of the shared fixtures of test files that are run against one mutant.
+SHARED = 30.0
+#: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
+REST_OF, LONGEST = 1, 20.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
 #: Verdicts that count as noticed: what only time ended is noticed as well.
 NOTICED = (KILLED, TIMED)
@@ -47,8 +49,8 @@ class Drawn:
 #: What a mutant meets that is drawn today.
 MEETS = (
     f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those "
-    f"that a test file begins within {RECORDED:g} s; then, unless its form tells that it changes words, "
-    f"{WHOLE_FILES} of the files that go on, for {LONGEST:g} s"
+    f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
+    f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"
 )
 
 
@@ -89,8 +91,14 @@ def table(rows: list[Drawn]) -> list[str]:
         own = [row.verdict for row in rows if row.module.startswith(f"{package}/")]
         each = (own.count(verdict) for verdict in (KILLED, TIMED, SURVIVED, UNREACHED, UNSHOWN))
         lines.append(f"| {package} | {len(own)} | {' | '.join(map(str, each))} |")
-    lines += ["", "Those that are not noticed; *since* is what tests that were written for them make of them:", "",
-              "| function | change | verdict | since | reason |", "|---|---|---|---|---|"]  # fmt: skip
+    missed = [row for row in rows if row.verdict not in NOTICED]
+    because = sum(bool(row.reason) for row in missed)
+    lines += [
+        "", f"Of the {len(missed)} that are not noticed {because} have a reason: they change words only, or nothing "
+        "that can be seen. They count as not noticed all the same. *Since* is what tests that were written for them "
+        "make of the others:", "",
+        "| function | change | verdict | since | reason |", "|---|---|---|---|---|",
+    ]  # fmt: skip
     for row in rows:
         if row.verdict not in NOTICED:
             change = row.change.replace("|", "\\|")

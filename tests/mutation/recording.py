@@ -3,6 +3,7 @@
 The blocks of an instrumented copy (`reach.instrumented`) call ``seen.add`` with their own name. Pytest tells which test
 runs in the environment, which processes inherit: a line ``test<tab>block`` goes to a file of each process. What runs
 while a file is imported, or in a fixture that tests share, is reached by all of its tests, under the name of no test.
+What a cache keeps is reached by whoever asks for it (`remembered`), not only by the test that came first.
 """
 
 from __future__ import annotations
@@ -10,18 +11,25 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
+from functools import _make_key, update_wrapper
 
 import pytest
 
 FOLDER = os.environ.get("CROSSCHECK_REACH", "")
-#: Seconds of CPU, children included, after which no further test of the file is begun.
+#: Seconds of CPU, children included and shared fixtures not, after which no further test of the file is begun.
 LIMIT = float(os.environ.get("CROSSCHECK_REACH_SECONDS", "inf"))
+#: A file that names tests which shall not run: they have been asked already.
+ASKED = os.environ.get("CROSSCHECK_REACH_ASKED", "")
 
 
 class Seen(set):
     """Names of blocks; a new one is written down at once, since processes may end without a word."""
 
-    pid, file = 0, -1
+    pid, file, turn = 0, -1, 0
+
+    def clear(self):
+        self.turn += 1
+        set.clear(self)
 
     def add(self, name):
         if name in self:
@@ -37,9 +45,42 @@ class Seen(set):
 
 
 seen = Seen()
-_passed: dict[str, float] = {}
-_failed: set[str] = set()
-_before = [0.0]
+_outcome: dict[str, str] = {}
+_before = [0.0, 0.0]
+#: Seconds of CPU of fixtures that tests share, so far, and how many of them are being made.
+_shared = [0.0, 0]
+
+
+def remembered(cached):
+    """A cached function that tells the blocks of an answer again when it gives it out of its cache."""
+    known, told = {}, {}
+
+    def call(*args, **kwargs):
+        try:
+            key = _make_key(args, kwargs, typed=False)
+            blocks = known.get(key)
+        except TypeError:  # the cache says so itself
+            return cached(*args, **kwargs)
+        if blocks is not None:
+            if told.get(key) != seen.turn:
+                told[key] = seen.turn
+                for name in blocks:
+                    seen.add(name)
+            return cached(*args, **kwargs)
+        before = set(seen)
+        seen.clear()
+        try:
+            answer = cached(*args, **kwargs)
+            known[key] = frozenset(seen)
+            return answer
+        finally:
+            seen.turn += 1
+            seen.update(before)
+
+    update_wrapper(call, cached)
+    for name in ("cache_clear", "cache_info", "cache_parameters"):
+        setattr(call, name, getattr(cached, name))
+    return call
 
 
 def _cpu():
@@ -49,24 +90,37 @@ def _cpu():
 _begun = _cpu()
 
 
+def _write(name, text):
+    if FOLDER:
+        with open(os.path.join(FOLDER, name), "a", encoding="utf-8") as stream:
+            stream.write(text)
+
+
 def pytest_runtest_logstart(nodeid):
     seen.clear()
-    _before[0] = _cpu()
+    _before[:] = _cpu(), _shared[0]
 
 
 def pytest_runtest_logreport(report):
-    if report.failed or report.skipped:
-        _failed.add(report.nodeid)
-        if report.failed and FOLDER:
-            with open(os.path.join(FOLDER, "failed"), "a", encoding="utf-8") as stream:
-                stream.write(f"{report.nodeid}\n")
-    elif report.when == "teardown":
-        _passed[report.nodeid] = _cpu() - _before[0]
+    """Write down at once how each test ended: a file may be stopped by the limit of its process."""
+    if report.failed:
+        _outcome[report.nodeid] = "failed"
+        _write("failed", f"{report.nodeid}\n")
+    elif report.skipped:
+        _outcome.setdefault(report.nodeid, "skipped")
+    if report.when == "teardown":
+        ended = _outcome.get(report.nodeid, "passed")
+        own = _cpu() - _before[0] - (_shared[0] - _before[1])
+        _write("ended", json.dumps([report.nodeid, ended, own]) + "\n")
 
 
 def pytest_collection_modifyitems(items):
-    """One case of every test first: what the record may cost is spent on different ones."""
-    if FOLDER and float("inf") > LIMIT:
+    """One case of every test first: what is spent is spent on different ones; and none that was asked before."""
+    if ASKED:
+        with open(ASKED, encoding="utf-8") as stream:
+            asked = set(stream.read().splitlines())
+        items[:] = [item for item in items if item.nodeid not in asked]
+    if ASKED or (FOLDER and float("inf") > LIMIT):
         met = Counter()
         place = {}
         for item in items:
@@ -79,26 +133,30 @@ def pytest_collection_modifyitems(items):
 def pytest_fixture_setup(fixturedef, request):
     test = os.environ.get("PYTEST_CURRENT_TEST")
     shared = fixturedef.scope != "function" and test is not None
+    begun = _cpu()
     if shared:
         os.environ["PYTEST_CURRENT_TEST"] = ""
         seen.clear()
+        _shared[1] += 1
     try:
         return (yield)
     finally:
         if shared:
             os.environ["PYTEST_CURRENT_TEST"] = test
+            _shared[1] -= 1
+            if not _shared[1]:  # one that asks for another has its seconds
+                _shared[0] += _cpu() - begun
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item, nextitem):
     result = yield
-    if _cpu() - _begun > LIMIT:
+    if _cpu() - _begun - _shared[0] > LIMIT:
         item.session.shouldstop = "what the record may cost is spent"
     return result
 
 
-def pytest_sessionfinish():
-    if FOLDER:
-        passed = {test: seconds for test, seconds in _passed.items() if test not in _failed}
-        with open(os.path.join(FOLDER, "passed.json"), "w", encoding="utf-8") as stream:
-            json.dump(passed, stream)
+def pytest_sessionfinish(session):
+    _write("shared", f"{_shared[0]}")
+    if not session.shouldstop:
+        _write("whole", "")

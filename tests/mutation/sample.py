@@ -5,9 +5,9 @@
 `SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
 likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
 its statements (`reach`) run, the cheapest case of each first, until one fails or what a mutant may cost is spent; then
-whole test files whose record ended before they did. It *survived* if none failed, for whatever reason: what it may cost
-was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the test
-that failed passes in the copy without a mutant.
+the rest of a test file whose record ended before it did. It *survived* if none failed, for whatever reason: what it may
+cost was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the
+test that failed passes in the copy without a mutant.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import hashlib
 import json
 import os
 import random
+import re
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,12 +32,13 @@ from drawn import (
     MEETS,
     NOTICED,
     RECORDED,
+    REST_OF,
+    SHARED,
     SPENT,
     SURVIVED,
     TIMED,
     UNREACHED,
     UNSHOWN,
-    WHOLE_FILES,
     Drawn,
     stored,
     write,
@@ -47,11 +49,11 @@ from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, PATIENCE, import_common, run
-from reach import PLUGIN, Reach, block_of, by_block, dotted, environment, record
+from reach import PLUGIN, Reach, Record, block_of, by_block, dotted, environment, record, recorded
 from subjects import PACKAGES, ROOT
 
 #: Seconds of wall time that a whole file may take: what its tests start in processes of their own counts nowhere else.
-PATIENCE_WITH_FILES = 60.0
+PATIENCE_WITH_FILES = 120.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
 
@@ -120,7 +122,8 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
     copy, records = folder / "copy", folder / "records"
     copy_of_the_checkout(copy)
     record(copy, records, RECORDED)
-    reach = by_block(records)
+    known = recorded(records)
+    reach = by_block(known)
     import_common()
     (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
     with chdir(folder):
@@ -141,13 +144,14 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
         spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
         assert isinstance(spoilt, Module)
         tests_of_it = reaching(reach, tree.code, spoilt.code, module, function)
-        verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it))
+        shared = {name: each.shared for name, each in known.items()}
+        verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it), shared)
         if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
         change = change_of(tree, mutation)
         why = known_by_form(change)
         if verdict in (SURVIVED, UNREACHED) and not why:
-            failed = by_whole_files(copy, module, spoilt.code, cut_short(reach, module)) or failed
+            failed = by_the_rest(copy, module, spoilt.code, cut_short(known, module), known) or failed
             verdict = KILLED if failed else verdict
         if k in found:
             found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
@@ -188,52 +192,59 @@ def in_turn(tests: dict[str, float]) -> list[tuple[str, float]]:
     return sorted(tests.items(), key=lambda item: place[item[0]])
 
 
-def judged(copy: Path, module: str, source: str, tests: Sequence[tuple[str, float]]) -> tuple[str, int, str]:
-    """Verdict over one mutant, how many tests were asked, and the one that failed."""
-    chosen, spent = list[str](), 0.0
+def judged(
+    copy: Path, module: str, source: str, tests: Sequence[tuple[str, float]], shared: Mapping[str, float]
+) -> tuple[str, int, str]:
+    """Verdict over one mutant, how many tests were asked, and the one that failed.
+
+    ``shared`` are the seconds of CPU that a test file takes before its first test.
+    """
+    chosen, spent, files = list[str](), 0.0, dict[str, float]()
     for test, seconds in tests:
-        if not chosen or spent + seconds <= SPENT:
+        name = test.partition("::")[0]
+        made = sum((files | {name: shared[name]}).values())
+        if not chosen or (spent + seconds <= SPENT and (name in files or made <= SHARED)):
             chosen.append(test)
             spent += seconds
+            files[name] = shared[name]
     if not chosen:
         return UNREACHED, 0, ""
+    limit = 60.0 + 4.0 * (spent + sum(files.values()))
     with spoilt_copy(copy, module, source):
-        code, failed = asked(copy, chosen, 60.0 + 4.0 * spent)
+        code, failed = asked(copy, chosen, limit)
         if code == NOT_FOUND:  # a file that cannot be imported, or tests that are made of what has changed
-            files = dict.fromkeys(test.partition("::")[0] for test in chosen)
-            code, failed = asked(copy, list(files), 60.0 + 4.0 * spent)
+            code, failed = asked(copy, list(files), limit)
     if code == OUT_OF_TIME:
         return TIMED, len(chosen), ""
     return (SURVIVED if code in (0, NOT_FOUND, 5) else KILLED), len(chosen), failed
 
 
-def by_whole_files(copy: Path, module: str, source: str, files: Sequence[str]) -> str:
-    """First test of these files that fails, and not without the mutant; empty where there is none.
+def by_the_rest(copy: Path, module: str, source: str, files: Sequence[str], known: Mapping[str, Record]) -> str:
+    """First test that fails, and not without the mutant, of what these files have beyond their records; or empty.
 
     Of a scene the cases that name it.
     """
     cases = ["-k", Path(module).stem] if module.startswith("validation/scenes/") else []
     for name in files:
         with spoilt_copy(copy, module, source):
-            _, failed = asked(copy, [name, *cases], LONGEST, PATIENCE_WITH_FILES)
+            _, failed = asked(copy, [name], LONGEST, PATIENCE_WITH_FILES, known[name].tests, cases)
         if "::" in failed and asked(copy, [failed], 60.0)[0] == 0:
             return failed
     return ""
 
 
-def cut_short(reach: Reach, module: str) -> list[str]:
-    """Test files whose record ended before they did and that reach a module, those that reach most of it first."""
-    spent, met = dict[str, float](), Counter[str]()
-    for block, tests in reach.items():
-        for test, seconds in tests.items():
-            spent[test] = seconds
-        if block.startswith(f"{dotted(module)}."):
-            met.update({test.partition("::")[0] for test in tests})
-    whole = dict[str, float]()
-    for test, seconds in spent.items():
-        name = test.partition("::")[0]
-        whole[name] = whole.get(name, 0.0) + seconds
-    return [name for name, _ in met.most_common() if whole[name] >= RECORDED][:WHOLE_FILES]
+def cut_short(known: Mapping[str, Record], module: str) -> list[str]:
+    """Test files whose record ended before they did: those that import a module first, then by how much they reach."""
+    parent, _, stem = dotted(module).rpartition(".")
+    imports = re.compile(rf"{re.escape(dotted(module))}\b|from {re.escape(parent)} import [^\n]*\b{re.escape(stem)}\b")
+    met = dict[str, tuple[bool, int]]()
+    for name, own in known.items():
+        blocks = {block for _, names in own.tests.values() for block in names}
+        reaches = sum(block.startswith(f"{dotted(module)}.") for block in blocks)
+        says = imports.search((ROOT / name).read_text(encoding="utf-8")) is not None
+        if not own.whole and (says or reaches):
+            met[name] = (says, reaches)
+    return sorted(met, key=lambda name: met[name], reverse=True)[:REST_OF]
 
 
 @contextmanager
@@ -249,12 +260,21 @@ def spoilt_copy(copy: Path, module: str, source: str) -> Iterator[None]:
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
-def asked(copy: Path, tests: Sequence[str], cpu_seconds: float, patience: float = PATIENCE) -> tuple[int, str]:
-    """Exit status of these tests in the copy as it is, and the first that failed."""
+def asked(
+    copy: Path,
+    tests: Sequence[str],
+    cpu_seconds: float,
+    patience: float = PATIENCE,
+    but: Iterable[str] = (),
+    options: Sequence[str] = (),
+) -> tuple[int, str]:
+    """Exit status of these tests, ``but`` some, in the copy as it is, and the first that failed."""
     with tempfile.TemporaryDirectory(prefix="crosscheck-sample-") as text:
         folder = Path(text)
         (folder / "tests").write_text("\n".join(tests), encoding="utf-8")
-        arguments = ["-p", PLUGIN, f"@{folder / 'tests'}"]
-        code = run(copy, arguments, environment(copy, folder, float("inf")), cpu_seconds, patience)
+        (folder / "but").write_text("\n".join(but), encoding="utf-8")
+        arguments = ["-p", PLUGIN, f"@{folder / 'tests'}", *options]
+        told = environment(copy, folder, float("inf"), folder / "but" if but else None)
+        code = run(copy, arguments, told, cpu_seconds, patience)
         said = (folder / "failed").read_text(encoding="utf-8") if (folder / "failed").exists() else ""
         return code, next(iter(said.splitlines()), "")

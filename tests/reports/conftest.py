@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.table import Table
 
 from adapters.trajectory import load_trajectory
 from validation.bench.timing import Timing
@@ -89,6 +91,30 @@ def _timings(purpose: str, slot: Slot, steps: int, seconds: float, bodies: int =
     return [
         Timing(purpose, *who, k, 0, 0, False, steps, seconds * (1 + 0.01 * k), seconds, "hash", 0.0) for k in range(5)
     ]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def tables_are_whole():
+    """Whatever a command prints in a test: no row is longer or shorter than its table, and nothing prints nothing.
+
+    rich gives a cell too many a column without a heading, leaves what lacks empty, and writes None as a word. A row of
+    one cell heads those below it.
+    """
+    add_row, print_objects = Table.add_row, Console.print
+
+    def whole(table, *cells, **options):
+        assert not table.columns or len(cells) in (1, len(table.columns)), cells
+        assert not any(cell is None for cell in cells), cells
+        return add_row(table, *cells, **options)
+
+    def something(console, *objects, **options):
+        assert not any(each is None for each in objects), objects
+        return print_objects(console, *objects, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Table, "add_row", whole)
+        patch.setattr(Console, "print", something)
+        yield
 
 
 @pytest.fixture(scope="session")

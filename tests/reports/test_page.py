@@ -29,6 +29,7 @@ from reports.page.families import families, sentence
 from reports.page.replay import Replay, people, replays
 from reports.page.scenes import split_figure
 from reports.page.verdicts import Mark, slug
+from reports.wording import mark_of
 from validation.cells import Slot
 from validation.records.store import Run, Store
 from validation.running.execution import execute
@@ -249,6 +250,33 @@ def test_findings_hold_every_failing_value_once(page_source):
     failing = [r for r in page_source.rows if r["physics"] == "fail" or r["outcome"] == "crashed"]
     assert sum(count for _, count, _ in findings(page_source)) == len(failing)
     assert sum(f.count for _, _, families in findings(page_source) for f in families) == len(failing)
+
+
+def test_a_finding_says_the_number_of_a_row_of_its_own_that_is_farthest_out(page_source):
+    """The text's numbers, read back: value, truth and tolerance of one row, and none of the family is worse."""
+    looked = 0
+    for mark, _, shown in findings(page_source):
+        for one in shown:
+            said = re.search(r"(\S+) = (.+?), truth (.+?), tolerance (.+)$", one.text)
+            value, truth, tolerance = (part.split()[0] for part in said.groups()[1:])
+            about = (one.engine, one.profile, one.scene, one.dimension)
+            rows = [
+                row for row in page_source.rows
+                if tuple(row[name] for name in ("engine", "profile", "scene", "dimension")) == about
+                and row["metric"].partition("[")[0] == one.family.partition("[")[0] and mark_of(row) == mark
+            ]  # fmt: skip
+            if not rows or any(row["value"] is None for row in rows):
+                continue
+            if not re.match(r"-?[\d.]", value):
+                assert "never" in said[2]
+                continue
+            row = max(rows, key=lambda row: abs(row["value"] - row["truth"]) / row["tolerance"])
+            assert said[1] == row["metric"], one.text
+            assert float(value) == pytest.approx(row["value"], rel=6e-3), one.text
+            assert float(truth) == pytest.approx(row["truth"], rel=6e-3), one.text
+            assert float(tolerance) == pytest.approx(row["tolerance"], rel=0.1), one.text
+            looked += 1
+    assert looked > 5
 
 
 # ---- families ----

@@ -8,7 +8,9 @@ import pytest
 from adapters import registry
 from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
+from adapters.scene import SceneError
 from validation import identity
+from validation.cells import MOST_ITERATIONS, MOST_ULPS, Slot, slot_from_dict
 from validation.running import plan
 from validation.running.plan import FULL_DT, Request, slots
 
@@ -83,3 +85,16 @@ def _from(node, package):
     base = ".".join([*parts[: len(parts) - node.level + 1], *([node.module] if node.module else [])])
     base = base if node.level else node.module
     return [base, *(f"{base}.{alias.name}" for alias in node.names)]
+
+
+@pytest.mark.parametrize(
+    ("field", "most", "least"),
+    [("iterations", MOST_ITERATIONS, 1), ("ulp", MOST_ULPS, -MOST_ULPS)],
+)
+def test_a_slot_may_ask_as_much_as_it_is_told_and_no_more(field, most, least):
+    plain = Slot("impact", (), 2, "chipmunk", "default", 1 / 240).as_dict()
+    for value in (least, most):
+        assert getattr(slot_from_dict(plain | {field: value}), field) == value
+    for value in (least - 1, most + 1, 1.5, "2"):
+        with pytest.raises(SceneError, match=rf"^slot\.{field}: .* must be a whole number in \[{least}, {most}\]$"):
+            slot_from_dict(plain | {field: value})

@@ -1,7 +1,11 @@
 """What every scene of the catalogue owes: figure, reasons, cells that exist, checks that planted cells state."""
 
+import random
+import re
+
 import pytest
 
+from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE
 from validation.running.plan import QUICK_DT
@@ -43,6 +47,35 @@ def test_every_cell_it_declares_can_be_made_and_has_judged_checks(name):
             scene = canonical.scene(dimension, params)
             assert (scene.name, scene.version, scene.dimension) == (name, canonical.version, dimension)
             assert any(check.bound is not None for check in canonical.checks(scene, DT)), params
+
+
+def within(parameter, dice):
+    """A value that the parameter's range admits: the default, an end, near the default or anywhere."""
+    size = 10.0 * max(1.0, abs(parameter.default))
+    low, high = max(parameter.low, -size), min(parameter.high, size)
+    scaled = parameter.default * 10.0 ** dice.uniform(-1.0, 1.0)
+    value = dice.choice([parameter.default, parameter.default, low, high, 1.0, dice.uniform(low, high), scaled])
+    value = min(max(value, low), high)
+    return float(round(value)) if parameter.integer else value
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_whatever_its_ranges_admit_is_a_scene_or_refused_by_the_name_of_a_parameter(name):
+    """Values that no one else asks for: a scene of that size and name, or one line that says which number is wrong."""
+    canonical, dice = CATALOGUE[name], random.Random(name)
+    names, made = {parameter.name for parameter in canonical.parameters}, 0
+    for _ in range(400):
+        params = {parameter.name: within(parameter, dice) for parameter in canonical.parameters}
+        dimension = dice.choice(canonical.dimensions)
+        try:
+            scene = canonical.scene(dimension, params)
+        except SceneError as error:
+            said = re.fullmatch(rf"{name}\.(\w+): [^\n]+", str(error))
+            assert said is not None and said[1] in names, (params, str(error))
+            continue
+        made += 1
+        assert (scene.name, scene.dimension) == (name, dimension) and dict(scene.params) == params
+    assert made >= 4
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

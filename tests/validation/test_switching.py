@@ -11,6 +11,7 @@ from adapters.experiment import Experiment
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of
+from validation.posed import resolve
 from validation.running.plan import QUICK_DT, in_quick_suite
 from validation.settings import proofs
 from validation.settings.proofs import Proof
@@ -97,6 +98,13 @@ def test_every_family_has_an_experiment_and_every_experiment_a_family_that_cover
         assert experiment.profile in family.profiles
         assert experiment.scene == family.scene
         assert experiment.metric.partition("[")[0] in family.metrics
+        said = experiment.says
+        assert isinstance(said, str) and len(said.split()) > 3 and "\n" not in said, said
+        canonical = resolve(experiment.scene)
+        assert experiment.dimension in canonical.dimensions
+        assert set(experiment.params) <= {parameter.name for parameter in canonical.parameters}
+        # What is switched off is not what is blamed in vain, and either is something.
+        assert experiment.off and all(idle and dict(idle) != dict(experiment.off) for idle in experiment.idle)
 
 
 def test_candidates_are_settings_that_the_engine_has():

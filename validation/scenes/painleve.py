@@ -103,9 +103,12 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the end would stop or lift before the rod is told, or friction would not hold it once it has jammed.
+        If the rod does not lean over its end, the end would stop or lift before the rod is told, or friction would not
+        hold it once it has jammed.
     """
     p = params
+    if _arm(p, _tilt(p))[0] <= 0.0:
+        raise SceneError(f"painleve.lean: at {p['lean']:g} degrees a rod so thick stands over its end: nothing jams it")
     if p["ratio"] < 1.0:
         found = _slides(_key(p))
         if found is None:

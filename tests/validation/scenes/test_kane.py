@@ -9,6 +9,7 @@ from planted import failing
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
+from validation.scenes.kane import answers
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
@@ -107,3 +108,16 @@ def test_whoever_takes_the_gain_away_fails():
 def test_what_lands_twice_or_is_no_rod_is_refused(params, named):
     with pytest.raises(SceneError, match=rf"kane\.{named}"):
         made(**params)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(("e", "mu"), [(0.0, 0.1), (0.5, 0.1), (0.9, 0.3), (0.0, 0.0)])
+def test_a_point_slides_on_slower_by_what_friction_takes_at_any_speed(scale, e, mu):
+    """A mass point that comes down at 1 and along at 1/2: (1 + e) up, mu (1 + e) back, or all of it if that is less."""
+    normal = 1.0 + e
+    tangent = min(mu * normal, 0.5)
+    for way in (1.0, -1.0):
+        found = answers(np.eye(2), scale * np.array([-1.0, way * 0.5]), e, mu)
+        assert [one.tolist() for one in found] == [pytest.approx([scale * normal, -way * scale * tangent])]
+    sticking = answers(np.eye(2), scale * np.array([-1.0, 0.5]), e, 1.0)
+    assert [one.tolist() for one in sticking] == [pytest.approx([scale * normal, -0.5 * scale])]

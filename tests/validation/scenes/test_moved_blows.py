@@ -12,6 +12,7 @@ from adapters.engine import Contacts
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
+from validation.scenes.closing_wall import _turned_back
 
 DT = 1 / 240
 SIZES = (0.1, 0.01, 0.001)
@@ -172,3 +173,11 @@ def test_a_blow_with_wrong_e_or_inertia_or_shared_unequally_fails(size):
 def test_a_box_whose_other_edge_would_land_too_is_refused_by_name():
     with pytest.raises(ValueError, match=r"edge_drop\.tilt"):
         made("edge_drop", e=1.0, tilt=5.0)
+
+
+@pytest.mark.parametrize(("meets", "told"), [(-0.3, 0.0), (0.0, 0.0), (0.4, 0.4), (1.0, 1.0), (1.7, 1.0)])
+def test_a_ball_turns_back_where_its_two_ways_meet_but_within_the_samples_between_which_it_does(meets, told):
+    """Ways x = t - meets and -(t - meets) cross at ``meets``; it is sampled at -1, 0, 1 and 2 s."""
+    t = np.array([-1.0, 0.0, 1.0, 2.0])
+    velocity = np.array([1.0, 1.0, -1.0, -1.0])
+    assert _turned_back(t, velocity * (t - meets), velocity, 2) == pytest.approx(told, abs=1e-15)

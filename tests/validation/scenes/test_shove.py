@@ -85,6 +85,21 @@ def test_boxes_move_as_five_contacts_that_hold_make_them(params, offset):
     assert failing(canonical, scene, trajectory) == set()
 
 
+@pytest.mark.parametrize("dt", [1 / 60, DT])
+@pytest.mark.parametrize("params", CELLS)
+@pytest.mark.parametrize(("share", "fails"), [(0.99, set()), (1.01, {"down", "ahead"})])
+def test_an_end_that_is_a_hundredth_of_a_step_s_fall_too_fast_is_just_forgiven(params, dt, share, fails):
+    """Speeds that go wrong by g dt/100 over the second half of the run, whatever its length, and no more."""
+    canonical, scene = made(**params)
+    trajectory = moving(scene, dt)
+    middle = len(trajectory.t) // 2
+    late = (trajectory.t - trajectory.t[middle]).clip(0.0) / (trajectory.t[-1] - trajectory.t[middle])
+    slope = math.radians(scene.params["angle"])
+    for body, along in ((2, (math.cos(slope), -math.sin(slope))), (3, (1.0, 0.0))):
+        trajectory.twist[:, body, :2] += share * 0.01 * scene.params["g"] * dt * late[:, None] * np.array(along)
+    assert failing(canonical, scene, trajectory) == fails
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_accelerations_and_forces_gaps_and_turns_fail(size):
     canonical, scene = made()

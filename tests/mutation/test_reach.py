@@ -1,0 +1,80 @@
+"""What a test is said to reach: blocks end where a statement leaves, a cache tells what it keeps to whoever asks."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = '''
+from functools import cache, lru_cache
+
+def sign(x):
+    """Words."""
+    if x < 0:
+        return -1
+    y = x + 1
+    for k in range(3):
+        if k == x:
+            break
+        y += k
+    return y
+
+@cache
+def inner(x):
+    return x
+
+@lru_cache(maxsize=4)
+def outer(x):
+    return inner(x) + sign(x)
+'''
+
+
+@pytest.fixture
+def reach(monkeypatch):
+    """The recorder's instruments, and a module whose blocks it hears of."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.delenv("CROSSCHECK_REACH", raising=False)
+    kept = set(sys.modules)
+    yield importlib.import_module("reach"), importlib.import_module("recording")
+    for name in set(sys.modules) - kept:
+        if name in ("reach", "recording", "subjects", "pytest_apart"):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def asked(reach, monkeypatch):
+    """Blocks that a call reaches, asked as a test of its own."""
+    tool, recorder = reach
+    monkeypatch.setitem(sys.modules, tool.PLUGIN, recorder)
+    module = {}
+    exec(tool.instrumented(SOURCE, "toy.py"), module)
+
+    def blocks(name, *given):
+        recorder.seen.clear()
+        module[name](*given)
+        return {block.removeprefix("toy.x_") for block in recorder.seen}
+
+    return blocks
+
+
+def test_what_stands_after_a_statement_that_leaves_is_another_block(asked):
+    assert asked("sign", -1) == {"sign:0", "sign:3"}
+    assert asked("sign", 5) == {"sign:0", "sign:4", "sign:6", "sign:8", "sign:9"}
+    assert asked("sign", 0) == {"sign:0", "sign:4", "sign:6", "sign:7", "sign:9"}
+
+
+def test_a_line_belongs_to_its_innermost_block(reach):
+    tool, _ = reach
+    first = SOURCE.splitlines().index("def sign(x):") + 1
+    told = [tool.block_of(SOURCE, "toy.py", "toy.x_sign", first + k).rpartition(":")[2] for k in range(10)]
+    assert told == ["0", "0", "0", "3", "4", "4", "6", "7", "8", "9"]
+
+
+def test_what_a_cache_keeps_is_reached_by_all_who_ask_for_it(asked):
+    inner, sign = asked("inner", 1), asked("sign", 1)
+    assert inner == {"inner:0"}
+    first = asked("outer", 1)
+    assert first == {"outer:0"} | inner | sign
+    assert asked("outer", 1) == first and asked("outer", 1) == first
+    assert asked("outer", -2) == {"outer:0", "inner:0", "sign:0", "sign:3"}
