@@ -208,3 +208,14 @@ def test_the_name_of_the_file_itself_may_hold_anything_that_can_be_seen(tmp_path
     marked = tmp_path / "[bold]<b>|x.json"
     marked.write_text(json.dumps(BASE))
     judged(slots(Request([str(marked)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0])))
+
+
+def test_what_is_wrong_with_a_body_without_a_name_is_told_by_its_place(tmp_path):
+    path = tmp_path / "nameless.toml"
+    path.write_text(
+        'name = "nameless"\ndimension = 3\ngravity = [0.0, 0.0, -9.81]\nduration = 0.1\n'
+        'bodies = [{ name = "", shape = { type = "sphere", radius = 0.5 }, pose = [0, 0, 1, 1, 0.5, 0, 0] }]\n'
+    )
+    said = r"bodies\.0\.pose: the quaternion .* must have length 1; bodies: ''"
+    with pytest.raises(SceneError, match=said):
+        resolve(pinned(str(path)))

@@ -203,7 +203,8 @@ def stated(model: SceneModel) -> Stated:
             _mass(body, model.dimension, notes)
             check_body(body_from_dict(body), model.dimension)
         except (SceneError, ArithmeticError) as error:
-            wrong.append(_why(error, f"{body['name']}.shape"))
+            # A body that has no name is told by its place.
+            wrong.append(("" if body["name"] else f"bodies.{k}") + _why(error, f"{body['name']}.shape"))
             data["bodies"][k] = _stand_in(body["name"], model.dimension)
     try:
         scene = scene_from_dict(data)
