@@ -10,6 +10,9 @@ Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
 Scheme = Literal["fixed", "located", "midpoint"]
 
+#: Difference of both orders of a phase, as a share of the motion in it: mostly 50 to 1000 times the error that is made.
+ACCURACY = 1e-8
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -47,6 +50,8 @@ class Settings:
         ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
         steps are cut where bodies meet and where a slide ends (E19 to E24). ``midpoint``: located impacts, and phases
         whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28).
+    accuracy
+        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35).
 
     Raises
     ------
@@ -67,6 +72,7 @@ class Settings:
     margin: float = 0.01
     direct: bool = True
     scheme: Scheme = "fixed"
+    accuracy: float = ACCURACY
 
     def __post_init__(self) -> None:
         _require("dt", self.dt, math.isfinite(self.dt) and self.dt > 0.0, "a positive, finite time")
@@ -88,6 +94,7 @@ class Settings:
             allowed = ("split", "none")
             _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
+        _require("accuracy", self.accuracy, 1e-12 <= self.accuracy <= 1e-4, "in [1e-12, 1e-4]")
 
     @classmethod
     def classical(cls, dt: float, iterations: int = 10) -> Settings:

@@ -50,7 +50,7 @@ class World:
         self._sub = allocate_sub_step(n, len(self._rows.real), allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(8 * n + 64)
         self._world = allocate_world(self._bodies, len(self._pairs.candidate))
-        self._options = options(settings, needs)
+        self._options, self._accuracy = options(settings, needs), settings.accuracy
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
         self.journal = allocate_journal(2, n, 0)
@@ -114,6 +114,7 @@ class World:
         state = (self._bodies, self._pairs, self._rows, self._problem)
         if self._options.scheme != FIXED_STEP:
             sub = self._sub._replace(journal=self.journal)
+            sub.lasting.accuracy[0] = self._accuracy
             whole = Island(*state, sub, self._ledger, self._options, self.tally)
             return int(run_located(whole, self._world, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))

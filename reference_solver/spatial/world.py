@@ -53,7 +53,7 @@ class World:
         self._sub_step = allocate_sub_step(n, 4 * n + 16, allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
         self._world = allocate_world(self._bodies, len(self._memory), len(self._detection.candidate))
-        self._options = options(settings, needs)
+        self._options, self._accuracy = options(settings, needs), settings.accuracy
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
         self.journal = allocate_journal(3, n, 0)
@@ -90,6 +90,7 @@ class World:
         state = (self._bodies, self._detection, self._manifolds, self._memory, self._problem)
         if self._options.scheme != FIXED_STEP:
             sub = self._sub_step._replace(journal=self.journal)
+            sub.lasting.accuracy[0] = self._accuracy
             whole = Island(*state, sub, self._ledger, self._options, self.tally)
             return int(run_located(whole, self._world, buffer, done, steps, stride))
         return int(run_steps(*state, self._options, self.tally, buffer, done, steps, stride))

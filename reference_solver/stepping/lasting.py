@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.model import Array
+from reference_solver.settings import ACCURACY
 from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
@@ -88,7 +89,8 @@ class Lasting(NamedTuple):
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
     monitor: Array  # (PLACES_WATCHED, k, FEATURE + LIMITS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
-    error: Array  # (1,): of the step made last, see `phase.relative_error`
+    accuracy: Array  # (1,): `Settings.accuracy`
+    error: Array  # (1,): of the step made last over it, see `phase.relative_error`
     early: Array  # (1,): share of a step after which a stage found a monitor below zero, 1 if none did
     lenient: Array  # (1,): 1 where a slip that is all but nothing may be projected away
     spin: Array  # (V,)
@@ -146,6 +148,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         unknown=np.zeros((r, 2), np.int64),
         monitor=np.zeros((PLACES_WATCHED, k, FEATURE + LIMITS[dimension])),
         length=np.zeros(1),
+        accuracy=np.full(1, ACCURACY),
         error=np.zeros(1),
         early=np.ones(1),
         lenient=np.zeros(1),

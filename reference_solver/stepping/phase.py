@@ -62,9 +62,6 @@ COUPLINGS = (
 #: Fifth order less embedded fourth order.
 ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 
-#: Largest difference of both orders, as a share of what the bodies move in the step: it is 50 to 1000 times the error
-#: that is made, which is 1e-11 of a motion then.
-ERROR = 1e-8
 #: Share of the translations that rotations are measured against at least, and the other way round.
 NEXT_TO_NOTHING = 1e-4
 #: Share of the length that the error would allow which is taken.
@@ -188,7 +185,7 @@ def go_to_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
 
 @inner_kernel
 def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
-    """One step of ``length`` from the start of the phase, cleaned up; its error over `ERROR`, < 0 where rows fail.
+    """One step of ``length`` from the start of the phase, cleaned up; its `relative_error`, < 0 where rows fail.
 
     Leaves the end state in bodies, its monitors in place LAST, and in `Lasting.early` whether a stage in between found
     one below zero.
@@ -238,7 +235,7 @@ def weigh_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
 
 @inner_kernel
 def relative_error(lasting: Lasting, length: float) -> float:
-    """Largest difference of both orders over what bodies move, translations and rotations apart, over `ERROR`.
+    """Largest difference of both orders over what bodies move, translations and rotations apart, over the accuracy.
 
     What moves next to nothing is measured against `NEXT_TO_NOTHING` of the other, at the size of the largest body that
     touches another, and of the reference speed of contacts: what is missed then is below `NOISE` of it.
@@ -254,9 +251,9 @@ def relative_error(lasting: Lasting, length: float) -> float:
     turn = max(size * moved_turn, least * max(moved_way, speed))
     worst = 0.0
     if way > 0.0:
-        worst = missed_way / (ERROR * way)
+        worst = missed_way / (lasting.accuracy[0] * way)
     if turn > 0.0:
-        worst = max(worst, size * missed_turn / (ERROR * turn))
+        worst = max(worst, size * missed_turn / (lasting.accuracy[0] * turn))
     return worst
 
 
