@@ -114,7 +114,8 @@ def _parted(v: Array, lightness: Array, touching: list[tuple[int, int, Array, fl
         before = f.copy()
         for k in range(len(f)):
             f[k] = max(0.0, f[k] - (whole[k] @ f - aim[k]) / whole[k, k])
-        if np.abs(f - before).max() <= np.finfo(float).eps * np.abs(f).max():
+        # A row adds as many products as there are contacts, each rounded: the last of them may go to and fro for ever.
+        if np.abs(f - before).max() <= len(f) * np.finfo(float).eps * np.abs(f).max():
             return np.asarray(v + (given.T @ f).reshape(v.shape))
     return None
 

@@ -153,4 +153,4 @@ def test_a_run_fails_on_a_planned_cell_that_left_nothing(tmp_path, monkeypatch):
     ]
     result = call(*cell, "--out", tmp_path)
     assert result.exit_code == 1
-    assert "MISSING" in result.stderr
+    assert "MISSING" in result.stdout
