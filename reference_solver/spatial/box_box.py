@@ -21,7 +21,7 @@ from reference_solver.spatial.vector import Vector, add, add_scaled, axis, cross
 #: boxes are always decided the same way and round-off cannot swap the reference face.
 FACE_ADVANTAGE = 1e-6
 #: A pair of edges must separate better than any face by this part. It has to exceed the tilt [rad] with which boxes
-#: land on each other, about v dt / L = 1e-3: an edge pair is one point where a face offers four.
+#: land on each other, about v dt / L = 1e-3: an edge pair is one point where a face offers up to eight.
 EDGE_ADVANTAGE = 1e-3
 #: The same where bodies touch to round-off when they do: what is larger is a tilt, and their normal that of the edges.
 EXACT_ADVANTAGE = 1e-7

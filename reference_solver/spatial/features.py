@@ -107,6 +107,8 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
             if cross_over(bodies, manifolds, lasting, c, k):
                 core_a = core_b = LINE
                 break
+            if side == 0 and face_b >= 0 and own == POINT:
+                continue  # a corner on a corner: the other one comes onto the other's face
         set_face(bodies, i, face, scale(1.0 - 2.0 * side, n), lasting, k, side)
         return True
     if core_a == LINE and core_b == LINE:

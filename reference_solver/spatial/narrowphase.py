@@ -48,7 +48,8 @@ def collide(
 ) -> int:
     """Write the manifold of bodies a < b in row m; return its number of points (0: no contact).
 
-    ``ahead``: time [s] within which axes that separate them are told apart by when they close; 0: by their gaps alone.
+    ``ahead``: time [s] within which axes that separate them are told apart by when they close, and corners on the side
+    of a face by whether they leave it; 0: by places alone, and four points at most, as in the textbook.
     ``advantage``: by how much of the smaller half extent two edges must separate boxes better than any face.
     """
     reach = margin * min(bodies.extent[a], bodies.extent[b])

@@ -30,7 +30,8 @@ from reference_solver.stepping.time_of_impact import (
 #: Overlap of bodies held in a phase, as a share of the smaller half width, at which their contact is another one: less
 #: than what a contact that is held may have (`phase.CLOSED`).
 SLIGHT = 2e-10
-#: Points of a face that are its own corners at most: where as many are pressed none is left to come down.
+#: As many corners of a convex polygon are never in line: where they are pressed faces lie on each other, and nothing is
+#: left to come down.
 CORNERS_OF_FACE = 4
 
 

@@ -18,8 +18,9 @@ CONTACTS, BODIES, VELOCITIES, TANGENTS = 0, 1, 2, 3
 SIZES = 4
 #: Modes of a contact. OPEN: it parts. STICK: its tangents are held. SLIP: friction mu times the load against the slip.
 OPEN, STICK, SLIP = 0, 1, 2
-#: Rows of the dense matrix of a phase; islands with more rows are stepped by the impulse-level scheme.
-MOST_ROWS = 64
+#: Rows of the dense matrix of a phase, such as five boxes turned against each other that stick in eight points each;
+#: islands with more rows are stepped by the impulse-level scheme.
+MOST_ROWS = 128
 #: Values of `Lasting.parts`: parts at the start of the phase, by noise; its features have ended.
 HOPS, GONE = 1, 2
 #: Contacts of a phase: each pressed one has a row at least.

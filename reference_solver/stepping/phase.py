@@ -352,8 +352,8 @@ def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
 def rises_first(bodies: Bodies, lasting: Lasting, which: int, what: int, length: float) -> bool:
     """Whether the way to an end of a feature that has fallen below zero grows where the phase begins.
 
-    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Bodies are left where
-    they are `GLANCE` of the phase later.
+    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Asked of bodies that
+    move: by their velocities at the start, and they are left where those take them in `GLANCE` of the phase.
     """
     go_back(bodies, lasting)
     for i in range(lasting.size[BODIES]):

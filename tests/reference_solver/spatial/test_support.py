@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from shapely import affinity
 from shapely.geometry import box as rectangle
 
-from reference_solver import Body, Box, Model, Settings, Simulation
+from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 GRAVITY = 9.81
@@ -65,3 +66,49 @@ def test_a_pressed_box_stands_while_what_presses_it_acts_over_the_shared_polygon
             arm = share * (corner - place)
             way = moved(lower, upper, place, yaw, (-GRAVITY * arm[1], GRAVITY * arm[0], 0.0))
             assert way < 1e-13 if stands else way > 1e-6
+
+
+@pytest.mark.parametrize("fixed_first", [True, False])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("velocity", [(0.4, 0.2), (0.4, 0.4), (0.4, 0.0), (-0.4, 0.2)])
+def test_a_corner_that_starts_on_a_corner_carries_on_either_way(fixed_first, sign, velocity):
+    """Slides straight on by its friction, whatever the order of the bodies, and mirrored."""
+    mu, time, steps = 0.3, 0.1, 12
+    v = np.array([sign * velocity[0], velocity[1], 0.0])
+    table = Body(Box((0.5, 0.5, 0.1)), pose=(0.0, 0.0, -0.1, *UPRIGHT), motion="fixed")
+    moments = ((0.09 + 4e-4) / 3.0,) * 2 + (0.06,)
+    free = Body(Box((0.3, 0.3, 0.02)), 1.0, moments, (0.2 * sign, 0.2, 0.02, *UPRIGHT), (*v, 0.0, 0.0, 0.0))
+    bodies = [table, free] if fixed_first else [free, table]
+    simulation = Simulation(Model(3, bodies, (0.0, 0.0, -GRAVITY), 0.0, mu), Settings.reference(time / steps))
+    simulation.advance(steps)
+    end = simulation.pose[1 if fixed_first else 0]
+    speed = float(np.linalg.norm(v))
+    stops = min(time, speed / (mu * GRAVITY))
+    way = speed * stops - 0.5 * mu * GRAVITY * stops**2
+    assert end[:3] == pytest.approx(np.array([0.2 * sign, 0.2, 0.02]) + way * v / speed, abs=1e-11)
+    assert simulation.certificate["holds"] and simulation.certificate["held_steps"] == 0
+
+
+def test_five_boxes_turned_against_each_other_tip_as_one():
+    """Thirty-four contacts that stick, more rows than 64: a single block on its edge, by an integration."""
+    count, half, height, lean = 5, 0.3, 0.4, math.atan(0.3) * 1.15
+    turn = [(math.cos(0.25 * (k % 2)), 0.0, 0.0, math.sin(0.25 * (k % 2))) for k in range(count)]
+    own = ((half**2 + 0.04) / 3.0,) * 2 + (2.0 * half**2 / 3.0,)
+    boxes = [
+        Body(Box((half, half, 0.2)), 1.0, own, (0.0, 0.0, 0.2 + height * k, *turn[k])) for k in range(count)
+    ]  # fmt: skip
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+    gravity = (GRAVITY * math.sin(lean), 0.0, -GRAVITY * math.cos(lean))
+    simulation = Simulation(Model(3, [floor, *boxes], gravity, 0.0, 3.0), Settings.reference(1 / 120))
+    simulation.advance(6)
+    # About the edge x = half: each box's own moment (its square base has one about any level axis) and its place.
+    arms = np.array([[-half, 0.2 + height * k] for k in range(count)])
+    moment = count * own[0] + (arms**2).sum()
+
+    def rate(_, state):
+        leans = lean + state[0]
+        return [state[1], GRAVITY * (arms[:, 1] * math.sin(leans) + arms[:, 0] * math.cos(leans)).sum() / moment]
+
+    spin = solve_ivp(rate, (0.0, 0.05), [0.0, 0.0], rtol=1e-12, atol=1e-15).y[1, -1]
+    assert simulation.certificate["held_steps"] == 0
+    assert simulation.twist[1:, 4] == pytest.approx(np.full(count, spin), rel=1e-9)
