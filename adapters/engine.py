@@ -85,6 +85,23 @@ class Declared:
     because: str = ""
 
 
+def _vectors(told: Sequence[Any], dimension: int) -> Array:
+    """Rows (k, d) of vectors; a number stands for a vector of it, as NaN does for an impulse that is not told.
+
+    Raises
+    ------
+    ValueError
+        For a vector of another dimension.
+    """
+    try:
+        found = np.array(told, float)
+    except ValueError:  # some are numbers
+        found = np.zeros(0)
+    if found.shape != (len(told), dimension):
+        found = np.array([np.broadcast_to(np.asarray(each, float), (dimension,)) for each in told])
+    return found
+
+
 @dataclass(frozen=True)
 class Contacts:
     """Contacts of one instant as arrays over k contacts; NaN where the engine does not say.
@@ -103,15 +120,15 @@ class Contacts:
     @classmethod
     def from_rows(cls, rows: Sequence[tuple[int, int, Any, Any, Any, float]], dimension: int) -> Contacts:
         """Build from ``(a, b, point, normal, impulse, gap)`` rows; pairs are turned so that a < b."""
-        k = len(rows)
-        a, b = np.zeros(k, np.int64), np.zeros(k, np.int64)
-        point, normal, impulse = (np.zeros((k, dimension)) for _ in range(3))
-        gap = np.zeros(k)
-        for row, (i, j, p, n, f, g) in enumerate(rows):
-            sign = 1.0 if i < j else -1.0
-            a[row], b[row], gap[row] = min(i, j), max(i, j), g
-            point[row], normal[row], impulse[row] = p, np.multiply(sign, n), np.multiply(sign, f)
-        return cls(a, b, point, normal, impulse, gap)
+        if not rows:
+            none, nowhere = np.zeros(0, np.int64), np.zeros((0, dimension))
+            return cls(none, none.copy(), nowhere, nowhere.copy(), nowhere.copy(), np.zeros(0))
+        first, second, points, normals, impulses, gaps = zip(*rows, strict=True)
+        i, j = np.array(first, np.int64), np.array(second, np.int64)
+        sign = np.where(i < j, 1.0, -1.0)[:, None]
+        a, b, gap = np.minimum(i, j), np.maximum(i, j), np.array(gaps, float)
+        point, normal, impulse = (_vectors(told, dimension) for told in (points, normals, impulses))
+        return cls(a, b, point, sign * normal, sign * impulse, gap)
 
 
 class Simulation(ABC):

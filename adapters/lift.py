@@ -119,14 +119,19 @@ def lower_pose(pose: Array) -> tuple[Array, float]:
     w, qx, qy, qz = pose[:, 3:].T
     theta = -2.0 * np.arctan2(qy, w)
     theta = np.arctan2(np.sin(theta), np.cos(theta))
-    outside = max(float(np.abs(pose[:, 1]).max()), 2.0 * float(np.hypot(qx, qz).max()))
+    outside = max(_largest(pose[:, 1]), 2.0 * _largest(np.hypot(qx, qz)))
     return np.column_stack([pose[:, 0], pose[:, 2], theta]), outside
 
 
 def lower_twist(twist: Array) -> tuple[Array, float]:
     """Planar twists (n, 3) of spatial ones (n, 6), and the largest component out of the plane [m/s, rad/s]."""
-    outside = float(np.abs(twist[:, [1, 3, 5]]).max())
+    outside = _largest(twist[:, [1, 3, 5]])
     return np.column_stack([twist[:, 0], twist[:, 2], -twist[:, 4]]), outside
+
+
+def _largest(values: Array) -> float:
+    """Largest size of those that are numbers: what a run has left the plane by is told also where it ends in NaN."""
+    return float(np.fmax.reduce(np.abs(values), axis=None, initial=0.0))
 
 
 def lower_contacts(contacts: Contacts) -> Contacts:

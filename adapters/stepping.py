@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from adapters.drives import as_moving, asked_abilities, top_speed
-from adapters.engine import Contacts, Engine, EngineError, Simulation
+from adapters.engine import Array, Contacts, Engine, EngineError, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.scene import Body, Scene
 from adapters.shapes import reach
@@ -27,52 +28,75 @@ from adapters.trajectory import ContactRecord, Sampling, Trajectory
 EXPLOSION_FACTOR = 1e3
 
 
-class PlanarView:
-    """Reads a lifted simulation as a planar one and remembers the largest departure from the plane."""
+#: States that are read as the scene's own at once: enough that a read costs little, and little memory beside a run.
+AT_ONCE = 1024
+CONTACT_FIELDS = tuple(field.name for field in fields(Contacts))
 
-    def __init__(self, inner: Simulation) -> None:
-        self.inner = inner
+
+class _Seen:
+    """States of a run as the engine gives them, read as the scene's own once it is over: many at once cost little.
+
+    Parameters
+    ----------
+    flat
+        A planar scene that ran lifted.
+    standing
+        Bodies that move so that their surfaces run: they stay where the scene has them.
+    limit
+        Speed that nothing in the scene explains [m/s].
+    """
+
+    def __init__(self, scene: Scene, flat: bool, standing: Sequence[int], limit: float) -> None:
+        self.dimension, self.flat, self.standing, self.limit = scene.dimension, flat, list(standing), limit
+        self.places = np.array([scene.bodies[i].pose for i in standing])
+        self.poses: list[Array] = []
+        self.twists: list[Array] = []
+        self.read: list[tuple[Array, Array]] = []
         self.outside = 0.0
 
-    def pose(self) -> np.ndarray:
-        """Planar poses (n, 3)."""
-        pose, outside = lower_pose(self.inner.pose())
+    def look(self, simulation: Simulation) -> None:
+        """Keep the state of this instant: copies, for what a simulation gives may be its own."""
+        if len(self.poses) == AT_ONCE:
+            self._read_all()
+        self.poses.append(np.array(simulation.pose()))
+        self.twists.append(np.array(simulation.twist()))
+
+    def divergence(self) -> str:
+        """Why the last state is none; empty if it is one.
+
+        Sums of squares tell most states that are in order, in a tenth of the time: where they are finite, so is all
+        that they are made of, and none of it is larger than their root.
+        """
+        pose, twist = self.poses[-1], self.twists[-1]
+        if np.vdot(twist, twist) < 0.5 * self.limit * self.limit and math.isfinite(np.vdot(pose, pose)):
+            return ""
+        (pose,), (twist,), _ = self._lowered(pose[None], twist[None])
+        return _divergence(pose, twist, self.dimension, self.limit)
+
+    def states(self) -> tuple[Array, Array, float]:
+        """Poses and twists of all instants, and the largest departure from the plane of a lifted scene."""
+        self._read_all()
+        pose, twist = (np.concatenate(parts) for parts in zip(*self.read, strict=True))
+        return pose, twist, self.outside
+
+    def _read_all(self) -> None:
+        pose, twist, outside = self._lowered(np.array(self.poses), np.array(self.twists))
+        self.read.append((pose, twist))
         self.outside = max(self.outside, outside)
-        return pose
+        self.poses, self.twists = [], []
 
-    def twist(self) -> np.ndarray:
-        """Planar twists (n, 3)."""
-        twist, outside = lower_twist(self.inner.twist())
-        self.outside = max(self.outside, outside)
-        return twist
-
-    def contacts(self) -> Contacts:
-        """Planar contacts."""
-        return lower_contacts(self.inner.contacts())
-
-
-class StandingView:
-    """Reads a simulation in which some bodies move so that their surfaces run: they stay where the scene has them."""
-
-    def __init__(self, inner: Simulation | PlanarView, scene: Scene, standing: Sequence[int]) -> None:
-        self.inner, self.standing = inner, list(standing)
-        self.places = np.array([scene.bodies[i].pose for i in standing])
-
-    def pose(self) -> np.ndarray:
-        """Poses (n, 3) or (n, 7)."""
-        pose = self.inner.pose()
-        pose[self.standing] = self.places
-        return pose
-
-    def twist(self) -> np.ndarray:
-        """Twists (n, 3) or (n, 6)."""
-        twist = self.inner.twist()
-        twist[self.standing] = 0.0
-        return twist
-
-    def contacts(self) -> Contacts:
-        """Contacts as they are."""
-        return self.inner.contacts()
+    def _lowered(self, pose: Array, twist: Array) -> tuple[Array, Array, float]:
+        outside = 0.0
+        if self.flat:
+            samples = pose.shape[:2]
+            flat_pose, off_place = lower_pose(pose.reshape(-1, 7))
+            flat_twist, off_speed = lower_twist(twist.reshape(-1, 6))
+            outside = max(outside, off_place, off_speed)
+            pose, twist = flat_pose.reshape(*samples, 3), flat_twist.reshape(*samples, 3)
+        if self.standing:
+            pose[:, self.standing] = self.places
+            twist[:, self.standing] = 0.0
+        return pose, twist, outside
 
 
 def posed_for(engine: Engine, scene: Scene) -> Scene:
@@ -154,38 +178,36 @@ def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[in
 def _record(
     simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float
 ) -> Trajectory:
-    plane = PlanarView(simulation) if posed.dimension != scene.dimension else None
-    view: Simulation | PlanarView | StandingView = plane or simulation
+    flat = posed.dimension != scene.dimension
     pairs = enumerate(zip(scene.bodies, posed.bodies, strict=True))
     standing = [i for i, (asked, body) in pairs if asked.motion != body.motion]
-    if standing:
-        view = StandingView(plane or simulation, scene, standing)
-    limit = EXPLOSION_FACTOR * _fastest(scene)
-    poses, twists, steps_at = [view.pose()], [view.twist()], [0]
+    seen = _Seen(scene, flat, standing, EXPLOSION_FACTOR * _fastest(scene))
+    seen.look(simulation)
+    steps_at = [0]
     collected: list[tuple[int, Contacts]] = []
     finish, reason = "completed", ""
     for done in advances(simulation, step_count(scene.duration, dt), sampling.stride):
-        poses.append(view.pose())
-        twists.append(view.twist())
+        seen.look(simulation)
         steps_at.append(done)
         if sampling.contacts_from is not None and done * dt > sampling.contacts_from - 0.5 * dt:
-            collected.append((len(poses) - 1, view.contacts()))
-        reason = _divergence(poses[-1], twists[-1], scene.dimension, limit)
+            collected.append((len(steps_at) - 1, _kept(simulation.contacts())))
+        reason = seen.divergence()
         if reason:
             finish, reason = "diverged", f"{reason} at t = {done * dt:.6g} s"
             break
+    pose, twist, outside = seen.states()
     return Trajectory(
         t=np.array(steps_at) * dt,
-        pose=np.array(poses),
-        twist=np.array(twists),
-        contacts=_join(collected, scene.dimension) if sampling.contacts_from is not None else None,
+        pose=pose,
+        twist=twist,
+        contacts=_join(collected, posed.dimension, flat) if sampling.contacts_from is not None else None,
         dt=dt,
         finish="diverged" if finish == "diverged" else "completed",
         reason=reason,
         initial_change=tuple(simulation.initial_change),
         readback=simulation.readback(),
         certificate=simulation.certificate(),
-        out_of_plane=plane.outside if plane else 0.0,
+        out_of_plane=outside,
         wall_time=time.perf_counter() - started,
     )
 
@@ -211,10 +233,15 @@ def _divergence(pose: np.ndarray, twist: np.ndarray, dimension: int, limit: floa
     return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it" if fastest > limit else ""
 
 
-def _join(collected: list[tuple[int, Contacts]], dimension: int) -> ContactRecord:
+def _kept(contacts: Contacts) -> Contacts:
+    """Copies, for what a simulation gives may be its own."""
+    return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
+
+
+def _join(collected: list[tuple[int, Contacts]], dimension: int, flat: bool) -> ContactRecord:
     offset = np.cumsum([0] + [len(contacts.a) for _, contacts in collected])
     empty = Contacts.from_rows([], dimension)
     parts = [empty] + [contacts for _, contacts in collected]
-    fields = ("a", "b", "point", "normal", "impulse", "gap")
-    rows = Contacts(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields))
+    rows = Contacts(*(np.concatenate([getattr(part, name) for part in parts]) for name in CONTACT_FIELDS))
+    rows = lower_contacts(rows) if flat else rows
     return ContactRecord(np.array([index for index, _ in collected], np.int64), offset.astype(np.int64), rows)

@@ -77,7 +77,10 @@ class BulletSimulation(Simulation):
             raise EngineError("pairs: no product of two bodies' values gives this table of materials")
         self._ids: list[int] = []
         self._mass: list[float] = []
-        self._offset: list[tuple[float, ...]] = []
+        self._offset: list[tuple[float, ...]] = []  # of the centre of what stands for a body from the scene's pose
+        faces = [(i, body.pose[3:]) for i, body in enumerate(scene.bodies) if isinstance(body.shape, HalfSpace)]
+        self._faces = [i for i, _ in faces]
+        self._normals = np.array([turn for _, turn in faces]).reshape(-1, 4)
         for i, body in enumerate(scene.bodies):
             self._add(i, body, heaviest, restitution[i], friction[i])
         self._index = {identifier: i for i, identifier in enumerate(self._ids)}
@@ -206,36 +209,33 @@ class BulletSimulation(Simulation):
 
     def pose(self) -> Array:
         """Poses (n, 7); that of a half-space without the shift to the box that stands for it."""
-        pose = np.empty((len(self._ids), 7))
-        for i, identifier in enumerate(self._ids):
-            position, (x, y, z, w) = self._p.getBasePositionAndOrientation(identifier, physicsClientId=self._client)
-            pose[i, :3] = np.subtract(position, self._offset[i])
-            half_space = isinstance(self._scene.bodies[i].shape, HalfSpace)
-            pose[i, 3:] = self._scene.bodies[i].pose[3:] if half_space else (w, x, y, z)
+        ask, client = self._p.getBasePositionAndOrientation, self._client
+        told = np.array([(*place, *turn) for place, turn in (ask(i, physicsClientId=client) for i in self._ids)])
+        pose = told[:, [0, 1, 2, 6, 3, 4, 5]]  # w last in Bullet
+        pose[:, :3] -= self._offset
+        pose[self._faces, 3:] = self._normals
         return pose
 
     def twist(self) -> Array:
         """Twists (n, 6) of the centres of mass in world axes."""
-        twist = np.empty((len(self._ids), 6))
-        for i, identifier in enumerate(self._ids):
-            linear, angular = self._p.getBaseVelocity(identifier, physicsClientId=self._client)
-            twist[i, :3], twist[i, 3:] = linear, angular
-        return twist
+        ask, client = self._p.getBaseVelocity, self._client
+        return np.array([(*v, *w) for v, w in (ask(i, physicsClientId=client) for i in self._ids)])
 
     def contacts(self) -> Contacts:
         """Contact points with normal and friction impulses; gaps are those at the start of the last step."""
-        rows = []
-        for point in self._p.getContactPoints(physicsClientId=self._client):
-            a, b = point[1], point[2]
-            on_a, on_b, normal_on_b, gap = point[5:9]
-            impulse = np.zeros(3)
-            if gap <= self._solved_gap:
-                forces = ((point[9], normal_on_b), (point[10], point[11]), (point[12], point[13]))
-                # Bullet's impulses act on A, along the normal that points from B to A.
-                impulse = -self._dt * sum(f * np.asarray(direction) for f, direction in forces)
-            middle = 0.5 * np.add(on_a, on_b)
-            rows.append((self._index[a], self._index[b], middle, np.negative(normal_on_b), impulse, gap))
-        return Contacts.from_rows(rows, 3)
+        told = self._p.getContactPoints(physicsClientId=self._client)
+        if not told:
+            return Contacts.from_rows([], 3)
+        points = list(zip(*told, strict=True))
+        a, b = ([self._index[body] for body in points[column]] for column in (1, 2))
+        on_a, on_b, normal, along, across = (np.array(points[column]) for column in (5, 6, 7, 11, 13))
+        gap, *forces = (np.array(points[column])[:, None] for column in (8, 9, 10, 12))
+        # Bullet's impulses act on A, along the normal that points from B to A. The sum starts from zero, so that one of
+        # negative zeros is zero.
+        pushed = 0.0 + forces[0] * normal + forces[1] * along + forces[2] * across
+        impulse = np.where(gap <= self._solved_gap, -self._dt * pushed, 0.0)
+        rows = zip(a, b, 0.5 * (on_a + on_b), -normal, impulse, gap[:, 0], strict=True)
+        return Contacts.from_rows(list(rows), 3)
 
     def _dynamics(self, index: int) -> dict[str, Any]:
         info = self._p.getDynamicsInfo(self._ids[index], -1, physicsClientId=self._client)

@@ -33,6 +33,11 @@ _AT_ONCE: _Settings = {"relaxation_time": 0.0}
 _SLOWLY: _Settings = {"dissipation": 1e6}
 #: Hunt's and Crossley's dissipation in SAP's convex step.
 _BOUNDED: _Settings = {"approximation": "similar"}
+_HARD_AND_BOUNDED: _Settings = {**_BOUNDED, **_HARDEST}
+#: What sinks and relaxes: neither of the two does it alone, nor does what mends relaxing elsewhere.
+_EACH_ALONE: tuple[_Settings, ...] = (_BOUNDED, _HARDEST, _AT_ONCE)
+#: Friction by the load of the step, and slower slips that are viscous.
+_STICKS_BY_LOAD: _Settings = {**_IMPLICIT, **_STICKS}
 
 _SAYS = {
     "relaxes-and-sinks": "where Hunt and Crossley bound what parts, and a heavy box finds harder ones, it passes",
@@ -47,6 +52,8 @@ _SAYS = {
 }
 #: A slim block that is let go from far out.
 _SLIM: dict[str, float] = {"aspect": 0.5, "tilt": 0.7}
+#: A cube on a table that is tilted beyond the angle at which it slides.
+_CUBE: dict[str, float] = {"aspect": 1.0, "ratio": 1.1}
 #: Family, profile, dimension, metric and parameters of a row; the settings that cure it, and those that must not.
 _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Settings, ...]], ...] = (
     ("far-origin-glides", "sap", 2, "braking", {}, _IMPLICIT, (_SOFT,)),
@@ -64,15 +71,7 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("hilltop-glides", "sap", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
     ("hilltop-glides", "similar", 2, "level_speed", {"mu": 0.1}, _IMPLICIT, (_SOFT,)),
     ("heavy-on-light-relaxes-and-sinks", "sap", 2, "penetration", {}, _BOUNDED, (_AT_ONCE, _HARDEST)),
-    (
-        "heavy-on-light-relaxes-and-sinks",
-        "sap",
-        2,
-        "penetration",
-        {"ratio": 1e4},
-        {**_BOUNDED, **_HARDEST},
-        (_BOUNDED, _HARDEST, _AT_ONCE),
-    ),
+    ("heavy-on-light-relaxes-and-sinks", "sap", 2, "penetration", {"ratio": 1e4}, _HARD_AND_BOUNDED, _EACH_ALONE),
     ("heavy-on-light-relaxes-and-sinks", "sap", 2, "interface_impulse[1]", {"ratio": 1e4}, _BOUNDED, (_HARDEST,)),
     ("incline-glides", "sap", 2, "threshold", {}, _IMPLICIT, (_SOFT,)),
     ("overhang-throws", "default", 2, "kinetic_energy", {}, _SLOWLY, (_STICKS, _HARD)),
@@ -82,15 +81,7 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("overhang-throws", "similar", 2, "impulse_scatter", {}, _SLOWLY, ()),
     ("overhang-throws", "sap", 2, "penetration", {}, {**_BOUNDED, **_SLOWLY}, (_BOUNDED, _AT_ONCE)),
     ("pinch-glides-and-creeps", "similar", 2, "creep", {}, _STICKS, (_SOFT, _HARD)),
-    (
-        "pinch-glides-and-creeps",
-        "similar",
-        2,
-        "creep",
-        {"margin": 1.05},
-        {**_IMPLICIT, **_STICKS},
-        (_IMPLICIT, _STICKS),
-    ),
+    ("pinch-glides-and-creeps", "similar", 2, "creep", {"margin": 1.05}, _STICKS_BY_LOAD, (_IMPLICIT, _STICKS)),
     ("rocking-block-lands-on-a-face", "tamsi", 2, "amplitude[1]", _SLIM, _HARDEST, (_STICKS,)),
     ("rocking-block-lands-on-a-face", "default", 2, "amplitude[2]", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST, _IMPLICIT)),
     ("rocking-block-lands-on-a-face", "default", 2, "slid", _SLIM, _HARD_AND_IMPLICIT, (_HARDEST,)),
@@ -141,18 +132,10 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("slide-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("slide-to-roll-glides", "sap", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
     ("slide-to-roll-glides", "similar", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
-    (
-        "tilt-table-friction-by-an-earlier-load",
-        "default",
-        2,
-        "acceleration",
-        {"aspect": 1.0, "ratio": 1.1},
-        _IMPLICIT,
-        (_STICKS,),
-    ),
-    ("tilt-table-glides", "sap", 2, "acceleration", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_SOFT,)),
-    ("tilt-table-glides", "sap", 2, "turned", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_SOFT,)),
-    ("tilt-table-glides", "similar", 2, "acceleration", {"aspect": 1.0, "ratio": 1.1}, _IMPLICIT, (_STICKS,)),
+    ("tilt-table-friction-by-an-earlier-load", "default", 2, "acceleration", _CUBE, _IMPLICIT, (_STICKS,)),
+    ("tilt-table-glides", "sap", 2, "acceleration", _CUBE, _IMPLICIT, (_SOFT,)),
+    ("tilt-table-glides", "sap", 2, "turned", _CUBE, _IMPLICIT, (_SOFT,)),
+    ("tilt-table-glides", "similar", 2, "acceleration", _CUBE, _IMPLICIT, (_STICKS,)),
 )
 
 

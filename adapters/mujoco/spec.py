@@ -35,13 +35,13 @@ def has_joint(body: Body) -> bool:
 
 def rotation(quaternion: Array) -> Array:
     """Matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T
+    w, x, y, z = (quaternion / np.sqrt((quaternion * quaternion).sum(axis=1, keepdims=True))).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def _turn_z_to(normal: tuple[float, ...]) -> list[float]:

@@ -9,7 +9,17 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.lasting import BODIES, CONTACTS, OPEN, SLIP, STICK, TANGENTS, VELOCITIES, Lasting
+from reference_solver.stepping.lasting import (
+    BODIES,
+    CONTACTS,
+    OPEN,
+    SLIP,
+    STICK,
+    TANGENTS,
+    VELOCITIES,
+    Indices,
+    Lasting,
+)
 
 #: What the rows of a phase are: independent; redundant, with forces that are not unique; contradictory.
 INDEPENDENT, REDUNDANT, CONTRADICTORY = 0, 1, 2
@@ -35,13 +45,19 @@ def list_rows(lasting: Lasting) -> int:
     for k in range(lasting.size[CONTACTS]):
         if lasting.mode[k] == OPEN:
             continue
-        held = 1 + (lasting.size[TANGENTS] if lasting.mode[k] == STICK else 0)
+        held = held_rows(lasting, k)
         if count + held > len(lasting.right):
             return -1
         for row in range(held):
             lasting.unknown[count, 0], lasting.unknown[count, 1] = k, row
             count += 1
     return count
+
+
+@inner_kernel
+def held_rows(lasting: Lasting, k: int) -> int:
+    """Equalities of a contact that is not open: of its normal, and of its tangents where it sticks."""
+    return 1 + (lasting.size[TANGENTS] if lasting.mode[k] == STICK else 0)
 
 
 @inner_kernel
@@ -56,23 +72,40 @@ def effect(lasting: Lasting, sliding: bool, k: int, side: int, row: int, d: int)
 
 @inner_kernel
 def assemble(lasting: Lasting, count: int, sliding: bool) -> None:
-    """Fill the matrix of the equalities; ``sliding``: with the friction of slips."""
+    """Fill the matrix of the equalities; ``sliding``: with the friction of slips.
+
+    Most contacts share no body: whether two do is asked before anything is multiplied.
+    """
     for j in range(count):
         kj, rj = lasting.unknown[j, 0], lasting.unknown[j, 1]
         for i in range(count):
             lasting.matrix[i, j] = 0.0
         for side in range(2):
             body = lasting.body[kj, side]
+            moves = False
             for d in range(lasting.size[VELOCITIES]):
-                change = effect(lasting, sliding, kj, side, rj, d)
-                if change == 0.0:
-                    continue
-                for i in range(count):
-                    ki, ri = lasting.unknown[i, 0], lasting.unknown[i, 1]
-                    if lasting.body[ki, 0] == body:
-                        lasting.matrix[i, j] += lasting.jacobian[ki, 0, ri, d] * change
-                    if lasting.body[ki, 1] == body:
-                        lasting.matrix[i, j] += lasting.jacobian[ki, 1, ri, d] * change
+                lasting.change[d] = effect(lasting, sliding, kj, side, rj, d)
+                moves = moves or lasting.change[d] != 0.0
+            if not moves:
+                continue
+            for i in range(count):
+                ki = lasting.unknown[i, 0]
+                if lasting.body[ki, 0] == body or lasting.body[ki, 1] == body:
+                    ri = lasting.unknown[i, 1]
+                    lasting.matrix[i, j] = row_change(lasting, ki, ri, body, lasting.matrix[i, j])
+
+
+@inner_kernel
+def row_change(lasting: Lasting, k: int, row: int, body: int, before: float) -> float:
+    """What row of contact k says to the `change` of a body's velocities, added to ``before``."""
+    total = before
+    for d in range(lasting.size[VELOCITIES]):
+        if lasting.change[d] == 0.0:
+            continue
+        for side in range(2):
+            if lasting.body[k, side] == body:
+                total += lasting.jacobian[k, side, row, d] * lasting.change[d]
+    return total
 
 
 @inner_kernel
@@ -87,13 +120,24 @@ def row_scale(lasting: Lasting, i: int) -> float:
 
 
 @inner_kernel
+def list_entries(matrix: Array, i: int, first: int, count: int, filled: Indices) -> int:
+    """List the columns from ``first`` on in which row i is not zero, in order; how many there are."""
+    entries = 0
+    for c in range(first, count):
+        if matrix[i, c] != 0.0:
+            filled[entries] = c
+            entries += 1
+    return entries
+
+
+@inner_kernel
 def eliminate(lasting: Lasting, count: int) -> bool:
     """Solve for `answer` by elimination with row interchanges; False where a pivot is round-off.
 
     Pivots are compared as entries over the roots of both rows' scales, squared: no root is taken, so that units of
     powers of two change no bit.
     """
-    factor, x, scale = lasting.factor, lasting.answer, lasting.spare
+    factor, x, scale, filled = lasting.factor, lasting.answer, lasting.spare, lasting.filled
     for i in range(count):
         scale[i] = lasting.other[i] = row_scale(lasting, i)
         if scale[i] == 0.0:
@@ -116,16 +160,18 @@ def eliminate(lasting: Lasting, count: int) -> bool:
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
             x[j], x[best] = x[best], x[j]
             scale[j], scale[best] = scale[best], scale[j]
+        entries = list_entries(factor, j, j + 1, count, filled)
         for i in range(j + 1, count):
-            share = factor[i, j] / factor[j, j]
-            if share != 0.0:
-                for c in range(j + 1, count):
-                    factor[i, c] -= share * factor[j, c]
+            if factor[i, j] != 0.0:
+                share = factor[i, j] / factor[j, j]
+                for e in range(entries):
+                    factor[i, filled[e]] -= share * factor[j, filled[e]]
                 x[i] -= share * x[j]
     for j in range(count - 1, -1, -1):
+        left = x[j]
         for c in range(j + 1, count):
-            x[j] -= factor[j, c] * x[c]
-        x[j] /= factor[j, j]
+            left -= factor[j, c] * x[c]
+        x[j] = left / factor[j, j]
     return True
 
 
@@ -144,7 +190,7 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
     method without roots, with interchanges, which ends where pivots are round-off, and corrections of what squaring
     cost.
     """
-    factor, x, y, order = lasting.factor, lasting.answer, lasting.spare, lasting.order
+    x, y, order, filled = lasting.answer, lasting.spare, lasting.order, lasting.filled
     largest = 0.0
     for j in range(count):
         largest = max(largest, force_weight(lasting, j) * row_scale(lasting, j))
@@ -155,35 +201,56 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
         x[j] = told * lasting.usual[lasting.unknown[j, 0], lasting.unknown[j, 1]]
         order[j] = j
     for i in range(count):
-        for j in range(i + 1):
-            total = 0.0
-            for c in range(count):
-                total += lasting.matrix[i, c] * lasting.weight[c] * lasting.matrix[j, c]
-            factor[i, j] = factor[j, i] = total
+        square_row(lasting, i, list_entries(lasting.matrix, i, 0, count, filled))
     rank = decompose(lasting, count)
     miss = 0.0
     for _ in range(CORRECTIONS):
         for i in range(count):
-            y[i] = lasting.right[i]
+            left = lasting.right[i]
             for c in range(count):
-                y[i] -= lasting.matrix[i, c] * x[c]
+                left -= lasting.matrix[i, c] * x[c]
+            y[i] = left
         miss = 0.0
         for i in range(count):
             size = abs(lasting.right[i]) + lasting.scale[lasting.unknown[i, 0]]
             miss = max(miss, abs(y[i]) / size if size > 0.0 else 0.0)
         substitute(lasting, count, rank)
+        change = lasting.other
         for c in range(count):
-            change = 0.0
-            for i in range(count):
-                change += lasting.matrix[i, c] * y[i]
-            x[c] += lasting.weight[c] * change
+            change[c] = 0.0
+        for i in range(count):
+            for c in range(count):
+                change[c] += lasting.matrix[i, c] * y[i]
+        for c in range(count):
+            x[c] += lasting.weight[c] * change[c]
     return REDUNDANT if miss <= CONSISTENT else CONTRADICTORY
 
 
 @inner_kernel
+def square_row(lasting: Lasting, i: int, entries: int) -> None:
+    """Row i of A W A^T up to its diagonal, into `factor`; ``entries`` of A's row are listed.
+
+    Four sums at a time: a processor does not wait for one to be added before it begins the next.
+    """
+    matrix, factor, weighed, filled = lasting.matrix, lasting.factor, lasting.other, lasting.filled
+    for e in range(entries):
+        weighed[e] = matrix[i, filled[e]] * lasting.weight[filled[e]]
+    for first in range(0, i + 1, 4):
+        j, k, m = min(first + 1, i), min(first + 2, i), min(first + 3, i)
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for e in range(entries):
+            at = filled[e]
+            a += weighed[e] * matrix[first, at]
+            b += weighed[e] * matrix[j, at]
+            c += weighed[e] * matrix[k, at]
+            d += weighed[e] * matrix[m, at]
+        factor[i, first], factor[i, j], factor[i, k], factor[i, m] = a, b, c, d
+
+
+@inner_kernel
 def decompose(lasting: Lasting, count: int) -> int:
-    """Factors L D L^T of `factor` with interchanges noted in `order`, in place; its rank."""
-    factor, order = lasting.factor, lasting.order
+    """Factors L D L^T of the lower half of `factor` with interchanges noted in `order`, in place; its rank."""
+    factor, column = lasting.factor, lasting.other
     first = 0.0
     for j in range(count):
         best = j
@@ -196,18 +263,30 @@ def decompose(lasting: Lasting, count: int) -> int:
         if not pivot > RANK_SQUARED * first:
             return j
         if best != j:
-            order[j], order[best] = order[best], order[j]
-            for c in range(count):
-                factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
-            for c in range(count):
-                factor[c, j], factor[c, best] = factor[c, best], factor[c, j]
+            interchange(lasting, count, j, best)
         for i in range(j + 1, count):
             factor[i, j] /= pivot
+            column[i] = factor[i, j]
         for i in range(j + 1, count):
-            for c in range(j + 1, i + 1):
-                factor[i, c] -= factor[i, j] * pivot * factor[c, j]
-                factor[c, i] = factor[i, c]
+            if column[i] != 0.0:
+                share = column[i] * pivot
+                for c in range(j + 1, i + 1):
+                    factor[i, c] -= share * column[c]
     return count
+
+
+@inner_kernel
+def interchange(lasting: Lasting, count: int, j: int, best: int) -> None:
+    """Put row and column ``best`` of a symmetric matrix, whose lower half `factor` has, before those from j on."""
+    factor, order = lasting.factor, lasting.order
+    order[j], order[best] = order[best], order[j]
+    factor[j, j], factor[best, best] = factor[best, best], factor[j, j]
+    for c in range(j):
+        factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
+    for c in range(j + 1, best):
+        factor[c, j], factor[best, c] = factor[best, c], factor[c, j]
+    for c in range(best + 1, count):
+        factor[c, j], factor[c, best] = factor[c, best], factor[c, j]
 
 
 @inner_kernel
@@ -215,13 +294,15 @@ def substitute(lasting: Lasting, count: int, rank: int) -> None:
     """Solution of the decomposed system for the right side `spare`, in place; zero for what is redundant."""
     factor, y, order, z = lasting.factor, lasting.spare, lasting.order, lasting.other
     for i in range(rank):
-        z[i] = y[order[i]]
+        left = y[order[i]]
         for c in range(i):
-            z[i] -= factor[i, c] * z[c]
+            left -= factor[i, c] * z[c]
+        z[i] = left
     for i in range(rank - 1, -1, -1):
-        z[i] /= factor[i, i]
+        left = z[i] / factor[i, i]
         for c in range(i + 1, rank):
-            z[i] -= factor[c, i] * z[c]
+            left -= factor[c, i] * z[c]
+        z[i] = left
     for i in range(count):
         y[i] = 0.0
     for i in range(rank):

@@ -87,6 +87,8 @@ class Lasting(NamedTuple):
     weight: Array  # (R,)
     wanted: Array  # (T,)
     order: Indices  # (R,)
+    filled: Indices  # (R,): columns of a row that are not zero
+    change: Array  # (V,): of the velocities of a body by a unit of force
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
     monitor: Array  # (PLACES_WATCHED, k, FEATURE + LIMITS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
@@ -146,6 +148,8 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         weight=np.zeros(r),
         wanted=np.zeros(t),
         order=np.zeros(r, np.int64),
+        filled=np.zeros(r, np.int64),
+        change=np.zeros(v),
         unknown=np.zeros((r, 2), np.int64),
         monitor=np.zeros((PLACES_WATCHED, k, FEATURE + LIMITS[dimension])),
         length=np.zeros(1),

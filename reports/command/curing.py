@@ -21,7 +21,7 @@ from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
 from validation.catalogue import matching
-from validation.settings.cures import Changes, Cure, cures_of, search, write
+from validation.settings.cures import Changes, Cure, Unsearched, cures_of, search, write
 
 
 @main.command()
@@ -54,7 +54,7 @@ def cure(engine: str, scenes: tuple[str, ...], dim: tuple[int, ...], jobs: int, 
             progress.print(f"{engine} {name} {dimension}-D", style="dim", markup=False, highlight=False)
             result = search(engine, name, dimension, jobs)
             listed.pop((name, dimension), None)
-            if result is not None:
+            if isinstance(result, Cure):
                 listed[name, dimension] = result
                 found.append(result)
             if keep:
@@ -73,10 +73,11 @@ def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
     write([listed[key] for key in sorted(listed)], folder / CURES)
 
 
-def _show(engine: str, scene: str, dimension: int, found: Cure | None, console: Console) -> None:
+def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, console: Console) -> None:
     head = Text(f"{engine} {scene} {dimension}-D: ", style="bold")
-    if found is None:
-        console.print(head + Text("as shipped it fails no check of it, or it cannot be asked of it", style=""))
+    if isinstance(found, Unsearched):
+        told = "as shipped nothing is to be mended" if found.asked else "cannot be asked"
+        console.print(head + Text(f"{told}: {found.reason}", style=""), soft_wrap=True)
         return
     console.print(head + Text(f"{found.failing} of {found.judged} checks fail as shipped"), soft_wrap=True)
     if not found.helps:

@@ -16,6 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
 from reference_solver.certification.fuzz.trial import attack
 from reports.wording import number
@@ -50,7 +51,7 @@ def serve(connection: Connection) -> None:
         try:
             answer = attack(seed, dimension).as_dict()
         except Exception as error:  # a scene that breaks the solver is a find like any other
-            answer = {"seed": seed, "dimension": dimension, "broken": f"{type(error).__name__}: {error}"}
+            answer = {"seed": seed, "dimension": dimension, "broken": said_by(error)}
         connection.send_bytes(json.dumps(answer).encode())
 
 
@@ -143,7 +144,7 @@ def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> 
                 f"DEFECT seed {answer['seed']}, {name}: {apart:.2e} m apart at {t:.3g} s, both bounds {allowed:.2e} m"
             )
     for answer in broken:
-        console.print(f"NO ANSWER seed {answer['seed']}: {answer['broken']}")
+        console.print(f"NO ANSWER seed {answer['seed']}: {answer['broken']}", soft_wrap=True)
     return len(differs) + len(broken)
 
 

@@ -166,6 +166,14 @@ def test_tilted_half_space_returns_a_ball_along_its_own_normal():
     assert np.allclose(end, velocity + (1.0 + 0.5) * 3.0 * normal, rtol=0.0, atol=1e-12)
 
 
+def test_half_spaces_are_read_back_with_the_poses_that_the_scene_gives_them():
+    """A box stands for each, turned and shifted: that is no one else's business."""
+    face = Body("face", HalfSpace((0.6, 0.0, 0.8), 0.2), motion="fixed")
+    record = drive(scene_of(FLOOR, face, ball(5.0), gravity=(0.0, 0.0, 0.0), duration=0.1))
+    # 1e-12 m: the shift of a box 400 m wide, added and taken away again
+    assert np.allclose(record.pose[:, :2], (0.0, 0.0, 0.0, *UPRIGHT), rtol=0.0, atol=1e-12)
+
+
 # ---- impulses ----------------------------------------------------------------------------------------------------
 
 

@@ -257,6 +257,52 @@ def test_what_leaves_the_plane_at_any_sample_is_kept() -> None:
     assert run(Toy({3}, sideways), scene(), 0.1, {}).out_of_plane == 0.125
 
 
+def test_what_has_left_the_plane_is_kept_where_a_run_ends_in_what_is_no_number() -> None:
+    def sideways(flight: Flight) -> None:
+        flight._twist[0, 1] = 0.125 if flight.steps == 3 else 0.0
+        if flight.steps == 5:
+            flight._twist[0] = math.nan
+
+    trajectory = run(Toy({3}, sideways), scene(), 0.1, {})
+    assert trajectory.finish == "diverged" and trajectory.out_of_plane == 0.125
+
+
+def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def sideways(flight: Flight) -> None:
+        flight._twist[0, 1] = 0.125 if flight.steps == 2 else 0.0
+
+    whole = run(Toy({3}, sideways), scene(), 0.1, {})
+    for at_once in (1, 3, 11):
+        monkeypatch.setattr("adapters.stepping.AT_ONCE", at_once)
+        parts = run(Toy({3}, sideways), scene(), 0.1, {})
+        assert parts.state_hash() == whole.state_hash() and len(parts.pose) == 11 and parts.out_of_plane == 0.125
+
+
+@pytest.mark.parametrize("dimensions", [{2}, {3}])
+def test_what_a_simulation_gives_may_be_its_own(monkeypatch: pytest.MonkeyPatch, dimensions: set[int]) -> None:
+    """Poses, twists and contacts in arrays that the next step writes into."""
+    monkeypatch.setattr(Flight, "pose", lambda flight: flight._pose)
+    monkeypatch.setattr(Flight, "twist", lambda flight: flight._twist)
+    live: list[Contacts] = []
+
+    def contacts(flight: Flight) -> Contacts:
+        d = flight.scene.dimension
+        live.append(live[0] if live else Contacts.from_rows([(0, 1, (0.0,) * d, (1.0,) * d, (0.0,) * d, 0.0)], d))
+        live[0].impulse[:] = flight.steps
+        return live[0]
+
+    monkeypatch.setattr(Flight, "contacts", contacts)
+
+    def moved(flight: Flight) -> None:
+        flight._pose[0, 0] = flight.steps
+
+    trajectory = run(Toy(dimensions, moved), scene(), 0.1, {}, Sampling(1, 0.0))
+    assert trajectory.pose[:, 0, 0].tolist() == list(range(11))
+    assert np.allclose(trajectory.twist[:, 0, 1], -10.0 * trajectory.t, atol=1e-14)
+    assert trajectory.contacts is not None
+    assert trajectory.contacts.rows.impulse[:, 0].tolist() == list(range(1, 11))
+
+
 def test_an_engine_of_both_dimensions_gets_the_scene_as_it_is() -> None:
     assert posed_for(Toy({2, 3}), scene()).dimension == 2
     assert run(Toy({2, 3}), scene(), 0.1, {}).out_of_plane == 0.0
@@ -322,6 +368,17 @@ def test_rows_turn_so_that_the_lower_index_comes_first() -> None:
     assert (contacts.a[0], contacts.b[0], contacts.gap[0]) == (1, 2, -0.1)
     assert contacts.point.tolist() == [[5.0, 6.0]]
     assert contacts.normal.tolist() == [[0.0, -1.0]] and contacts.impulse.tolist() == [[-3.0, -4.0]]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_number_stands_for_a_vector_of_it_and_a_wrong_length_is_refused(count: int) -> None:
+    row = (0, 1, (5.0, 6.0), (0.0, 1.0), math.nan, 0.0)
+    contacts = Contacts.from_rows([row] * count, 2)
+    assert contacts.impulse.shape == (count, 2) and np.isnan(contacts.impulse).all()
+    mixed = Contacts.from_rows([row, (1, 0, (5.0, 6.0), (0.0, 1.0), (3.0, 4.0), 0.0)], 2)
+    assert np.isnan(mixed.impulse[0]).all() and mixed.impulse[1].tolist() == [-3.0, -4.0]
+    with pytest.raises(ValueError):
+        Contacts.from_rows([(0, 1, (5.0, 6.0, 7.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), 0.0)] * count, 2)
 
 
 def test_a_missing_impulse_stays_missing_in_the_sum() -> None:

@@ -31,6 +31,9 @@ LEFT_OUT = ("tests/test_house.py", "tests/reference_solver/", "tests/chaos/test_
             "tests/mutation/")  # fmt: skip
 #: Name under which the recorder lies in the copy.
 PLUGIN = "recording_of_tests"
+#: The tools' runs end at the first failure, which is all that a mutant needs; here every test of a file is asked, since
+#: some fail only because the sources are instrumented. Zero is no limit.
+TO_THE_END = "--maxfail=0"
 #: How a test ends, as the recorder writes it.
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
 #: Block -> tests that reach it, with their seconds of CPU.
@@ -180,7 +183,7 @@ def reached(copy: Path, name: str, seconds: float) -> tuple[Record, set[str]]:
     """Run one test file; what each of its tests cost and reached, and which failed."""
     with tempfile.TemporaryDirectory(prefix="crosscheck-reach-") as text:
         folder = Path(text)
-        run(copy, ["--maxfail=1000", "-p", PLUGIN, name], environment(copy, folder, seconds), 10.0 * seconds + 60.0)
+        run(copy, [TO_THE_END, "-p", PLUGIN, name], environment(copy, folder, seconds), 10.0 * seconds + 60.0)
         ended = outcomes(folder)
         found: dict[str, set[str]] = defaultdict(set)
         for path in folder.glob("*.reached"):
@@ -198,7 +201,7 @@ def passing(copy: Path, tests: set[str], seconds: float) -> set[str]:
     with tempfile.TemporaryDirectory(prefix="crosscheck-reach-") as text:
         folder = Path(text)
         (folder / "tests").write_text("\n".join(sorted(tests)), encoding="utf-8")
-        arguments = ["--maxfail=1000", "-p", PLUGIN, f"@{folder / 'tests'}"]
+        arguments = [TO_THE_END, "-p", PLUGIN, f"@{folder / 'tests'}"]
         run(copy, arguments, environment(copy, folder, float("inf")), seconds)
         return {test for test, (how, _) in outcomes(folder).items() if how == PASSED}
 

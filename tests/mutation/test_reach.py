@@ -78,3 +78,16 @@ def test_what_a_cache_keeps_is_reached_by_all_who_ask_for_it(asked):
     assert first == {"outer:0"} | inner | sign
     assert asked("outer", 1) == first and asked("outer", 1) == first
     assert asked("outer", -2) == {"outer:0", "inner:0", "sign:0", "sign:3"}
+
+
+def test_a_test_that_fails_ends_no_record(reach, tmp_path):
+    """Those after it are met as well: it may fail only because the sources are instrumented."""
+    tool, _ = reach
+    (tmp_path / f"{tool.PLUGIN}.py").write_text(Path(tool.__file__).with_name("recording.py").read_text())
+    (tmp_path / "test_toy.py").write_text(
+        "def test_a():\n    assert 0\n\ndef test_b():\n    assert 0\n\ndef test_c(): 0\n"
+    )
+    found, failed = tool.reached(tmp_path, "test_toy.py", 10.0)
+    assert list(found.tests) == [f"test_toy.py::test_{x}" for x in "abc"] and found.whole
+    assert failed == {"test_toy.py::test_a", "test_toy.py::test_b"}
+    assert tool.passing(tmp_path, set(found.tests), 20.0) == {"test_toy.py::test_c"}

@@ -94,7 +94,7 @@ def _timings(purpose: str, slot: Slot, steps: int, seconds: float, bodies: int =
 
 
 @pytest.fixture(scope="session", autouse=True)
-def tables_are_whole():
+def tables_are_whole(offences):
     """Whatever a command prints in a test: no row is longer or shorter than its table, and nothing prints nothing.
 
     rich gives a cell too many a column without a heading, leaves what lacks empty, and writes None as a word. A row of
@@ -103,12 +103,15 @@ def tables_are_whole():
     add_row, print_objects = Table.add_row, Console.print
 
     def whole(table, *cells, **options):
-        assert not table.columns or len(cells) in (1, len(table.columns)), cells
-        assert not any(cell is None for cell in cells), cells
+        if table.columns and len(cells) not in (1, len(table.columns)):
+            offences.append(f"a row of {len(cells)} cells in a table of {len(table.columns)} columns: {cells}")
+        if any(cell is None for cell in cells):
+            offences.append(f"a row with nothing in a cell: {cells}")
         return add_row(table, *cells, **options)
 
     def something(console, *objects, **options):
-        assert not any(each is None for each in objects), objects
+        if any(each is None for each in objects):
+            offences.append(f"nothing is printed: {objects}")
         return print_objects(console, *objects, **options)
 
     with pytest.MonkeyPatch.context() as patch:

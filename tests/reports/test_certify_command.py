@@ -6,7 +6,7 @@ import math
 import pytest
 from click.testing import CliRunner
 
-from reference_solver.certification import Gate, rotation
+from reference_solver.certification import Gate, piles, rotation
 from reference_solver.certification.orders import RATES, Order
 from reports.command import certifying, main
 
@@ -45,6 +45,53 @@ def test_a_part_that_breaks_is_a_gate_that_does_not_hold(monkeypatch):
     kept, broken = certifying.measured("rotation")
     assert kept.holds and not broken.holds
     assert "no answer" in broken.case
+
+
+@pytest.mark.parametrize(
+    ("seed", "fall", "broken"),
+    [
+        (2, piles.Fall((), 1e-5, 0.0), set()),
+        (2, piles.Fall((), 1e-3, 0.0), {"pile: overlap, of a half width"}),
+        (2, piles.Fall((), 1e-5, 1e-9), {"pile: energy gained, of all"}),
+        # one pile of seventeen is more than the twentieth that may be refused
+        (
+            3,
+            piles.Fall(("a gap is missed",), 1e-5, 0.0),
+            {"pile: laws broken, overlap apart", "share of piles whose certificate does not hold"},
+        ),
+    ],
+    ids=("all hold", "overlap", "energy", "law"),
+)
+def test_piles_are_measured_one_by_one_and_judged_by_kind(monkeypatch, seed, fall, broken):
+    spoilt, asked = f"pile of 50 boxes, seed {seed}", []
+
+    def at_once(measure, runs, console):
+        asked.extend(runs)
+        return {run: fall if run == spoilt else piles.Fall((), 1e-6, 0.0) for run in runs}
+
+    monkeypatch.setattr(certifying, "PARTS", ("piles",))
+    monkeypatch.setattr(certifying, "side_by_side", at_once)
+    result = CliRunner().invoke(main, ["certify", "--json"])
+    rows = json.loads(result.stdout)
+    assert sorted(asked) == sorted(piles.PILES)
+    assert len(asked) == sum(len(kind.seeds) for kind in piles.KINDS.values())
+    assert {row["quantity"] for row in rows if not row["holds"]} == broken
+    assert all("50 boxes" in row["case"] or "17 piles" in row["case"] for row in rows if not row["holds"])
+    assert result.exit_code == (1 if broken else 0)
+
+
+def test_a_pile_that_breaks_breaks_all_that_is_promised_of_it(monkeypatch):
+    def fall(model):
+        raise RuntimeError("no answer")
+
+    monkeypatch.setattr(piles, "fall", fall)
+    fallen = certifying.measured("pile of 50 boxes, seed 1")
+    assert "no answer" in fallen.reasons[0]
+    rows = list(piles.gates(lambda pile: fallen))
+    told = {row.case for row in rows if "could not be measured" in row.quantity}
+    assert told == {f"{pile}: RuntimeError('no answer')" for pile in piles.PILES}
+    assert len(rows) == 3 * len(piles.KINDS) + 1 + len(piles.PILES)
+    assert not any(row.holds for row in rows)
 
 
 def test_parts_run_in_processes_and_come_back_by_name():

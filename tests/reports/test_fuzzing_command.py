@@ -4,6 +4,7 @@ import json
 import os
 import time
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -103,6 +104,33 @@ def test_what_a_scene_raises_is_its_answer():
 
     fuzzing.serve(Connection())
     assert sent[0] == fuzzing.READY and json.loads(sent[1])["broken"]
+
+
+def test_what_a_scene_raises_is_told_in_one_line(monkeypatch):
+    """The first that says something, however long the whole is, and however narrow the terminal."""
+
+    def raised(seed, dimension):
+        raise np.linalg.LinAlgError("\n[0, 0] of the matrix is singular\n" + 40 * " 0.0 0.0\n")
+
+    sent, asked = [], [b"[3, 2]"]
+
+    class Connection:
+        send_bytes = sent.append
+
+        def recv_bytes(self):
+            if not asked:
+                raise EOFError
+            return asked.pop()
+
+    monkeypatch.setattr(fuzzing, "attack", raised)
+    fuzzing.serve(Connection())
+    result, _ = certify(monkeypatch, json.loads(sent[1]))
+    lines = result.stderr.splitlines()
+    (at,) = (k for k, line in enumerate(lines) if "NO ANSWER" in line)
+    assert lines[at:] == ["NO ANSWER seed 3: LinAlgError: [0, 0] of the matrix is singular"]
+    long = answer(4) | {"broken": "the process was killed by SIGSEGV " + 20 * "and so on, " + "to its end"}
+    result, _ = certify(monkeypatch, long)
+    assert result.stderr.splitlines()[-1] == f"NO ANSWER seed 4: {long['broken']}"
 
 
 def test_the_command_hands_over(monkeypatch):

@@ -205,6 +205,32 @@ def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law
     assert all("misses" in why for _, why in proposal.refused) and proposal.refused
 
 
+def test_of_what_is_not_asked_about_all_that_is_new_or_drifted_is_told_and_nothing_else():
+    """In the order of the run, whatever stands between; what is asked about afterwards is still proposed."""
+    known = {row_key(SLOT, name): Finding(FAMILY, 0.5, 1e-3) for name in ("known", "drifted", "drifted pass")}
+    cases = (
+        ("passes", {"physics": "pass", "standing": None}, False),
+        ("fails", {"physics": "fail", "standing": "new"}, True),
+        ("explained", {"physics": "fail", "standing": "explained"}, False),
+        ("explodes", {"outcome": "diverged", "value": None, "physics": None, "standing": "new"}, True),
+        ("no value", {"value": None, "physics": None, "standing": "new"}, False),
+        ("known", {"physics": "fail", "standing": "known"}, False),
+        ("drifted", {"physics": "fail", "standing": "drifted"}, True),
+        ("drifted pass", {"physics": "pass", "standing": "drifted"}, False),
+    )
+    run = [row_of(metric=name, **fields) for name, fields, _ in cases]
+    proposal = propose([*run, *rows()], "nameless", replace(listed(FAMILY), members=known), lambda key: key == KEY)
+    assert [row.metric for row in proposal.left_out] == [name for name, _, told in cases if told]
+    assert [list(change.new) for change in proposal.changes] == [[KEY]]
+
+
+def test_rows_that_are_not_asked_about_do_not_hide_those_after_them_from_being_moved():
+    steeper = rows(replace(SLOT, params=(("ratio", 0.9),)), moved=None)
+    others = [replace(row, engine="another") for row in steeper]
+    found = slots_to_move([*others, *steeper, *rows(moved=None)], "nameless", lambda key: key == KEY)
+    assert found == [replace(SLOT, ulp=move) for move in MOVES]
+
+
 def test_starts_of_an_engine_of_singles_are_moved_by_units_of_singles():
     """Moved by units of doubles they would be the same numbers to it, and nothing would scatter."""
     for engine, kind in (("box2d", np.float32), ("mujoco", np.float64)):

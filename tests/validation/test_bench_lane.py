@@ -185,9 +185,9 @@ def test_a_unit_closes_when_its_interval_is_narrow(clockwork):
 
 def test_a_series_ends_where_a_pile_takes_too_long(clockwork):
     sizes = size_units([("clockwork", "one")], [2], [], [], [1, 2, 3])
-    steps = {1: 10, 3: 3000, 6: 10}  # 1 ms, 0.3 s: the limit of 0.25 s leaves room for a busy machine
+    steps = {1: 10, 3: 12000, 6: 10}  # 1 ms, 1.2 s: the limit of 1 s leaves room for a busy machine
     slow = [replace(u, steps=steps[u.bodies]) for u in sizes]
-    timings = timed(slow, replace(PATIENT, size_seconds=0.25, most=3))
+    timings = timed(slow, replace(PATIENT, size_seconds=1.0, most=3))
     by_size = {bodies: [t for t in timings if t.bodies == bodies] for bodies in (1, 3, 6)}
     assert not by_size[1][0].void and not by_size[3][0].void
     assert [t.void[:8] for t in by_size[6]] == ["left out"]

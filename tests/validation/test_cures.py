@@ -1,16 +1,19 @@
 """Cures: the smallest change that mends most and breaks nothing, told of the scene and dimension it was measured on."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from adapters.engine_folder import CURES, inside
 from adapters.registry import find, names
+from reports.command import main
 from reports.cures import cure_paste, cure_text, decided_by, told_cures
 from validation.posed import resolve
 from validation.settings import cures
-from validation.settings.cures import Cure, _best, _Trials, asked_of, cures_of, read, search, write
+from validation.settings.cures import Cure, Unsearched, _best, _Trials, asked_of, cures_of, read, search, write
 from validation.settings.switching import readings
 
 CURE = Cure(
@@ -178,7 +181,29 @@ def test_a_real_engine_is_cured_by_what_its_sheet_says():
     assert (found.failing, found.left) == (1, 0) and found.metric == "hop"
     assert list(found.changes) == ["start_overlap"] and found.before > found.tolerance > found.after
     assert found.cost_before > 0.0 and found.cost_after > 0.0
-    assert search("chipmunk", "incline", 2) is None and search("chipmunk", "slide", 3) is None
+    passes, refuses = search("chipmunk", "incline", 2), search("chipmunk", "slide", 3)
+    assert isinstance(passes, Unsearched) and passes.asked and "passes all" in passes.reason
+    assert isinstance(refuses, Unsearched) and not refuses.asked
+
+
+def test_what_passes_and_what_cannot_be_asked_are_told_apart():
+    pytest.importorskip("pymunk")
+    told = CliRunner().invoke(main, ["cure", "chipmunk", "incline", "slide"])
+    assert told.exit_code == 0, told.output
+    lines = told.stdout.splitlines()
+    assert re.match(r"chipmunk incline 2-D: as shipped nothing is to be mended: it passes all \d+ checks$", lines[0])
+    refused = [line for line in lines if ": cannot be asked: " in line]
+    assert [line.partition(":")[0] for line in refused] == ["chipmunk incline 3-D", "chipmunk slide 3-D"]
+    assert "chipmunk slide 2-D: 1 of" in told.stdout
+
+
+def test_an_engine_or_a_scene_that_has_nothing_to_search_says_so(monkeypatch):
+    monkeypatch.setattr(cures, "asked_of", lambda scene, dimension: ())
+    assert search("chipmunk", "incline", 2) == Unsearched(
+        False, "incline has no quick cell in 2-D at a profile's own iterations"
+    )
+    monkeypatch.setattr(cures, "profile_of", lambda engine, role: None)
+    assert search("chipmunk", "incline", 2) == Unsearched(False, "chipmunk has no profile as shipped")
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])

@@ -285,6 +285,17 @@ def test_a_study_is_a_row_of_its_cells_and_of_no_single_run():
     assert not predictions_of(replace(row, physics="fail"))
 
 
+def test_a_study_has_no_floor_though_its_cells_have_been_moved():
+    """What several cells say together is none of their values, not even of the one that it is told under."""
+    sets = ((), (("ratio", 0.9),), (("ratio", 1.01),), (("ratio", 1.1),))
+    slots = [Slot("incline", params, 2, "nameless", "default", 1 / 240) for params in sets]
+    metrics = {"creep": (0.0, ""), "acceleration": (0.5, ""), "threshold": (9.0, "")}
+    cells = [Observation(slot, "c", 1, "1", Outcome.OK, metrics=metrics) for slot in slots]
+    moved = [replace(cell, slot=replace(cell.slot, ulp=1), metrics=metrics | {"creep": (0.25, "")}) for cell in cells]
+    floors = {(row.metric, row.floor) for row in rows.with_floors(rows_of("run", cells), moved)}
+    assert floors == {("threshold", None), ("creep", 0.25), ("acceleration", 0.0)}
+
+
 def test_a_study_that_fails_says_what_was_found_and_how_it_stands():
     row = inclines((0.9, True), (0.99, True), (1.01, True))
     assert (row.physics, row.value) == ("fail", 0.9)

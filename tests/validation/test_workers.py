@@ -174,3 +174,21 @@ def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():
     cells = run_cells(slots, jobs=1, keep=lambda slot: handed.append(slot))
     assert next(cells).slot == slots[0] and handed == slots[:2]
     assert [found.slot for found in cells] == slots[1:] and handed == slots
+
+
+def test_open_files_are_counted_from_the_first_look_at_a_process(monkeypatch):
+    """A leak of one a cell ends the process after as many cells as it may keep files, also where each cell imports."""
+    before = first = state.taken()
+    assert first.facts[state.OPEN_FILES] > 0
+    opened = []
+    try:
+        while not (told := state.changed(before)) and len(opened) <= 2 * state.SPARE_FILES:
+            monkeypatch.setattr(limits, f"come_with_{len(opened)}", len, raising=False)
+            before = state.still(before)
+            opened.append(os.open(os.devnull, os.O_RDONLY))
+        assert told == state.OPEN_FILES and len(opened) == state.SPARE_FILES + 1
+        os.close(opened.pop())
+        assert state.changed(before) == "" == state.changed(first)
+    finally:
+        for number in opened:
+            os.close(number)

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Simulation
+from adapters.engine import Array, Simulation
 from adapters.foreign import said_by
+from adapters.lift import lower_pose, lower_twist
 from adapters.registry import find
-from adapters.stepping import PlanarView, advances
+from adapters.stepping import advances
 from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_of
 
 
@@ -57,6 +58,21 @@ def _void(unit: Unit, error: float | None) -> str:
     return ""
 
 
+class _Lowered:
+    """Reads a lifted simulation as a planar one, state by state: what a user who looks after each step pays."""
+
+    def __init__(self, inner: Simulation) -> None:
+        self.inner = inner
+
+    def pose(self) -> Array:
+        """Planar poses (n, 3)."""
+        return lower_pose(self.inner.pose())[0]
+
+    def twist(self) -> Array:
+        """Planar twists (n, 3)."""
+        return lower_twist(self.inner.twist())[0]
+
+
 def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
     engine, scene, settings, lifted = prepared(unit.slot)
     dt = unit.slot.dt
@@ -66,7 +82,7 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
         twin.close()
     simulation = engine.build(scene, dt, settings)
     try:
-        view = PlanarView(simulation) if lifted else simulation
+        view = _Lowered(simulation) if lifted else simulation
         start = np.array(view.pose())
         if unit.warm_up:
             simulation.advance(unit.warm_up)

@@ -31,7 +31,7 @@ class Timing:
     round, order, process
         Round of the lane, position within it, and which process of the lane it was; all from 0.
     sampled
-        Whether poses and twists were read after each step, by the one step loop.
+        Whether poses and twists were read after each step, and lowered where the scene was lifted.
     worlds, threads, kernel
         Worlds per call, threads, and the variant of a kernel where an engine names one.
     steps

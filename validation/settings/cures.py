@@ -183,8 +183,16 @@ def _differing(changes: Changes, own: Changes) -> Changes:
     return {name: value for name, value in changes.items() if name not in own or own[name] != value}
 
 
-def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | None:
-    """Search what mends ``engine`` as shipped; None if it passes there, cannot be asked, or ships no profile.
+@dataclass(frozen=True)
+class Unsearched:
+    """Why nothing was searched: the engine passes as shipped, or (not ``asked``) the scene cannot be asked of it."""
+
+    asked: bool
+    reason: str
+
+
+def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Unsearched:
+    """Search what mends ``engine`` as shipped, if something fails there.
 
     Raises
     ------
@@ -193,16 +201,21 @@ def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Non
     """
     shipped = profile_of(engine, "shipped")
     cells = asked_of(scene, dimension)
-    if shipped is None or not cells:
-        return None
+    if shipped is None:
+        return Unsearched(False, f"{engine} has no profile as shipped")
+    if not cells:
+        return Unsearched(False, f"{scene} has no quick cell in {dimension}-D at a profile's own iterations")
     own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, QUICK_DT) for cell in cells]
     first = observe(own, jobs)
-    if any(found.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED) for found in first.values()):
-        return None
+    for found in first.values():
+        if found.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED):
+            return Unsearched(False, found.reason)
     trials = _Trials(own, jobs)
+    if not trials.start:
+        return Unsearched(False, "no check of its quick cells is judged")
     failing = [found for found in trials.start if found.badness > 1.0]
     if not failing:
-        return None
+        return Unsearched(True, f"it passes all {len(trials.start)} checks")
     best, singles = _best(engine, trials, own, len(failing))
     return _cure(engine, trials, failing, best, singles)
 

@@ -8,6 +8,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing.connection import wait
 from pathlib import Path
 
@@ -60,6 +61,10 @@ def run_cells(
 ) -> Iterator[Observation]:
     """Yield an observation per slot, in the order in which they finish.
 
+    What is raised once cells run is raised after every cell that has been asked has answered: of all cells but those
+    whose own trajectory or recording could not be kept, nothing that was computed is lost. What fails after that is not
+    told.
+
     Parameters
     ----------
     jobs
@@ -95,28 +100,46 @@ def run_cells(
     try:
         yield from _never_started(waiting)
 
-        def ask(seat: _Seat) -> None:
-            _next(seat, seats, waiting, timeouts, leave, memory)
-            if seat.slot is not None:
-                _ask(seat, seat.slot, texts, timeout, keep(seat.slot), seat.slot in shown)
+        failure: Exception | None = None  # nothing is asked any more; it is told after all that has been computed
+
+        def ask(seat: _Seat, choose: Callable[[], Slot | None]) -> None:
+            nonlocal failure
+            try:
+                slot = choose()
+                if slot is not None:
+                    _ask(seat, slot, texts, timeout, keep(slot), slot in shown)
+            except Exception as error:  # no worker can be started, or the caller has no place for what comes
+                failure = failure or error
 
         while True:
             for seat in seats:
-                if seat.slot is None:
-                    ask(seat)
+                if seat.slot is None and failure is None:
+                    ask(seat, partial(_next, seat, seats, waiting, timeouts, leave, memory))
             busy = [seat for seat in seats if seat.slot is not None]
             if not busy:
+                if failure is not None:
+                    raise failure
                 return
             for seat in _ready(busy):
                 slot = seat.slot
                 assert slot is not None
-                observation, recording = _collect(seat, slot, timeout)
+                try:
+                    observation, recording = _collect(seat, slot, timeout)
+                except Unwritten as error:
+                    failure = failure or error
+                    continue
                 if observation.outcome is Outcome.TIMED_OUT:
                     timeouts[slot.engine, slot.scene] += 1
-                if seat.child is not None and waiting.get(seat.engine):
-                    ask(seat)  # before anyone looks at the answer: a worker does not wait for what is kept of it
+                # Before anyone looks at the answer: a worker does not wait for what is kept of it. But no worker is
+                # started meanwhile, which takes seconds.
+                if seat.child is not None and failure is None:
+                    ask(seat, partial(_first, waiting.get(seat.engine, deque()), timeouts, leave))
                 if recording is not None:
-                    record(slot, recording)
+                    try:
+                        record(slot, recording)
+                    except Exception as error:  # as if it had not run: it is run again when its run is resumed
+                        failure = failure or error
+                        continue
                 yield observation
     finally:
         for seat in seats:
@@ -139,26 +162,37 @@ def _next(
     timeouts: Counter[tuple[str, str]],
     leave: Callable[[Slot, str], None],
     memory: int,
-) -> None:
-    """Give a free seat its next cell: of its own engine while there are any, else of the one that has most to do."""
-    while True:
+) -> Slot | None:
+    """Next cell of a free seat: of its own engine while there are any, else of the one that has most to do.
+
+    The seat has a worker for it then.
+    """
+    slot = None
+    while slot is None:
         for engine in [engine for engine, queue in waiting.items() if not queue]:
             del waiting[engine]
         if not waiting:
             seat.free()
-            return
+            return None
         engine = seat.engine
         if engine not in waiting:
             served = Counter(other.engine for other in seats)
             engine = max(waiting, key=lambda name: len(waiting[name]) / (1 + served[name]))
-        slot = waiting[engine].popleft()
-        if timeouts[slot.engine, slot.scene] < MOST_TIMEOUTS:
-            break
-        leave(slot, f"{slot.engine} has timed out {MOST_TIMEOUTS} times on {slot.scene}")
+        slot = _first(waiting[engine], timeouts, leave)
     if seat.engine != engine or seat.child is None:
         seat.free()
         seat.child, seat.engine = _started(memory), engine
-    seat.slot = slot
+    return slot
+
+
+def _first(queue: deque[Slot], timeouts: Counter[tuple[str, str]], leave: Callable[[Slot, str], None]) -> Slot | None:
+    """Take the first cell that is worth asking; those before it are left."""
+    while queue:
+        slot = queue.popleft()
+        if timeouts[slot.engine, slot.scene] < MOST_TIMEOUTS:
+            return slot
+        leave(slot, f"{slot.engine} has timed out {MOST_TIMEOUTS} times on {slot.scene}")
+    return None
 
 
 def _started(memory: int) -> Child:
@@ -193,7 +227,7 @@ def _ask(seat: _Seat, slot: Slot, texts: dict[str, str], timeout: float, keep: P
     assert seat.child is not None
     seat.child.written = b""
     seat.child.send(json.dumps(job).encode())
-    seat.until = time.monotonic() + timeout
+    seat.slot, seat.until = slot, time.monotonic() + timeout
 
 
 def _ready(busy: Sequence[_Seat]) -> list[_Seat]:

@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -22,8 +22,10 @@ import numpy as np
 #: Modules whose functions and classes are watched besides our own: what measuring and judging computes with.
 WATCHED = ("builtins", "math", "random", "time", "json", "os", "sys", "copy", "dataclasses", "numpy", "numpy.linalg")
 OURS = ("adapters", "validation")
-#: Files that may stay open beyond those there were: engines keep caches and libraries open.
+#: Files that may stay open beyond those there were before the first cell: engines keep caches and libraries open. It is
+#: a sixteenth of the 1024 that Linux allows a process.
 SPARE_FILES = 64
+OPEN_FILES = "open files"
 
 
 @dataclass(frozen=True)
@@ -41,20 +43,27 @@ class State:
 
 def taken() -> State:
     """Look at this process now."""
+    facts = {name: look() for name, look in _FACTS.items()}  # first of all: a look may import what it needs
     modules, names = len(sys.modules), _names()
     sizes = {place: len(now) for place, (now, _) in names.items()}
-    return State({name: look() for name, look in _FACTS.items()}, names, sizes, modules)
+    return State(facts, names, sizes, modules)
 
 
 def still(before: State) -> State:
     """What to compare the next cell with, after one that has changed nothing: the same look, which costs 3 ms.
 
-    If modules or names have come since, as a first cell imports what it needs, another look.
+    If modules or names have come since, as a first cell imports what it needs, another look. Open files are counted
+    from the first look all the same: what runs out is their sum, whether one cell opened them or each a few. So a leak
+    of one a cell ends the process after `SPARE_FILES` cells, and so do libraries that slowly open as many. That blames
+    no cell: its answer stands, and the next one gets a fresh process, for a second or two.
     """
     come = len(sys.modules) != before.modules or any(
         len(now) != before.sizes[place] for place, (now, _) in before.names.items()
     )
-    return taken() if come else before
+    if not come:
+        return before
+    now = taken()
+    return replace(now, facts={**now.facts, OPEN_FILES: before.facts[OPEN_FILES]})
 
 
 def changed(before: State) -> str:
@@ -67,7 +76,7 @@ def changed(before: State) -> str:
 
 
 def _same(name: str, before: Any, now: Any) -> bool:
-    if name == "open files":
+    if name == OPEN_FILES:
         return bool(now <= before + SPARE_FILES)
     return bool(before == now)
 
@@ -150,7 +159,7 @@ def _locale() -> str:
 _FACTS: dict[str, Callable[[], Any]] = {
     "floating point": _rounding,
     "streams": _streams,
-    "open files": _open_files,
+    OPEN_FILES: _open_files,
     "limits": _limits,
     "environment": lambda: dict(os.environ),
     "folder": _folder,

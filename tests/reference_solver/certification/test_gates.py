@@ -61,7 +61,7 @@ ALONE = [
     (random_scenes.gates,),
     (falling.dominoes,),
     (falling.rocking,),
-    (piles.laws,),
+    *[(piles.laws, name) for name in piles.KINDS],
     *[(turning_in_space.errors, name) for name in turning_in_space.CASES],
     *[(turning_in_space.order, name) for name in turning_in_space.CASES],
     (detection.seams, SPACES[0], "polygon"),

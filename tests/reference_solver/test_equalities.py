@@ -1,0 +1,122 @@
+"""Equalities of a phase against dense algebra: matrix, solution, and the choice where rows say the same (E37)."""
+
+import numpy as np
+import pytest
+
+from reference_solver.compilation import from_python
+from reference_solver.stepping import equalities
+from reference_solver.stepping.equalities import CONTRADICTORY, REDUNDANT
+from reference_solver.stepping.lasting import CONTACTS, OPEN, SLIP, STICK, allocate_lasting
+
+assemble, eliminate, list_rows, solve_rows = (
+    from_python(kernel)
+    for kernel in (equalities.assemble, equalities.eliminate, equalities.list_rows, equalities.solve_rows)
+)
+
+#: Bodies, the first of which is fixed, and contacts between random pairs of them: most share no body.
+BODIES, TOUCHING = 24, 9
+
+
+def drawn(dimension, seed):
+    """Contacts of all modes between random bodies, with random levers; rows that say the same are all but impossible.
+
+    There are at most 27 rows, and 69 velocities.
+    """
+    rng = np.random.default_rng(seed)
+    lasting = allocate_lasting(dimension, BODIES, TOUCHING)
+    velocities = 3 * (dimension - 1)
+    lasting.size[CONTACTS] = TOUCHING
+    light = rng.uniform(0.5, 2.0, (BODIES, velocities))
+    light[0] = 0.0
+    for k in range(TOUCHING):
+        lasting.body[k] = rng.choice(BODIES, 2, replace=False)
+        lasting.mode[k] = (STICK, SLIP, OPEN, STICK, SLIP)[k % 5]
+        lasting.friction[k] = rng.uniform(0.1, 0.5)
+        towards = rng.normal(size=dimension - 1)
+        lasting.direction[k] = towards / np.linalg.norm(towards)
+        lasting.jacobian[k] = rng.normal(size=lasting.jacobian[k].shape)
+        lasting.jacobian[k, 0, :, : velocities // 3] = 0.0  # entries that are zero before those that are not...
+        lasting.jacobian[k, 1, :, -velocities // 3 :] = 0.0  # ... and after them
+        for side in range(2):
+            lasting.response[k, side] = lasting.jacobian[k, side] * light[lasting.body[k, side]]
+        lasting.usual[k] = rng.uniform(0.5, 2.0, dimension)
+        lasting.scale[k] = 1.0
+    return lasting, rng
+
+
+def dense(lasting, count):
+    """G M^-1 F of the rows that are numbered, from whole rows over all bodies."""
+    width = lasting.free.shape[1]
+    rows, forces = np.zeros((count, BODIES * width)), np.zeros((count, BODIES * width))
+    for i in range(count):
+        k, row = lasting.unknown[i]
+        for side in range(2):
+            at = slice(lasting.body[k, side] * width, (lasting.body[k, side] + 1) * width)
+            rows[i, at] += lasting.jacobian[k, side, row]
+            forces[i, at] += lasting.response[k, side, row]
+            if row == 0 and lasting.mode[k] == SLIP:
+                forces[i, at] -= lasting.friction[k] * (lasting.direction[k] @ lasting.response[k, side, 1:])
+    return rows @ forces.T
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_matrix_and_solution_are_those_of_dense_algebra(dimension, seed):
+    lasting, rng = drawn(dimension, seed)
+    count = list_rows(lasting)
+    assert count == sum({OPEN: 0, SLIP: 1, STICK: dimension}[mode] for mode in lasting.mode)
+    lasting.matrix[:] = 7.0  # of the phase before
+    assemble(lasting, count, True)
+    expected = dense(lasting, count)
+    assert np.allclose(lasting.matrix[:count, :count], expected, rtol=0.0, atol=1e-14 * np.abs(expected).max())
+    assert (expected == 0.0).sum() > 0.3 * expected.size  # or nothing that is left out would be noticed
+    lasting.right[:count] = rng.normal(size=count)
+    assert eliminate(lasting, count)
+    solution = np.linalg.solve(expected, lasting.right[:count])
+    # round-off of either, magnified by the condition at most
+    limit = 1e-15 * count * np.linalg.cond(expected) * np.abs(solution).max()
+    assert np.abs(lasting.answer[:count] - solution).max() <= limit
+
+
+@pytest.mark.parametrize("told", [0.0, 1.0])
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_redundant_rows_get_the_forces_nearest_to_the_usual_ones(dimension, seed, told):
+    """Least squares of what each force differs by, over its weight: found by a pseudo-inverse instead."""
+    lasting, rng = drawn(dimension, seed)
+    lasting.mode[:] = STICK
+    for twin, of in ((3, 0), (7, 2)):  # contacts that say what others say, with other usual forces
+        lasting.body[twin] = lasting.body[of]
+        lasting.jacobian[twin], lasting.response[twin] = lasting.jacobian[of], lasting.response[of]
+    count = list_rows(lasting)
+    assemble(lasting, count, False)
+    matrix = lasting.matrix[:count, :count].copy()
+    lasting.right[:count] = matrix @ rng.normal(size=count)
+    assert solve_rows(lasting, count, told) == REDUNDANT
+    usual = told * np.array([lasting.usual[tuple(unknown)] for unknown in lasting.unknown[:count]])
+    carried = [(lasting.usual[k, 0], lasting.friction[k] if row else 1.0) for k, row in lasting.unknown[:count]]
+    weight = np.abs(carried).prod(axis=1)
+    root = np.sqrt(weight)
+    change = root * (np.linalg.pinv(matrix * root, rcond=1e-9) @ (lasting.right[:count] - matrix @ usual))
+    sizes = np.linalg.svd(matrix * root, compute_uv=False)
+    sizes = sizes[sizes > 1e-9 * sizes[0]]  # others are round-off: conditions here are below 1e4
+    # round-off of either, magnified by the condition: corrections gain back what squaring the matrix costs
+    limit = 1e-15 * count * sizes[0] / sizes[-1] * np.abs(usual + change).max()
+    assert np.abs(lasting.answer[:count] - usual - change).max() <= limit
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_rows_that_say_otherwise_of_the_same_contradict_each_other(dimension):
+    lasting, _ = drawn(dimension, 0)
+    lasting.mode[:] = STICK
+    lasting.body[3], lasting.jacobian[3], lasting.response[3] = (
+        lasting.body[0],
+        lasting.jacobian[0],
+        lasting.response[0],
+    )
+    count = list_rows(lasting)
+    assemble(lasting, count, False)
+    lasting.right[:count] = 1.0
+    assert solve_rows(lasting, count, 1.0) == REDUNDANT
+    lasting.right[3 * dimension] = 2.0
+    assert solve_rows(lasting, count, 1.0) == CONTRADICTORY

@@ -1,0 +1,80 @@
+"""What no test may bring about is told by the test that did it, also where the code under test swallows exceptions."""
+
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+OPTIONS = ("-q", "-p", "no:randomly", "-p", "no:cacheprovider", "-p", "no:xdist")
+
+
+def planted(pytester, line, before=""):
+    """Run a test that does ``line`` and swallows what that raises, and one after it that does nothing."""
+    pytester.makeconftest((HERE / "conftest.py").read_text(encoding="utf-8"))
+    folder = pytester.mkdir("reports")
+    (folder / "conftest.py").write_text((HERE / "reports" / "conftest.py").read_text(encoding="utf-8"))
+    (folder / "test_planted.py").write_text(f"""
+import contextlib
+import pytest
+from rich.console import Console
+from rich.table import Table
+from adapters.engine import EngineError
+from adapters.shapes import SceneError
+{before}
+def test_one():
+    with contextlib.suppress(Exception):
+        {line}
+
+def test_two():
+    pass
+""")
+    # A process of its own: in this one what watches the tests around may be at work already, and would tell it twice.
+    return pytester.runpytest_subprocess(*OPTIONS, "reports")
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("raise SceneError('first\\nsecond')", "SceneError does not say one line*test_planted.py:11"),
+        ("raise SceneError(' ')", "SceneError does not say one line"),
+        ("raise SceneError()", "SceneError does not say one line"),
+        ("raise SceneError('a', 'b')", "SceneError does not say one line"),
+        ("raise EngineError(7)", "EngineError does not say one line"),
+        ("Table('a', 'b', 'c').add_row('1', '2')", "a row of 2 cells in a table of 3 columns"),
+        ("Table('a').add_row('1', '2')", "a row of 2 cells in a table of 1 columns"),
+        ("Table('a', 'b').add_row('1', None)", "a row with nothing in a cell"),
+        ("Console(quiet=True).print(None)", "nothing is printed"),
+    ],
+)
+def test_what_is_swallowed_is_told(pytester, line, told):
+    result = planted(pytester, line)
+    result.assert_outcomes(passed=2, errors=1)
+    result.stdout.fnmatch_lines([f"*{told}*", "ERROR *test_planted.py::test_one*"])
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "raise SceneError('one line')",
+        "raise EngineError('first\\nsecond')",
+        "Table('a', 'b').add_row('1', '2')",
+        "Table('a', 'b').add_row('1')",
+        "Console(quiet=True).print('')",
+    ],
+)
+def test_what_is_as_it_should_be_is_not(pytester, line):
+    planted(pytester, line).assert_outcomes(passed=2)
+
+
+def test_what_is_set_up_or_ends_around_tests_is_told_as_well(pytester):
+    """Of a fixture that the test asks for by that test; of one that ends after the last by that."""
+    shared = """
+@pytest.fixture(scope="module", autouse=True)
+def shared():
+    SceneError("")
+    yield
+    SceneError("")
+"""
+    result = planted(pytester, "pass", shared)
+    result.assert_outcomes(passed=2, errors=2)
+    result.stdout.fnmatch_lines(["ERROR *::test_one*", "ERROR *::test_two*"])
