@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
+.PHONY: run test test-long recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
 
 setup: $(STAMP)
 
@@ -39,6 +39,10 @@ REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys
 test: $(STAMP)
 	$(BIN)/crosscheck compile --engine reference
 	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
+
+# What takes minutes of CPU in one test: all faults in all scenes, the largest piles.
+test-long: $(STAMP)
+	CROSSCHECK_LONG=1 CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) $(BIN)/python -m pytest -n auto -m long
 
 # An engine made by CONTRIBUTING's recipe, from our wheel in a fresh environment; some 80 s of CPU.
 recipe: $(STAMP)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 import textwrap
 
@@ -23,12 +25,28 @@ settings.register_profile("without_deadline", deadline=None)
 settings.load_profile("without_deadline")
 
 
-def pytest_configure():
+def pytest_configure(config):
     """Without its engines whole files are skipped: where they are required, that is a failure and not a skip."""
+    config.addinivalue_line("markers", "long: minutes of CPU, run by `make test-long`")
     try:
         registry.check_required()
     except EngineError as error:
         raise pytest.UsageError(str(error)) from None
+
+
+def pytest_collection_modifyitems(items):
+    """Long tests have a command of their own."""
+    if not os.environ.get("CROSSCHECK_LONG"):
+        for item in items:
+            if item.get_closest_marker("long"):
+                item.add_marker(pytest.mark.skip(reason="minutes of CPU: make test-long"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _what_is_there_stays():
+    """Searches for garbage go through what a file makes, not through a gigabyte of kernels and tests, a second each."""
+    gc.collect()
+    gc.freeze()
 
 
 #: Errors that a user reads: what is wrong stands in one line.

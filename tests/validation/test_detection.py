@@ -40,8 +40,9 @@ def test_two_per_cent_of_impulses_or_friction_break_a_receipt_of_every_engine_an
 
 @pytest.fixture(scope="module")
 def detected():
+    """Every fault in the scenes that tests below name; all others are asked by `make test-long`."""
     pytest.importorskip("pymunk")
-    return detection(registry.load("chipmunk"), "tuned", 2)
+    return detection(registry.load("chipmunk"), "tuned", 2, scenes=["impact", "bounce", "stack", "slide", "pinch"])
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +50,17 @@ def seen(detected):
     return detected.seen
 
 
-def test_every_fault_is_seen_from_one_per_cent_on_by_something(seen):
+@pytest.fixture(scope="module")
+def whole():
+    """Every fault in every scene: minutes of CPU."""
+    pytest.importorskip("pymunk")
+    return detection(registry.load("chipmunk"), "tuned", 2)
+
+
+@pytest.mark.long
+def test_every_fault_is_seen_from_one_per_cent_on_by_something(whole):
     for fault in SIZED:
-        sizes = [entry.size for entry in seen if entry.fault == fault and entry.size is not None]
+        sizes = [entry.size for entry in whole.seen if entry.fault == fault and entry.size is not None]
         assert min(sizes) <= 0.01, fault
         # Sizes and shapes, and what comes late, are told to a step of motion; all else to a thousandth and better.
         assert fault in ("extent", "late") or min(sizes) == min(SIZES), fault
@@ -82,8 +91,9 @@ def test_what_no_parameter_makes_is_seen_by_the_check_that_is_there_for_it(seen,
     assert own[fault] == size
 
 
-def test_every_check_and_receipt_sees_a_fault(seen):
-    assert not [line["name"] for line in lines(seen) if not any(list(line.values())[1:])]
+@pytest.mark.long
+def test_every_check_and_receipt_sees_a_fault(whole):
+    assert not [line["name"] for line in lines(whole.seen) if not any(list(line.values())[1:])]
 
 
 #: Checks that see one kind of fault alone, which is there for them, and the smallest size that the law lets them see.
@@ -128,10 +138,11 @@ def test_a_blind_spot_is_told_with_what_the_fault_changes_and_what_a_step_may_mi
     assert not [b for b in detected.blind if (b.scene, b.fault) in (("slide", "mass"), ("impact", "restitution"))]
 
 
-def test_no_blind_spot_is_one_that_a_check_of_the_same_name_sees(detected):
-    sharp = {(e.scene, e.watcher, e.fault) for e in detected.seen if e.size is not None and e.size <= 0.01}
-    assert not [b for b in detected.blind if (b.scene, b.metric, b.fault) in sharp]
-    assert all(0.0 < b.moved <= 2.0 * b.allowed for b in detected.blind)  # with the fault and without it hold
+@pytest.mark.long
+def test_no_blind_spot_is_one_that_a_check_of_the_same_name_sees(whole):
+    sharp = {(e.scene, e.watcher, e.fault) for e in whole.seen if e.size is not None and e.size <= 0.01}
+    assert whole.blind and not [b for b in whole.blind if (b.scene, b.metric, b.fault) in sharp]
+    assert all(0.0 < b.moved <= 2.0 * b.allowed for b in whole.blind)  # with the fault and without it hold
 
 
 def committed():
@@ -163,9 +174,10 @@ def test_the_table_s_blind_spots_are_those_that_a_step_hides():
         assert int(step[2:]) >= 2 / DT and float(size) > 1.0
 
 
-def test_what_no_check_sees_is_said(seen):
+@pytest.mark.long
+def test_what_no_check_sees_is_said(whole):
     """Since a bar is struck beside its centre, and turns, there is no fault that only probes see."""
-    assert only_by_receipts(seen) == {}
+    assert only_by_receipts(whole.seen) == {}
 
 
 @pytest.mark.parametrize("fault", REPORTED)

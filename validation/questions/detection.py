@@ -10,7 +10,7 @@ is blind to one per cent of what it hangs on is a `BlindSpot`, with what the fau
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -95,7 +95,12 @@ Watchers = dict[str, Watched]
 
 
 def detection(
-    engine: Engine, profile: str, dimension: int, dt: float = QUICK_DT, others: Iterable[tuple[Engine, str]] = ()
+    engine: Engine,
+    profile: str,
+    dimension: int,
+    dt: float = QUICK_DT,
+    others: Iterable[tuple[Engine, str]] = (),
+    scenes: Collection[str] | None = None,
 ) -> Detected:
     """Plant every fault in ``engine``, and say what sees it from which size on.
 
@@ -106,6 +111,8 @@ def detection(
     others
         Engines with their profiles: the first that can pose it takes a scene that ``engine`` cannot. What none of them
         can is left out.
+    scenes
+        Names of the canonical scenes to ask; None: all.
 
     Returns
     -------
@@ -114,7 +121,8 @@ def detection(
     seen: dict[tuple[str, str, str], float | None] = {}
     missed: dict[tuple[str, str, str], _Missed] = {}
     candidates = [(engine, profile), *others]
-    there = {name: canonical for name, canonical in CATALOGUE.items() if dimension in canonical.dimensions}
+    asked = CATALOGUE if scenes is None else {name: CATALOGUE[name] for name in scenes}
+    there = {name: canonical for name, canonical in asked.items() if dimension in canonical.dimensions}
     cells = [(name, params) for name, canonical in there.items() for params in canonical.planted]
     for scene, params in cells:
         made = CATALOGUE[scene].scene(dimension, params)

@@ -18,6 +18,8 @@ from reference_solver.certification import (
 )
 from reference_solver.certification.space import SPACES
 
+#: Piles of more than a minute of CPU each: `crosscheck certify` measures them, and `make test-long`.
+LONG = ("50 spheres", "8 spatial boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),
@@ -61,7 +63,7 @@ ALONE = [
     (random_scenes.gates,),
     (falling.dominoes,),
     (falling.rocking,),
-    *[(piles.laws, name) for name in piles.KINDS],
+    *[pytest.param((piles.laws, name), marks=[pytest.mark.long] if name in LONG else []) for name in piles.KINDS],
     *[(turning_in_space.errors, name) for name in turning_in_space.CASES],
     *[(turning_in_space.order, name) for name in turning_in_space.CASES],
     (detection.seams, SPACES[0], "polygon"),
