@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from multiprocessing.connection import wait
@@ -145,6 +146,36 @@ def test_nothing_that_a_child_has_started_outlives_it(child, leaves):
             child.receive(PATIENCE)
     child.stop()
     assert within(isolation.GRACE, lambda: not any(map(is_running, pids)))
+
+
+#: A parent that says which processes hang on it, and hangs itself.
+PARENT = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+from adapters.isolation import Child
+from served_to_children import serve
+
+if __name__ == "__main__":
+    child = Child(serve)
+    child.send(b"answer(os.getppid(), os.getpid(), start(600)); time.sleep(600)")
+    print(child.receive().decode(), flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_child_that_hangs_outlives_no_parent_that_is_killed_nor_does_what_it_has_started(serve, tmp_path):
+    """A child that serves would notice that nobody asks any more: this one never looks."""
+    (tmp_path / "parent.py").write_text(PARENT)
+    parent = subprocess.Popen([sys.executable, str(tmp_path / "parent.py"), str(tmp_path)], stdout=subprocess.PIPE)
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    parent.kill()
+    parent.wait(), parent.stdout.close()  # others may hold its end open: nothing is read there any more
+    try:
+        assert len(pids) == 3
+        assert within(isolation.GRACE, lambda: not any(map(is_running, pids)))
+    finally:
+        for pid in filter(is_running, pids):
+            os.kill(pid, signal.SIGKILL)
 
 
 def test_the_last_lines_of_what_a_child_wrote_are_kept_and_much_of_it_blocks_nobody(child):
