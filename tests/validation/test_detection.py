@@ -40,10 +40,9 @@ def test_two_per_cent_of_impulses_or_friction_break_a_receipt_of_every_engine_an
 
 @pytest.fixture(scope="module")
 def detected():
-    """What chipmunk's faults are seen by; blind spots are asked at half of the step and a quarter of it.
+    """What sees the faults of chipmunk; a blind spot is asked at half of its step and a quarter, as its test needs.
 
-    The engine has errors of its own that hide the fault at shorter steps as well: what those take to run is a quarter
-    of all. The table that is committed asks our solver down to a 128th.
+    The table that is committed has our solver's, down to a 128th.
     """
     pytest.importorskip("pymunk")
     with pytest.MonkeyPatch.context() as patch:
