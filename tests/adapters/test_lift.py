@@ -95,6 +95,19 @@ def test_a_twist_that_leaves_the_plane_is_seen(entry: int) -> None:
     assert lower_twist(twist)[1] == 0.25
 
 
+def test_what_is_no_number_hides_nothing_of_what_left_the_plane() -> None:
+    """A run that ends in NaN says how far it was out of the plane before; one of nothing else was never seen to be."""
+    pose, twist = np.zeros((3, 7)), np.zeros((3, 6))
+    pose[:, 3] = 1.0
+    pose[1, 1], twist[1, 3] = -0.5, -0.25
+    for lost in (0, 2):
+        pose[lost], twist[lost] = math.nan, math.nan
+        assert (lower_pose(pose)[1], lower_twist(twist)[1]) == (0.5, 0.25)
+    nothing = np.full((2, 7), math.nan)
+    assert (lower_pose(nothing)[1], lower_twist(nothing[:, 1:])[1]) == (0.0, 0.0)
+    assert (lower_pose(nothing[:0])[1], lower_twist(nothing[:0, 1:])[1]) == (0.0, 0.0)
+
+
 def test_an_angle_does_not_depend_on_the_sign_of_the_quaternion() -> None:
     q = np.array([math.cos(1.2), 0.0, -math.sin(1.2), 0.0])
     pose = np.array([[0.0, 0.0, 0.0, *q], [0.0, 0.0, 0.0, *-q]])

@@ -117,8 +117,7 @@ def write_table() -> None:
     scores, reasons = stored(), listed()
     lines = ["# Mutation score", "", "Written by `make mutants`, as are the survivors with their reasons in",
              "`survivors.csv`. *Open* are survivors without a reason; *stale* is a score of a module that has changed",
-             "since, or whose tests have. What a test was seen to fail on since, that one mutant applied in a copy, is",
-             "counted as killed; its module is stale until it runs whole.", "",
+             "since, or whose tests have. No number here is entered by hand.", "",
              "| module | mutants | killed | listed with a reason | open | score | CPU s | |",
              "|---|---|---|---|---|---|---|---|"]  # fmt: skip
     for module in SUBJECTS:

@@ -1,10 +1,16 @@
 """``accept``: shows families, asks for the reason of each, and cannot be talked into what must not be listed."""
 
+import io
+import re
+from types import SimpleNamespace
+
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from reports.command import accepting, main
 from validation.findings import files
+from validation.judging.acceptance import Change
 
 FAMILY = """
 [[family]]
@@ -99,6 +105,27 @@ def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
     assert result.exit_code == 2
     assert "has no reason" in result.stderr
     assert members(findings) == []
+
+
+def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_another():
+    """Listed are those that stay, those that drifted and those that are gone."""
+    counts = {"one": (111, 2, 30, 4), "another": (0, 12345, 0, 0)}
+    changes = [
+        Change(SimpleNamespace(id=name, reason="four sweeps" if name == "one" else ""),
+               *(dict.fromkeys(range(number)) for number in each)) for name, each in counts.items()
+    ]  # fmt: skip
+    told = io.StringIO()
+    Console(file=told, width=120).print(accepting._table("toy", changes))
+    title, header, first, second = (line for line in told.getvalue().splitlines() if re.search(r"\w", line))
+    assert title.strip() == "Findings of toy: rows per family"
+    cells = [re.split(r"[│┃]", line)[1:-1] for line in (header, first, second)]
+    assert [[cell.strip() for cell in line] for line in cells] == [
+        ["family", "listed", "new", "drifted", "gone", "why"],
+        ["one", "145", "2", "30", "4", "four sweeps"],
+        ["another", "0", "12345", "0", "0", "nobody has said why yet"],
+    ]
+    for line in cells:
+        assert all(cell[-2] != " " for cell in line[1:5]) and all(cell[1] != " " for cell in (line[0], line[5]))
 
 
 def test_an_unknown_family_is_a_wrong_call(out, findings):

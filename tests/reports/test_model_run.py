@@ -15,7 +15,8 @@ from reports.command import main
 from reports.spread import spread_lines
 from validation import posed
 from validation.cells import Observation, Outcome, Slot
-from validation.files.model_files import canonical_from_text, momentum_drift
+from validation.files.model_files import _momentum_check, canonical_from_text, momentum_drift
+from validation.judging.verdicts import Physics, judge_physics
 from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.tracks import Recording
@@ -149,6 +150,29 @@ def falling(kick=0.0, impulse=None, n=21, dt=0.05):
 def test_momentum_that_nobody_gave_is_seen():
     assert momentum_drift(*falling())[0] == pytest.approx(0.0, abs=1e-12)
     assert momentum_drift(*falling(kick=0.01))[0] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("dt", "thousands"), [(0.05, 1.0), (1 / 1000, 1.0), (1 / 4000, 4.0)])
+def test_momentum_of_free_bodies_alone_is_judged_to_round_off_of_what_they_have_and_are_given(dt, thousands):
+    """2 kg at 5 m/s and 3 kg at rest have 10 N s; 20 N, and 30 N less a force of 10 N, give them 40 N s in a second.
+
+    Momenta are sums of a thousand steps' roundings each: 1e-12 of them (`validation.bounds.ROUND_OFF`).
+    """
+    scene, falls = falling()
+    thrown = replace(scene.bodies[0], twist=(3.0, 4.0, 0.0))
+    held = Body("held", Disc(0.1), 3.0, 0.01, (5.0, 9.0, 0.0), force=(0.0, 10.0))
+    check = _momentum_check(replace(scene, bodies=(thrown, held)), dt)
+    assert (check.metric, check.unit, check.truth) == ("momentum_drift", "N s", 0.0)
+    assert check.bound == pytest.approx(1e-12 * thousands * (10.0 + 40.0)) and "round-off" in check.because
+    drift = momentum_drift(scene, falls)[0]
+    assert judge_physics(drift, _momentum_check(scene, falls.dt)) is Physics.PASS
+    assert judge_physics(momentum_drift(*falling(kick=1e-9))[0], _momentum_check(scene, falls.dt)) is Physics.FAIL
+
+
+def test_momentum_that_a_fixed_body_may_have_taken_is_shown_and_not_judged():
+    check = _momentum_check(falling(impulse=(0.0, 1.0))[0], 0.05)
+    assert (check.metric, check.unit, check.truth, check.bound) == ("momentum_drift", "N s", None, None)
+    assert check.because.startswith("shown")
 
 
 def test_momentum_of_a_fixed_body_is_its_reported_impulse():

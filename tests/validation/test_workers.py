@@ -178,8 +178,13 @@ def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():
 
 
 def test_open_files_are_counted_from_the_first_look_at_a_process(monkeypatch):
-    """A leak of one a cell ends the process after as many cells as it may keep files, also where each cell imports."""
+    """A leak of one a cell ends the process after as many cells as it may keep files, also where each cell imports.
+
+    Files that tests before this one have left to the collector must not be closed while these are counted.
+    """
     gc.collect()
+    collects = gc.isenabled()
+    gc.disable()
     before = first = state.taken()
     assert first.facts[state.OPEN_FILES] > 0
     opened = []
@@ -196,3 +201,5 @@ def test_open_files_are_counted_from_the_first_look_at_a_process(monkeypatch):
     finally:
         for number in opened:
             os.close(number)
+        if collects:
+            gc.enable()
