@@ -14,6 +14,11 @@ _SWEPT = "overlaps and slips are taken back by a share in each sweep, and what a
 _REBOUNDS = "rebounds come after the sweeps, from approaches before them, without friction, and numbers are singles"
 _ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
 _PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
+_COLUMNS = (
+    "a sweep gives a box the mean of what its contacts ask for, and tells of a face the mean of two boxes; what it "
+    "leaves of an overlap is a velocity"
+)
+_STANDING = ("settle_time", "penetration", "kinetic_energy", "impulse_scatter")
 
 #: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook. Left out is what
 #: it misses, for which there is no reason yet: of `rolling_spin` the spin by 2 to 200 bands, of `roll_incline` the
@@ -47,6 +52,8 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "pressed_box": (_SWEPT, ("creep", "acceleration")),
     "v_groove": (_SWEPT, ("load",)),
     "rod_gas": (_REBOUNDS, ("astray", "energy_defect", "wrong_speed")),
+    "stack": (_COLUMNS, (*_STANDING, *(f"interface_impulse[{k}]" for k in range(1, 21)))),
+    "heavy_on_light": (_COLUMNS, (*_STANDING, "interface_impulse[1]", "interface_impulse[2]")),
 }
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(
@@ -57,7 +64,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         exactly(metric),
         motion_law(metric, profile),
         because,
-        "xpbd/kernels.py, xpbd/restitution_kernels.py; recurrence in adapters/newton/motion.py",
+        "xpbd/kernels.py, xpbd/restitution_kernels.py; recurrence in adapters/newton/motion.py"
+        + (", column.py" if because is _COLUMNS else ""),
         ("1.8.",),
     )
     for profile in PROFILES

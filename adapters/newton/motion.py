@@ -46,6 +46,7 @@ from adapters.law import Law, Measure, Prediction
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.means import means
 from adapters.needs import needs
+from adapters.newton.column import column_moved, column_of
 from adapters.newton.profiles import PROFILES
 from adapters.newton.shipped import LEAST_APPROACH, STOPPED
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
@@ -239,13 +240,20 @@ def moved(
     longer: float = 0.0,
     blur: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Trajectory | None:
-    """The motion of a scene, every step, in doubles or singles; None for a scene that is not `followed`.
+    """The motion of a scene, every step, in doubles or singles; None if it is neither `followed` nor a column.
 
     ``longer``: share by which steps are longer, under the same settings; times are told as if they were not.
     ``blur``: by which share of its place the two points of a contact are seen apart, along three axes.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
-    return _moved(scene, dt, profile, single, longer, blur) if followed(spatial) else None
+    if followed(spatial):
+        return _moved(scene, dt, profile, single, longer, blur)
+    column = column_of(spatial)
+    if column is None:
+        return None
+    chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+    steps, flat = step_count(scene.duration, dt), scene.dimension == 2
+    return column_moved(spatial, column, steps, dt, longer, chosen, single, blur, flat)
 
 
 class _Asked:
