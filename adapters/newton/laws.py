@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, exactly
-from adapters.newton.motion import motion_law
+from adapters.newton.motion import motion_law, swept_law
 from adapters.newton.profiles import PROFILES
 from adapters.single_precision import UNIT, Method, rounded_law
 from adapters.unswept import passing_law
@@ -67,6 +67,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         "xpbd/kernels.py, xpbd/restitution_kernels.py; recurrence in adapters/newton/motion.py"
         + (", column.py" if because is _COLUMNS else ""),
         ("1.8.",),
+        swept_law(metric, profile),
     )
     for profile in PROFILES
     for scene, (because, metrics) in MOTIONS.items()
