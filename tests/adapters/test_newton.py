@@ -273,3 +273,15 @@ def test_what_a_column_s_contacts_tell_is_the_mean_that_two_bodies_make_of_it(di
         told = asked / many[0] if k == 0 else 2.0 * asked / (many[k - 1] + many[k])
         off = abs(found[f"interface_impulse[{k + 1}]"][0] - told / above)
         assert off <= 2.0 * STOPPED / (9.81 * DT) < abs(1.0 - told / above)
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+def test_a_box_too_far_away_stays_where_it_is_while_its_speed_grows(profile):
+    far = CATALOGUE["far_origin"]
+    scene = far.scene(3, {})
+    found = far.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), far.sampling(scene)))
+    for metric in ("stopping_distance", "braking", "end_speed"):
+        (law,) = [d.law for d in DEVIATIONS if d.covers("newton", "1.8.0", profile, "far_origin", metric)]
+        said, band = law(scene, DT, far.measure)
+        assert abs(found[metric][0] - said) <= band < 1e-3
+        assert law(far.scene(3, {"far": 1e3}), DT, far.measure) is None
