@@ -23,6 +23,8 @@ Measure = Callable[[Scene, Trajectory], dict[str, Measured]]
 Prediction = tuple[float, float]
 #: ``law(scene, dt, measure)`` or None where the law says nothing about this scene.
 Law = Callable[[Scene, float, Measure], Prediction | None]
+#: ``law(scene, dt, measure, iterations)``: the same where a slot asks for another count than its profile's own.
+AskedLaw = Callable[[Scene, float, Measure, int], Prediction | None]
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,8 @@ class Deviation:
         The mechanism in one sentence, and where it is documented or read.
     versions
         Prefixes of engine versions it was checked on; an empty tuple means all.
+    asked
+        What the law says at iterations that are asked for; nothing, unless it follows the engine's sweeps.
     """
 
     engine: str
@@ -51,6 +55,13 @@ class Deviation:
     because: str
     source: str
     versions: tuple[str, ...] = ()
+    asked: AskedLaw | None = None
+
+    def says(self, scene: Scene, dt: float, measure: Measure, iterations: int | None = None) -> Prediction | None:
+        """What is predicted at the profile's own iterations, or at those that are asked for."""
+        if iterations is None:
+            return self.law(scene, dt, measure)
+        return self.asked(scene, dt, measure, iterations) if self.asked else None
 
     def covers(self, engine: str, version: str, profile: str, scene: str, metric: str) -> bool:
         """Whether the law speaks about this row."""

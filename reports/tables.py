@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
@@ -109,7 +110,7 @@ def _engine(data: Plain, console: Console) -> None:
     _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
     for profile, scenes in data["profiles"].items():
         _heading(f"Profile {profile}", console)
-        console.print(_settings(scenes))
+        _settings(scenes, console)
     _heading("Habits, and what the adapter does about them", console)
     table = grid("habit", "what we do", "source")
     table.columns[0].no_wrap = False
@@ -140,17 +141,28 @@ def _said_of(fact: Plain) -> str:
     return f"{cell}: {fact['metric']} {off}{number(fact['found'])}{because}"
 
 
-def _settings(scenes: Mapping[str, Sequence[Plain]]) -> Table:
-    """One line per setting and value; names the scenes where a value is not the same in all."""
+def _settings(scenes: Mapping[str, Sequence[Plain]], console: Console) -> None:
+    """Print one line per setting and value; scenes are named below, once for all settings that go with them.
+
+    Half a hundred names in a column leave none of a line's 80 characters for the reason beside them.
+    """
     found: dict[tuple[str, str, str], list[str]] = {}
     for scene, settings in scenes.items():
         for s in settings:
             found.setdefault((s["name"], setting_text(s["value"]), s["because"]), []).append(scene)
+    marks: dict[tuple[str, ...], str] = {tuple(scenes): ""}
     table = grid("setting", "value", "in", "because")
     for (name, value, because), where in found.items():
-        everywhere = len(where) == len(scenes)
-        table.add_row(name, Text(value), "" if everywhere else ", ".join(where), Text(because))
-    return table
+        mark = marks.setdefault(tuple(where), f"({len(marks)})")
+        table.add_row(name, Text(value), mark, Text(because))
+    console.print(table)
+    for names, mark in marks.items():
+        if mark:
+            others = tuple(scene for scene in scenes if scene not in names)
+            # The fewer are named, and only once.
+            but = f"all but {marks.get(others, ', '.join(others))}"
+            named = but if len(others) < len(names) else ", ".join(names)
+            console.print(Padding(Text(f"{mark} {named}"), (0, 0, 0, 2)))
 
 
 def _pairs(data: Plain, console: Console) -> None:

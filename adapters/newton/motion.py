@@ -42,10 +42,11 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Contacts as EngineContacts
-from adapters.law import Law, Measure, Prediction
+from adapters.law import AskedLaw, Law, Measure, Prediction
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.means import means
 from adapters.needs import needs
+from adapters.newton.column import column_moved, column_of
 from adapters.newton.profiles import PROFILES
 from adapters.newton.shipped import LEAST_APPROACH, STOPPED
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
@@ -187,13 +188,17 @@ def followed(scene: Scene) -> bool:
 
 
 def _moved(
-    scene: Scene, dt: float, profile: str, single: bool, longer: float, blur: tuple[float, float, float]
+    scene: Scene,
+    dt: float,
+    chosen: Mapping[str, Any],
+    single: bool,
+    longer: float,
+    blur: tuple[float, float, float],
 ) -> Trajectory:
     """The motion of a scene that is `followed`."""
     from adapters.newton.recurrence import Told, run
 
     spatial = scene if scene.dimension == 3 else lift(scene)
-    chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
     kind = np.float32 if single else np.float64
     steps, layout = step_count(scene.duration, dt), _Layout(spatial, dt * (1.0 + longer), chosen, kind, blur)
     many, pairs = len(layout.free), len(layout.pairs)
@@ -238,14 +243,25 @@ def moved(
     single: bool = False,
     longer: float = 0.0,
     blur: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    iterations: int | None = None,
 ) -> Trajectory | None:
-    """The motion of a scene, every step, in doubles or singles; None for a scene that is not `followed`.
+    """The motion of a scene, every step, in doubles or singles; None if it is neither `followed` nor a column.
 
     ``longer``: share by which steps are longer, under the same settings; times are told as if they were not.
     ``blur``: by which share of its place the two points of a contact are seen apart, along three axes.
+    ``iterations``: sweeps that are asked for, in place of the profile's.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
-    return _moved(scene, dt, profile, single, longer, blur) if followed(spatial) else None
+    chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+    if iterations is not None:
+        chosen["iterations"] = iterations
+    if followed(spatial):
+        return _moved(scene, dt, chosen, single, longer, blur)
+    column = column_of(spatial)
+    if column is None:
+        return None
+    steps, flat = step_count(scene.duration, dt), scene.dimension == 2
+    return column_moved(spatial, column, steps, dt, longer, chosen, single, blur, flat)
 
 
 class _Asked:
@@ -262,14 +278,18 @@ class _Asked:
 
 
 @lru_cache(maxsize=4096)  # tables of some twenty numbers: more cells than any suite asks of one engine
-def _readings(asked: _Asked, dt: float, profile: str) -> Mapping[str, tuple[float, float]]:
+def _readings(
+    asked: _Asked, dt: float, profile: str, iterations: int | None = None
+) -> Mapping[str, tuple[float, float]]:
     """What doubles make of each metric, and the band that roundings ask for."""
     scene = asked.scene
     values: Mapping[str, Measured] = {}
     missed: dict[str, list[float]] = {}
     chance = np.random.default_rng(0)
     for draw in range(DRAWS):
-        exact, rounded = (moved(scene, dt, profile, single, draw * LONGER) for single in (False, True))
+        exact, rounded = (
+            moved(scene, dt, profile, single, draw * LONGER, iterations=iterations) for single in (False, True)
+        )
         if exact is None or rounded is None:
             return {}
         found, other = asked.measure(scene, exact), asked.measure(scene, _told_otherwise(rounded, scene, chance))
@@ -280,7 +300,7 @@ def _readings(asked: _Asked, dt: float, profile: str) -> Mapping[str, tuple[floa
     bands = {metric: QUANTILE * math.sqrt(sum(miss * miss for miss in each) / DRAWS) for metric, each in missed.items()}
     share = ROUNDINGS * UNIT
     for blur in ((share, 0.0, 0.0), (0.0, share, 0.0), (0.0, 0.0, share)):
-        blurred = moved(scene, dt, profile, blur=blur)
+        blurred = moved(scene, dt, profile, blur=blur, iterations=iterations)
         found = asked.measure(scene, blurred) if blurred else {}
         for metric, (value, _) in values.items():
             told = found[metric][0] if metric in found else None
@@ -304,12 +324,27 @@ def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generato
     return replace(motion, pose=pose, twist=twist, contacts=record)
 
 
+def _predicted(
+    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None
+) -> Prediction | None:
+    value, band = _readings(_Asked(scene, measure), dt, profile, iterations).get(metric, (0.0, math.inf))
+    band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
+    return (value, band) if 0.0 < band <= VAGUE * abs(value) else None
+
+
 def motion_law(metric: str, profile: str) -> Law:
     """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        value, band = _readings(_Asked(scene, measure), dt, profile).get(metric, (0.0, math.inf))
-        band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
-        return (value, band) if 0.0 < band <= VAGUE * abs(value) else None
+        return _predicted(scene, dt, measure, metric, profile, None)
+
+    return law
+
+
+def swept_law(metric: str, profile: str) -> AskedLaw:
+    """As `motion_law`, at another number of sweeps."""
+
+    def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
+        return _predicted(scene, dt, measure, metric, profile, iterations)
 
     return law

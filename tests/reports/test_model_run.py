@@ -1,6 +1,7 @@
 """`crosscheck run model.xml`: a model people have, on every engine, as a user calls it."""
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,6 +92,48 @@ def test_a_robot_in_urdf_runs_as_well(tmp_path):
     assert "friction 1 in all pairs" in done.stderr
     arm = call("run", MODELS / "refused_arm.urdf", "--engine", "mujoco", "--out", tmp_path / "no", status=(2,))
     assert "line 3: <joint> 'shoulder': a revolute joint" in arm.output and len(arm.output.splitlines()) == 1
+
+
+def _said_of_models():
+    """Rows of the two tables of `tests/models/README.md`, by model."""
+    text = (MODELS / "README.md").read_text()
+    rows = [
+        [cell.strip(" `") for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| `")
+    ]
+    return {name: cells for name, *cells in rows}
+
+
+def test_the_table_of_models_speaks_of_each_and_of_twenty_that_run_on_three_engines_and_the_reference():
+    said = _said_of_models()
+    assert set(said) == {path.name for path in MODELS.iterdir() if path.suffix in (".xml", ".urdf")} and len(said) >= 30
+    everywhere = [name for name, cells in said.items() if len(cells) == 4
+                  and all(cell in ("2-D", "3-D", "2-D and 3-D") for cell in cells)]  # fmt: skip
+    assert len(everywhere) >= 20
+
+
+@pytest.mark.skipif(not os.environ.get("CROSSCHECK_SOAK"), reason="half a minute a model; CROSSCHECK_SOAK=1")
+@pytest.mark.parametrize("name", sorted(path.name for path in MODELS.iterdir() if path.suffix in (".xml", ".urdf")))
+def test_a_model_runs_as_the_table_says(name, tmp_path):
+    for package in ("pymunk", "pybullet"):
+        pytest.importorskip(package)
+    engines = ("reference", "bullet", "mujoco", "chipmunk")
+    words = [word for engine in engines for word in ("--engine", engine)]
+    cells = _said_of_models()[name]
+    refused = len(cells) == 1
+    done = call("run", MODELS / name, *words, "--profile", "default", "--profile", "reference", "--jobs", 1, "--out",
+                tmp_path, "--json", status=(2,) if refused else (0, 1))  # fmt: skip
+    if refused:
+        assert done.output.strip().endswith(cells[0]) and len(done.output.splitlines()) == 1
+        return
+    rows = json.loads(done.stdout)
+    for engine, cell in zip(engines, cells, strict=True):
+        ran = [row for row in rows if row["engine"] == engine and row["outcome"] != "unsupported"]
+        bad = {row["dimension"] for row in ran if row["outcome"] != "ok"}
+        assert {row["outcome"] for row in ran} <= {"ok", "invalid"}
+        assert " and ".join(f"{d}-D" for d in sorted({row["dimension"] for row in ran} - bad)) == (
+            "" if cell == "not planar" or cell.startswith("-") else cell.partition(";")[0]
+        )
+        assert bool(bad) == ("certificate refuses it" in cell)
 
 
 def test_sdf_is_refused_in_one_line_that_says_what_is_read(tmp_path):

@@ -120,6 +120,26 @@ def test_settings_and_habits_of_a_plugin_are_shown_as_they_are(monkeypatch):
     assert flat(result.stdout).count(said) >= 6
 
 
+def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch):
+    """Four settings of forty of fifty scenes: named once, as all but ten, and a reason of 30 letters stays whole."""
+    data = listing.describe("chipmunk")
+    if data["status"] != "installed":
+        pytest.skip(f"chipmunk: {data['reason']}")
+    because = "thirty letters give the reason"
+    scenes = [f"scene_number_{k}" for k in range(50)]
+    data["profiles"] = {"tuned": {
+        name: [{"name": f"aSettingOfTwentyNineLetters{n}", "value": 1 + k // 40, "because": because, "source": ""}
+               for n in range(4)]
+        for k, name in enumerate(scenes)
+    }}  # fmt: skip
+    monkeypatch.setattr(listing, "describe", lambda name: data)
+    said = call("describe", "chipmunk").stdout
+    assert sum(because in line for line in said.splitlines()) == 8
+    assert flat(said).count("(1) all but (2)") == 1 and said.count("scene_number_40") == 1
+    assert "scene_number_1," not in said
+    assert flat(said).count("(2) scene_number_40, scene_number_41") == 1
+
+
 def test_every_command_has_the_console_that_reads_no_markup():
     made = []
     for path in Path(reports.__file__).parent.rglob("*.py"):

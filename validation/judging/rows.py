@@ -213,9 +213,9 @@ def _certificate(observation: Observation, check: Check) -> str:
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
-    """What laws say about a FAIL. They state what a profile's own settings do, so not at iterations asked for."""
+    """What laws say about a FAIL; at iterations asked for those alone that follow an engine's sweeps."""
     slot = observation.slot
-    if judge_physics(value, check) is not Physics.FAIL or slot.iterations is not None:
+    if judge_physics(value, check) is not Physics.FAIL:
         return []
     laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
     return predicted(laws, scene, slot, resolve(slot.scene).measure)
@@ -223,7 +223,7 @@ def _predictions(observation: Observation, scene: Scene, check: Check, value: fl
 
 def predictions_of(row: Row) -> list[Prediction]:
     """What deviation laws say about a failing row, whether or not it is so; nothing about a study."""
-    if row.physics != Physics.FAIL.value or row.iterations is not None or len(row.cells) > 1:
+    if row.physics != Physics.FAIL.value or len(row.cells) > 1:
         return []
     slot = slot_from_dict(row.slot)
     canonical = resolve(slot.scene)

@@ -69,7 +69,7 @@ def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot, measure: Meas
 
     ``measure`` is the scene's own: a law predicts a motion, and what a row shows is read from it.
     """
-    said = ((law, law.law(scene, slot.dt, measure)) for law in laws)
+    said = ((law, law.says(scene, slot.dt, measure, slot.iterations)) for law in laws)
     return [(law, *prediction) for law, prediction in said if prediction is not None]
 
 
