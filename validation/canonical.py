@@ -108,7 +108,7 @@ FAMILIES = (
     "rebound", "materials", "grip and force", "stacks and statics", "friction", "turning", "many impacts", "hard",
 )  # fmt: skip
 
-#: A few cells a scene; those whose FAILs are listed row by row; all that are stated. Each holds those before it.
+#: A few cells a scene; those and others whose FAILs are listed row by row; those that map a scene out.
 Suite = Literal["quick", "standard", "full"]
 SUITES: tuple[Suite, ...] = ("quick", "standard", "full")
 #: Parameters of a cell, as what differs from the scene's defaults.
@@ -348,7 +348,8 @@ class CanonicalScene:
         What people would look for it under: one of `FAMILIES`, or a name of its own.
     quick, standard, full
         Cells of the suites: a few, between them every kind of answer that engines give; those whose FAILs are listed
-        row by row; all. Without cells of its own a suite has those of the one before it.
+        row by row; those that map the scene out, where defaults may be left out. Without cells of its own a suite has
+        those of the one before it.
     representative
         The cell that stands for the scene: its noise floor is measured and its motion is kept for the replay.
     planted

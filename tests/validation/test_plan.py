@@ -10,7 +10,6 @@ from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
 from adapters.scene import SceneError
 from validation import identity
-from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, Slot, slot_from_dict
 from validation.running import plan
@@ -103,10 +102,10 @@ def test_a_slot_may_ask_as_much_as_it_is_told_and_no_more(field, most, least):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_each_suite_holds_the_one_before_it_and_the_quick_one_has_a_few_cells_with_every_check(name):
+def test_the_quick_suite_has_a_few_cells_of_the_standard_one_with_every_check_of_each_scene(name):
     canonical = CATALOGUE[name]
     asked, stated = {}, {}
-    for suite in SUITES:
+    for suite in ("quick", "standard"):
         asked[suite] = {
             (canonical.minimal(each.params), count, dimension)
             for each in canonical.variations(suite)
@@ -120,7 +119,7 @@ def test_each_suite_holds_the_one_before_it_and_the_quick_one_has_a_few_cells_wi
             for check in canonical.checks(canonical.scene(dimension, dict(params)), plan.QUICK_DT)
             if check.truth is not None
         }
-    assert asked["quick"] <= asked["standard"] <= asked["full"]
+    assert asked["quick"] <= asked["standard"]
     assert len({cell[:2] for cell in asked["quick"]}) <= 8
     assert stated["quick"] == stated["standard"]
     assert {canonical.minimal(canonical.representative)} <= {params for params, _, _ in asked["quick"]}

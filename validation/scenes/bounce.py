@@ -250,7 +250,7 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     track=track,
-    # Two phases of the first impact (Bullet's steps hide an apex at one of them), and the edges of restitution.
+    # Two phases of the first impact, for an engine may miss an apex at one of them, and the edges of restitution.
     quick=(*_from(0.8, HEIGHTS[0], HEIGHTS[3]), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
     standard=(*_from_all_heights(0.8), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
     full=_from_all_heights(0.5, 0.8, 0.95, 1.0),
