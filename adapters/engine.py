@@ -131,6 +131,26 @@ class Contacts:
         return cls(a, b, point, sign * normal, sign * impulse, gap)
 
 
+@dataclass(frozen=True)
+class Recorded:
+    """States of a stretch of a run, one after another.
+
+    Parameters
+    ----------
+    pose, twist
+        (s, n, 3 | 7) and (s, n, 3 | 6), as `Simulation.pose` and `Simulation.twist` tell each of them.
+    counts
+        (s,) how many contacts belong to each.
+    contacts
+        Those of all, in that order; None where they were not asked for.
+    """
+
+    pose: Array
+    twist: Array
+    counts: NDArray[np.int64]
+    contacts: Contacts | None = None
+
+
 class Simulation(ABC):
     """One built world. Built fresh for every run, never reset. What is missing is an error, not a zero."""
 
@@ -152,6 +172,14 @@ class Simulation(ABC):
     @abstractmethod
     def contacts(self) -> Contacts:
         """Contacts with the impulses of the last step made."""
+
+    def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
+        """Make ``samples`` times ``stride`` steps and tell the state after each ``stride`` of them, or None: make none.
+
+        For engines that can do so without a call per step. It must be, bit for bit, what `advance` and the readers tell
+        sample after sample.
+        """
+        return None
 
     @abstractmethod
     def readback(self) -> dict[str, Any]:

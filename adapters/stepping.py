@@ -3,7 +3,8 @@
     build -> sample -> [ advance(stride) -> sample -> finite? ] ... -> readback -> close
 
 Every engine is driven, sampled and stopped by these lines, so that a difference between two trajectories is a
-difference between two engines.
+difference between two engines. One that can tell many samples at once (`Simulation.record`) is asked for them at once,
+and in the way above where one of them ends the run.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from adapters.drives import as_moving, asked_abilities, top_speed
-from adapters.engine import Array, Contacts, Engine, EngineError, Simulation
+from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.scene import Body, Scene
 from adapters.shapes import reach
@@ -30,6 +31,8 @@ EXPLOSION_FACTOR = 1e3
 
 #: States that are read as the scene's own at once: enough that a read costs little, and little memory beside a run.
 AT_ONCE = 1024
+#: Samples that an engine is asked for in one call: each enters it seldom, and a run that explodes ends soon.
+IN_ONE_CALL = 256
 CONTACT_FIELDS = tuple(field.name for field in fields(Contacts))
 
 
@@ -61,6 +64,18 @@ class _Seen:
         self.poses.append(np.array(simulation.pose()))
         self.twists.append(np.array(simulation.twist()))
 
+    def take(self, found: Recorded) -> bool:
+        """Keep states that were recorded at once; False, and none of them is kept, if one of them may be none.
+
+        The sums are those of `divergence`, over all states.
+        """
+        pose, twist = found.pose, found.twist
+        if not (np.vdot(twist, twist) < 0.5 * self.limit * self.limit and math.isfinite(np.vdot(pose, pose))):
+            return False
+        self._read_all()
+        self._read(pose, twist)
+        return True
+
     def divergence(self) -> str:
         """Why the last state is none; empty if it is one.
 
@@ -80,10 +95,14 @@ class _Seen:
         return pose, twist, self.outside
 
     def _read_all(self) -> None:
-        pose, twist, outside = self._lowered(np.array(self.poses), np.array(self.twists))
+        if self.poses:
+            self._read(np.array(self.poses), np.array(self.twists))
+        self.poses, self.twists = [], []
+
+    def _read(self, pose: Array, twist: Array) -> None:
+        pose, twist, outside = self._lowered(pose, twist)
         self.read.append((pose, twist))
         self.outside = max(self.outside, outside)
-        self.poses, self.twists = [], []
 
     def _lowered(self, pose: Array, twist: Array) -> tuple[Array, Array, float]:
         outside = 0.0
@@ -158,11 +177,16 @@ def run(
     sampling = sampling or Sampling()
     posed = posed_for(engine, scene)
     started = time.perf_counter()
-    simulation = engine.build(posed, dt, settings)
-    try:
-        return _record(simulation, scene, posed, dt, sampling, started)
-    finally:
-        simulation.close()
+    # What an engine says of a run that diverged is of the instant at which it did: that run is made sample by sample.
+    for in_one_call in (IN_ONE_CALL, 0):
+        simulation = engine.build(posed, dt, settings)
+        try:
+            found = _record(simulation, scene, posed, dt, sampling, started, in_one_call)
+        finally:
+            simulation.close()
+        if found is not None:
+            return found
+    raise AssertionError("a run that is made sample by sample ends in a trajectory")
 
 
 def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[int]:
@@ -176,21 +200,36 @@ def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[in
 
 
 def _record(
-    simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float
-) -> Trajectory:
+    simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float, in_one_call: int
+) -> Trajectory | None:
+    """Step and sample; None where one of the samples that were asked for at once may be the last of the run."""
     flat = posed.dimension != scene.dimension
     pairs = enumerate(zip(scene.bodies, posed.bodies, strict=True))
     standing = [i for i, (asked, body) in pairs if asked.motion != body.motion]
     seen = _Seen(scene, flat, standing, EXPLOSION_FACTOR * _fastest(scene))
     seen.look(simulation)
+    steps, stride = step_count(scene.duration, dt), sampling.stride
     steps_at = [0]
-    collected: list[tuple[int, Contacts]] = []
+    collected: list[tuple[range, Sequence[int], Contacts]] = []
     finish, reason = "completed", ""
-    for done in advances(simulation, step_count(scene.duration, dt), sampling.stride):
+    while in_one_call:
+        samples, contacts = _alike(sampling, dt, steps_at[-1], min(in_one_call, (steps - steps_at[-1]) // stride))
+        found = simulation.record(samples, stride, contacts) if samples else None
+        if found is None:
+            break
+        if not seen.take(found):
+            return None
+        if found.contacts is not None:
+            collected.append((range(len(steps_at), len(steps_at) + samples), found.counts.tolist(), found.contacts))
+        steps_at += [steps_at[-1] + stride * (k + 1) for k in range(samples)]
+    begun = steps_at[-1]
+    for more in advances(simulation, steps - begun, stride):
+        done = begun + more
         seen.look(simulation)
         steps_at.append(done)
-        if sampling.contacts_from is not None and done * dt > sampling.contacts_from - 0.5 * dt:
-            collected.append((len(steps_at) - 1, _kept(simulation.contacts())))
+        if _has_contacts(sampling, dt, done):
+            told = _kept(simulation.contacts())
+            collected.append((range(len(steps_at) - 1, len(steps_at)), [len(told.a)], told))
         reason = seen.divergence()
         if reason:
             finish, reason = "diverged", f"{reason} at t = {done * dt:.6g} s"
@@ -210,6 +249,19 @@ def _record(
         out_of_plane=outside,
         wall_time=time.perf_counter() - started,
     )
+
+
+def _has_contacts(sampling: Sampling, dt: float, done: int) -> bool:
+    """Whether the sample after ``done`` steps is recorded with its contacts."""
+    return sampling.contacts_from is not None and done * dt > sampling.contacts_from - 0.5 * dt
+
+
+def _alike(sampling: Sampling, dt: float, done: int, most: int) -> tuple[int, bool]:
+    """How many of the samples that follow, ``most`` at most, all have their contacts recorded or not, and whether."""
+    ends = range(done + sampling.stride, done + sampling.stride * (most + 1), sampling.stride)
+    if not ends or _has_contacts(sampling, dt, ends[0]) or not _has_contacts(sampling, dt, ends[-1]):
+        return most, bool(ends) and _has_contacts(sampling, dt, ends[0])
+    return next(k for k, end in enumerate(ends) if _has_contacts(sampling, dt, end)), False
 
 
 def _fastest(scene: Scene) -> float:
@@ -238,10 +290,12 @@ def _kept(contacts: Contacts) -> Contacts:
     return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
 
 
-def _join(collected: list[tuple[int, Contacts]], dimension: int, flat: bool) -> ContactRecord:
-    offset = np.cumsum([0] + [len(contacts.a) for _, contacts in collected])
+def _join(collected: list[tuple[range, Sequence[int], Contacts]], dimension: int, flat: bool) -> ContactRecord:
+    """Contacts of all samples: which samples they are, how many each has, and they themselves, part by part."""
+    offset = np.cumsum([0] + [count for _, counts, _ in collected for count in counts])
     empty = Contacts.from_rows([], dimension)
-    parts = [empty] + [contacts for _, contacts in collected]
+    parts = [empty] + [contacts for _, _, contacts in collected]
     rows = Contacts(*(np.concatenate([getattr(part, name) for part in parts]) for name in CONTACT_FIELDS))
     rows = lower_contacts(rows) if flat else rows
-    return ContactRecord(np.array([index for index, _ in collected], np.int64), offset.astype(np.int64), rows)
+    samples = [sample for numbers, _, _ in collected for sample in numbers]
+    return ContactRecord(np.array(samples, np.int64), offset.astype(np.int64), rows)

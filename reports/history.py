@@ -16,7 +16,7 @@ from validation.releases.notes import explanations
 
 HEAD = """# Physics over engine releases
 
-Made by `make releases`{commit}. The same cells of every scene of the quick suite on each release,
+Made by `make releases`{commit}. The same cells of every scene of the standard suite on each release,
 driven by one adapter in an environment of its own; receipts ran before each cell. A row is one check of one cell.
 *fails* counts rows outside their tolerance; *no answer* those whose cell crashed, hung or is not driven as declared:
 they fail no check and are no better for it; *mended* those that pass although they are listed as findings of other

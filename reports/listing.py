@@ -13,6 +13,7 @@ from adapters import engine_folder, registry
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import SceneError
+from validation.canonical import SUITES, Variation
 from validation.catalogue import CATALOGUE, broken
 from validation.field.measured import facts_of
 from validation.identity import commit, machine
@@ -26,6 +27,27 @@ def scenes() -> list[dict[str, Any]]:
         {"name": s.name, "version": s.version, "title": s.title, "dimensions": list(s.dimensions), "law": s.law}
         for s in CATALOGUE.values()
     ]
+
+
+def suites() -> list[dict[str, Any]]:
+    """Cells of each scene that the suites ask of a profile with an iteration count at 1/240 s, and their parameters."""
+    out: list[dict[str, Any]] = []
+    for canonical in CATALOGUE.values():
+        asked = {suite: canonical.variations(suite) for suite in SUITES}
+        counts = {
+            suite: sum(len(v.iterations) * sum(map(v.runs_in, canonical.dimensions)) for v in variations)
+            for suite, variations in asked.items()
+        }
+        out.append({"name": canonical.name, **counts, "of_quick": [_cell(v) for v in asked["quick"]]})
+    total = {suite: sum(entry[suite] for entry in out) for suite in SUITES}
+    return [*out, {"name": "all", **total, "of_quick": []}]
+
+
+def _cell(variation: Variation) -> str:
+    """``n=10 at own/1/30 iterations``."""
+    params = " ".join(f"{name}={value:g}" for name, value in variation.params.items()) or "as it is"
+    counts = "/".join("own" if count is None else str(count) for count in variation.iterations)
+    return params if variation.iterations == (None,) else f"{params} at {counts} iterations"
 
 
 def engines() -> list[dict[str, Any]]:
@@ -46,7 +68,7 @@ def checks() -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for canonical in CATALOGUE.values():
         seen: dict[str, dict[str, Any]] = {}
-        for variation in canonical.variations("quick"):
+        for variation in canonical.variations("standard"):
             scene = canonical.scene(canonical.dimensions[0], variation.params)
             for check in canonical.checks(scene, QUICK_DT):
                 name = f"{canonical.name}/{check.metric.partition('[')[0]}"

@@ -22,6 +22,13 @@ FEW = 4
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
+    "suites": (
+        ("scene", "name"),
+        ("quick", "quick"),
+        ("standard", "standard"),
+        ("full", "full"),
+        ("cells of quick", "of_quick"),
+    ),
     "engines": (("engine", "name"), ("version", "version"), ("profiles", "profiles"), ("status", "status")),
     "checks": (("check", "name"), ("truth", "truth"), ("tolerance", "bound"), ("because", "because")),
     "runs": (("run", "id"), ("date", "date"), ("commit", "commit"), ("what", "title"), ("finished", "finished")),

@@ -3,7 +3,7 @@
     figure and law        what is asked, drawn and said
     parameters, make      the scene itself
     exact, measure, rule  its truth, what is measured of a run, and how far the two may be apart
-    quick, full           the cells that a suite runs
+    quick, standard, full the cells that a suite runs
     primary, steps        the one error that a bench compares engines by, and the steps that it runs
     the rest              what reports, tuning and detection want to know about a scene
 
@@ -108,7 +108,9 @@ FAMILIES = (
     "rebound", "materials", "grip and force", "stacks and statics", "friction", "turning", "many impacts", "hard",
 )  # fmt: skip
 
-Suite = Literal["quick", "full"]
+#: A few cells a scene; those and others whose FAILs are listed row by row; those that map a scene out.
+Suite = Literal["quick", "standard", "full"]
+SUITES: tuple[Suite, ...] = ("quick", "standard", "full")
 #: Parameters of a cell, as what differs from the scene's defaults.
 Params = Mapping[str, float]
 
@@ -344,8 +346,10 @@ class CanonicalScene:
         Exact motion for the replay's ghost, or None.
     family
         What people would look for it under: one of `FAMILIES`, or a name of its own.
-    quick, full
-        Cells of the suites; without ``full`` both are the same.
+    quick, standard, full
+        Cells of the suites: a few, between them every kind of answer that engines give; those whose FAILs are listed
+        row by row; those that map the scene out, where defaults may be left out. Without cells of its own a suite has
+        those of the one before it.
     representative
         The cell that stands for the scene: its noise floor is measured and its motion is kept for the replay.
     planted
@@ -390,6 +394,7 @@ class CanonicalScene:
     track: Callable[[Scene], Track | None] = lambda scene: None
     family: str = "others"
     quick: tuple[Variation, ...] = (Variation({}),)
+    standard: tuple[Variation, ...] = ()
     full: tuple[Variation, ...] = ()
     representative: Params = field(default_factory=dict)
     planted: tuple[Params, ...] = ()
@@ -413,7 +418,8 @@ class CanonicalScene:
 
     def variations(self, suite: Suite) -> Sequence[Variation]:
         """Cells of a suite."""
-        return self.quick if suite == "quick" or not self.full else self.full
+        standard = self.standard or self.quick
+        return {"quick": self.quick, "standard": standard, "full": self.full or standard}[suite]
 
     def stands_for_it(self, params: Params) -> bool:
         """Whether a cell with these parameters is the representative one."""

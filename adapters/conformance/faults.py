@@ -17,7 +17,7 @@ import numpy as np
 
 from adapters.conformance.scenes import DT
 from adapters.conformance.spoilt import Fault, Spoilt, World
-from adapters.engine import Array, Contacts, Setting
+from adapters.engine import Array, Contacts, Recorded, Setting
 from adapters.scene import Body, Box, Scene, Sphere
 
 SHARES = (0.1, 0.01, 0.001)
@@ -226,6 +226,10 @@ def _no_reason(given: list[Setting]) -> list[Setting]:
     return [replace(setting, because="") for setting in given]
 
 
+def _low_record(world: World, told: Recorded, size: float) -> Recorded:
+    return told if told.contacts is None else replace(told, contacts=_impulse(_low)(world, told.contacts, size))
+
+
 FAULTS: dict[str, Fault] = {
     "mass too small": Fault("receipt mass", SHARES, "share", told=_each(_mass)),
     "inertia too small": Fault("receipt inertia", SHARES, "share", told=_each(_inertia)),
@@ -327,5 +331,12 @@ FAULTS: dict[str, Fault] = {
     "another answer for many steps at once": Fault(
         "stride", BITS, "m", pose=_at(ALL, 0, lambda world: float(world.at_once > 1))
     ),
+    "another state in a record": Fault(
+        "stride", BITS, "m", record=lambda world, told, size: replace(told, pose=told.pose + size * (told.pose != 0.0))
+    ),
+    "contacts of a record a sample late": Fault(
+        "stride", record=lambda world, told, _: replace(told, counts=np.roll(told.counts, 1))
+    ),
+    "impulses of a record too low": Fault("stride", SHARES, "share", record=_low_record),
     "worlds that are never freed": Fault("memory", (1e5, 1e4, 3e3), "bytes a world", build=_leaking),
 }

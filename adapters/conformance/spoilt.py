@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from adapters.conformance.toy import ToyEngine
-from adapters.engine import Array, Contacts, Declared, Engine, EngineError, EngineFacts, Setting, Simulation
+from adapters.engine import Array, Contacts, Declared, Engine, EngineError, EngineFacts, Recorded, Setting, Simulation
 from adapters.needs import Needs
 from adapters.scene import Scene
 
@@ -24,8 +24,8 @@ class Fault:
         Three sizes in ``unit``, the largest first; empty where a thing is wrong or right.
     told, stepped
         What the engine is told instead of the scene and the step.
-    pose, twist, contacts, readback
-        What is read instead, made of the world, what is true, and the size.
+    pose, twist, contacts, readback, record
+        What is read instead, made of the world, what is true, and the size; a record is kept only where it is spoilt.
     settings, refuses, facts, build
         What the engine itself says or does instead.
     """
@@ -39,6 +39,7 @@ class Fault:
     twist: Callable[[World, Array, float], Array] | None = None
     contacts: Callable[[World, Contacts, float], Contacts] | None = None
     readback: Callable[[World, dict[str, Any], float], dict[str, Any]] | None = None
+    record: Callable[[World, Recorded, float], Recorded] | None = None
     settings: Callable[[list[Setting]], list[Setting]] | None = None
     refuses: Callable[[Scene, str | None], str | None] | None = None
     facts: Callable[[EngineFacts], EngineFacts] | None = None
@@ -144,6 +145,13 @@ class World(Simulation):
         """See `Simulation.contacts`."""
         spoil = self.engine.fault.contacts
         return spoil(self, self.inner.contacts(), self.engine.size) if spoil else self.inner.contacts()
+
+    def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
+        """See `Simulation.record`."""
+        from adapters.conformance.worlds import one_by_one
+
+        spoil = self.engine.fault.record
+        return spoil(self, one_by_one(self, samples, stride), self.engine.size) if spoil else None
 
     def readback(self) -> dict[str, Any]:
         """See `Simulation.readback`."""

@@ -28,11 +28,11 @@ from adapters.conformance.scenes import (
     striking,
     values,
 )
-from adapters.engine import Engine, Simulation
+from adapters.engine import Contacts, Engine, Recorded, Simulation
 from adapters.isolation import Child, IsolationError, Lost
 from adapters.plain import one_line
 from adapters.scene import Scene
-from adapters.stepping import posed_for
+from adapters.stepping import CONTACT_FIELDS, advances, posed_for
 
 #: Seconds that a process may take to import an engine and step it 48 times; kernels may be compiled meanwhile.
 PATIENCE = 300.0
@@ -218,7 +218,49 @@ def stride(engine: Engine) -> str:
         ends = [_stepped(engine, scene, profile, strides) for strides in ((24,), (1,) * 24, (1, 7, 16))]
         if not all(np.array_equal(ends[0], end) for end in ends):
             return f"{profile}: 24 steps at once end elsewhere than 24 single ones that are read in between"
+        for samples, stride in ((24, 1), (8, 3)):
+            wrong = _recorded_otherwise(engine, scene, profile, samples, stride)
+            if wrong:
+                return f"{profile}: {wrong} recorded at once ({samples} of {stride} steps) are others than one by one"
     return ""
+
+
+def one_by_one(simulation: Simulation, samples: int, stride: int) -> Recorded:
+    """What `Simulation.record` has to be, contacts and all."""
+    states, told = [], []
+    for _ in advances(simulation, samples * stride, stride):
+        states.append((np.array(simulation.pose()), np.array(simulation.twist())))
+        told.append(simulation.contacts())
+    rows = (np.concatenate([np.array(getattr(each, name)) for each in told]) for name in CONTACT_FIELDS)
+    pose, twist = (np.array(column) for column in zip(*states, strict=True))
+    return Recorded(pose, twist, np.array([len(each.a) for each in told]), Contacts(*rows))
+
+
+def _recorded_otherwise(engine: Engine, scene: Scene, profile: str, samples: int, stride: int) -> str:
+    """Which of an engine's records differ from what its readers tell; nothing if none does or it keeps none.
+
+    It goes on from where advance left it, and ends there.
+    """
+    recorder, reader = built(engine, scene, profile), built(engine, scene, profile)
+    try:
+        recorder.advance(1), reader.advance(1)
+        found = recorder.record(samples, stride, True)
+        if found is None:
+            return ""
+        wanted = one_by_one(reader, samples, stride)
+        ends = [np.hstack([each.pose(), each.twist()]) for each in (recorder, reader)]
+        parts: dict[str, tuple[Any, Any]] = {"poses": (found.pose, wanted.pose), "twists": (found.twist, wanted.twist)}
+        parts["ends"] = ends[0], ends[1]
+        parts["counts"] = (found.counts, wanted.counts)
+        if found.contacts is None or wanted.contacts is None:
+            return "contacts"
+        for name in CONTACT_FIELDS:
+            parts[f"contacts' {name}"] = getattr(found.contacts, name), getattr(wanted.contacts, name)
+        same = {name: np.array_equal(one, other, equal_nan=True) for name, (one, other) in parts.items()}
+        return ", ".join(name for name, holds in same.items() if not holds)
+    finally:
+        recorder.close()
+        reader.close()
 
 
 def _stepped(engine: Engine, scene: Scene, profile: str, strides: tuple[int, ...]) -> np.ndarray:

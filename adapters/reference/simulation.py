@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Recorded, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 
 
@@ -85,9 +85,13 @@ class ReferenceSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """See `Simulation.contacts`."""
-        found = self.solver.contacts()
-        a, b = (np.asarray(x, np.int64) for x in (found.body_a, found.body_b))
-        return Contacts(a, b, found.point, found.normal, found.impulse, found.gap)
+        return _contacts(self.solver.contacts())
+
+    def record(self, samples: int, stride: int, contacts: bool) -> Recorded:
+        """See `Simulation.record`: compiled code is entered once, and samples by itself."""
+        found = self.solver.record(samples * stride, stride, contacts)
+        counts = np.diff(found.offset)[1:]  # the first sample is the state before
+        return Recorded(found.pose[1:], found.twist[1:], counts, _contacts(found.contacts) if contacts else None)
 
     def readback(self) -> dict[str, Any]:
         """Settings and model that the solver holds, and what it left out because the scene has no use for it."""
@@ -117,6 +121,12 @@ class ReferenceSimulation(Simulation):
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
         return found if self.settings.residual is None else {**found, "certified": found["holds"]}
+
+
+def _contacts(found: Any) -> Contacts:
+    """Contacts of the solver's (`reference_solver.records.Contacts`)."""
+    a, b = (np.asarray(x, np.int64) for x in (found.body_a, found.body_b))
+    return Contacts(a, b, found.point, found.normal, found.impulse, found.gap)
 
 
 def json_ready(value: Any) -> Any:

@@ -69,7 +69,8 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
         return
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
-    options["full"] = not options["quick"]
+    if options["suite"] == "standard":
+        raise SceneError("standard: a suite of cells that are judged; a bench is --quick or --full")
     request = replace(request_from(options), ulps=(0,))
     if not options["scenes"]:
         request = replace(request, scenes=benched(request.suite))

@@ -23,14 +23,14 @@ from validation.records.store import Store
 
 
 @main.command("list")
-@click.argument("what", type=click.Choice(["scenes", "engines", "checks", "runs"]))
+@click.argument("what", type=click.Choice(["scenes", "suites", "engines", "checks", "runs"]))
 @click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
 @click.option("--engine", metavar="E", help="Engine that gets the faults; our solver by default.")
 @click.option("--profile", metavar="P", help="Its profile that passes; by default the one that promises a solution.")
 @AS_JSON
 @OUT
 def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None, as_json: bool, out: Path) -> None:
-    """List scenes, engines, checks, or the runs in OUT.
+    """List scenes, the cells of each in every suite, engines, checks, or the runs in OUT.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
     receipt; takes three minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an engine
@@ -54,7 +54,12 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
         names = ("id", "date", "commit", "title", "finished")
         data = [{name: getattr(run, name) for name in names} for run in store.runs()]
     else:
-        data = {"scenes": listing.scenes, "engines": listing.engines, "checks": listing.checks}[what]()
+        data = {
+            "scenes": listing.scenes,
+            "suites": listing.suites,
+            "engines": listing.engines,
+            "checks": listing.checks,
+        }[what]()
     if as_json:
         click.echo(json.dumps(data, indent=1))
     elif sensitivity:

@@ -63,7 +63,6 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     if not all of it ran.
     """
     console = terminal(stderr=True)
-    options["full"] = not options["quick"]
     for name in ("junit", "markdown"):
         if options[name]:
             writable(options[name], name)
@@ -127,7 +126,6 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
 
     `run` and `bench` do so by themselves; tests that run side by side would each compile the same.
     """
-    options["full"] = not options["quick"]
     done = warm_up(slots(request_from(options)), 0, terminal(stderr=True))
     if as_json:
         click.echo(json.dumps({"compiled": done}))

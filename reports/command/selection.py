@@ -93,9 +93,9 @@ def request_from(options: dict[str, Any]) -> Request:
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
         params=dict(map(parameter, options["param"])) or None,
-        suite="full" if options["full"] else "quick",
+        suite=options["suite"],
         ulps=tuple(options["ulp"]) or (0,),
-        floors=options["full"] and not options["ulp"],
+        floors=options["suite"] == "full" and not options["ulp"],
     )
 
 
@@ -123,7 +123,9 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             type=click.IntRange(-MOST_ULPS, MOST_ULPS),
             help="Move the start by this many units in the last place.",
         ),
-        click.option("--quick/--full", "quick", default=True, help="Suite; quick is the default."),
+        click.option("--quick", "suite", flag_value="quick", default=True, help="A few cells a scene: the default."),
+        click.option("--standard", "suite", flag_value="standard", help="The cells whose FAILs are listed row by row."),
+        click.option("--full", "suite", flag_value="full", help="All cells of each scene, and other steps."),
     )
     for option in reversed(options):
         command = option(command)

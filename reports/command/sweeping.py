@@ -49,7 +49,6 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     are no alarm: it exits with 1 if cells are INVALID, CRASHED, TIMED OUT or missing, with 4 if not all of it ran.
     """
     console = terminal(stderr=True)
-    options["full"] = not options["quick"]
     files = {"csv": options["csv_file"] or out / "sweep.csv", "parquet": options["parquet"]}
     if not options["scenes"]:
         raise SceneError("scenes: name the scenes of a sweep, it has parameters of its own")

@@ -27,7 +27,6 @@ def residuals(as_json: bool, **options: Any) -> None:
 
     Shares of the largest impulse of the run (works: times the fastest contact); a word where an engine reports none.
     """
-    options["full"] = not options["quick"]
     cells = cells_of(slots(request_from(options)), bool(options["param"] or options["iterations"] or options["dt"]))
     progress = terminal(stderr=True)
     found: list[Residuals] = []

@@ -165,7 +165,7 @@ def cite(source: Source) -> dict[str, str]:
     lines += ['pip install -e ".[all]" -c constraints.txt']
     suite, _, scenes = run.title.partition(": ")
     options = "--full" if suite == "full" else "--quick"
-    lines.append(f"crosscheck run {scenes} {options} --out again")
+    lines.append(f"crosscheck run {scenes} {'--standard' if suite == 'standard' else options} --out again")
     if source.bench is not None:
         lines.append(f"crosscheck bench {options} --out again")
     lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]

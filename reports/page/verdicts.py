@@ -42,7 +42,7 @@ MEANINGS = {
     "pass": "within the stated tolerance of the truth",
     "explained": "fails, and lies where a law of the engine predicts it",
     "known": "fails, and is listed with a reason and this value",
-    "fail": "fails; findings are not listed for this engine, or not outside the quick suite",
+    "fail": "fails; findings are not listed for this engine, or not outside the standard suite",
     "new": "fails or has no value, and nobody knew",
     "drifted": "left the band of its law or of what is listed",
     "diverged": "the state exploded or stopped being finite",

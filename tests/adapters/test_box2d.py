@@ -129,7 +129,7 @@ def textbook(e, speed):
 def test_the_law_predicts_the_truth_of_the_scene_with_a_band_of_single_precision(name):
     """Its motion is computed here, the truth by the scene: independent of each other."""
     canonical, spoken = CATALOGUE[name], 0
-    for variation in canonical.quick:
+    for variation in canonical.variations("standard"):
         for dimension in canonical.dimensions:
             scene = canonical.scene(dimension, variation.params)
             truth = canonical.exact(scene)

@@ -87,7 +87,7 @@ def test_blows_event_by_event_end_in_the_scene_s_own_truth(name):
     """In doubles, with the restitution that is asked for: as near as the scene's check asks of anybody."""
     canonical, exact, said = CATALOGUE[name], Method(lambda e, speed: e, 200, 2.0**-53), 0
     for dimension in canonical.dimensions:
-        for variation in canonical.quick:
+        for variation in canonical.variations("standard"):
             scene = canonical.scene(dimension, variation.params)
             for check in canonical.checks(scene, DT):
                 found = told(check.metric, exact, scene) if check.bound is not None else None

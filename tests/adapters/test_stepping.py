@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Scheme, Setting, Simulation
+from adapters.conformance.worlds import one_by_one
+from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Recorded, Scheme, Setting, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import advances, posed_for, run, step_count
 from adapters.trajectory import ContactRecord, Sampling, load_trajectory
@@ -290,6 +291,76 @@ def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.
         monkeypatch.setattr("adapters.stepping.AT_ONCE", at_once)
         parts = run(Toy({3}, sideways), scene(), 0.1, {})
         assert parts.state_hash() == whole.state_hash() and len(parts.pose) == 11 and parts.out_of_plane == 0.125
+
+
+def recording(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int, bool]]:
+    """Have `Flight` record many samples at once; returns what it was asked for."""
+    asked: list[tuple[int, int, bool]] = []
+
+    def record(flight: Flight, samples: int, stride: int, contacts: bool) -> Recorded:
+        asked.append((samples, stride, contacts))
+        found = one_by_one(flight, samples, stride)
+        return found if contacts else replace(found, contacts=None)
+
+    monkeypatch.setattr(Flight, "record", record)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("sampling", "in_one_call", "asked"),
+    [
+        (Sampling(), 256, [(10, 1, False)]),
+        (Sampling(), 4, [(4, 1, False), (4, 1, False), (2, 1, False)]),
+        (Sampling(4), 256, [(2, 4, False)]),  # the last two steps are less than a stride
+        (Sampling(11), 256, []),
+        (Sampling(1, 0.0), 4, [(4, 1, True), (4, 1, True), (2, 1, True)]),
+        (Sampling(1, 0.55), 256, [(5, 1, False), (5, 1, True)]),
+        (Sampling(1, 0.55), 4, [(4, 1, False), (1, 1, False), (4, 1, True), (1, 1, True)]),
+    ],
+)
+@pytest.mark.parametrize("dimensions", [{2}, {3}])
+def test_what_an_engine_tells_at_once_is_what_it_tells_sample_by_sample(
+    monkeypatch: pytest.MonkeyPatch,
+    dimensions: set[int],
+    sampling: Sampling,
+    in_one_call: int,
+    asked: list[tuple[int, int, bool]],
+) -> None:
+    def sideways(flight: Flight) -> None:
+        flight._twist[0, 1] += 0.125 if flight.steps == 2 else 0.0
+
+    single = run(Toy(dimensions, sideways), scene(), 0.1, {}, sampling)
+    monkeypatch.setattr("adapters.stepping.IN_ONE_CALL", in_one_call)
+    calls, toy = recording(monkeypatch), Toy(dimensions, sideways)
+    found = run(toy, scene(), 0.1, {}, sampling)
+    assert calls == asked and len(toy.built) == 1 and toy.built[0].closed == 1
+    assert found.state_hash() == single.state_hash() and found.t.tolist() == single.t.tolist()
+    assert found.out_of_plane == single.out_of_plane
+    assert (found.contacts is None) == (single.contacts is None)
+    if found.contacts is not None and single.contacts is not None:
+        assert found.contacts.step.tolist() == single.contacts.step.tolist()
+        assert found.contacts.offset.tolist() == single.contacts.offset.tolist()
+        assert found.contacts.impulse_between(0, 1).tolist() == single.contacts.impulse_between(0, 1).tolist()
+
+
+@pytest.mark.parametrize(("name", "value"), [("_pose", math.nan), ("_twist", math.inf), ("_twist", 1e5)])
+def test_a_run_that_ends_within_what_is_told_at_once_is_that_of_single_samples(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: float
+) -> None:
+    """Its engine is asked how it went at the instant at which it diverged, in a world of its own; both are closed."""
+    monkeypatch.setattr(Flight, "certificate", lambda flight: {"steps": flight.steps})
+    single = run(Toy({2}, spoiled(name, (0, 1), value)), scene(), 0.1, {}, Sampling(1, 0.0))
+    recording(monkeypatch)
+    toy = Toy({2}, spoiled(name, (0, 1), value))
+    found = run(toy, scene(), 0.1, {}, Sampling(1, 0.0))
+    assert found.finish == "diverged" and found.reason == single.reason and "t = 0.4 s" in found.reason
+    assert found.certificate == single.certificate == {"steps": 4} and len(found.t) == 5
+    assert [built.closed for built in toy.built] == [1, 1]
+
+
+def test_a_spin_that_is_fast_is_no_end_of_a_run_that_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording(monkeypatch)
+    assert run(Toy({2}, spoiled("_twist", (0, 2), 1e9)), scene(), 0.1, {}).finish == "completed"
 
 
 @pytest.mark.parametrize("dimensions", [{2}, {3}])

@@ -23,7 +23,7 @@ def asked_by(command):
     words = shlex.split(command)
     assert words[:2] == ["crosscheck", "run"]
     options = run.make_context("run", words[2:]).params
-    return slots(request_from(options | {"full": not options["quick"]}))
+    return slots(request_from(options))
 
 
 def between(own):

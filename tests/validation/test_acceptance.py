@@ -333,7 +333,7 @@ def test_rows_that_say_nothing_do_not_hide_those_that_come_after_them():
 
 
 @pytest.mark.parametrize("slot", [replace(SLOT, engine="another"), replace(SLOT, dt=1 / 1000)])
-def test_rows_of_another_engine_or_outside_the_quick_suite_propose_nothing(slot):
+def test_rows_of_another_engine_or_outside_the_standard_suite_propose_nothing(slot):
     assert not propose(rows(slot), "nameless", listed(FAMILY)).changes[0].asks
 
 

@@ -98,7 +98,7 @@ def test_all_that_a_bound_allows_is_owed_to_the_step_or_to_round_off(name):
     """Halving the step widens no bound but by round-off; of a step of 1 us a thousandth and round-off are left."""
     canonical = CATALOGUE[name]
     for dimension in canonical.dimensions:
-        for variation in canonical.quick:
+        for variation in canonical.variations("standard"):
             scene = canonical.scene(dimension, variation.params)
             shorter = {dt: {c.metric: c for c in canonical.checks(scene, dt)} for dt in (1 / 480, 1e-6)}
             far = max(abs(x) for body in scene.bodies for x in body.pose)

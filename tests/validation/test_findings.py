@@ -11,7 +11,7 @@ from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, parse_dt
 from validation.findings import Family, Finding, FindingsError, Known, Unsupported, files, known_of, row_key
 from validation.judging.rows import rows_of
-from validation.running.plan import in_quick_suite
+from validation.running.plan import is_standard
 
 ENGINES = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
 SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)
@@ -80,7 +80,7 @@ def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_member_is_a_row_that_the_quick_suite_states(engine):
+def test_every_member_is_a_row_that_the_standard_suite_states(engine):
     findings = files.findings_of(engine)
     for key in findings.members if findings else ():
         profile, scene, dimension, params, dt, iterations, metric = key
@@ -89,7 +89,7 @@ def test_every_member_is_a_row_that_the_quick_suite_states(engine):
         slot = Slot(
             scene, given, int(dimension), engine, profile, parse_dt(dt), int(iterations) if iterations else None
         )
-        assert in_quick_suite(slot), key
+        assert is_standard(slot), key
         canonical = CATALOGUE[scene]
         stated = {check.metric for check in canonical.checks(canonical.scene(slot.dimension, dict(given)), slot.dt)}
         assert metric in stated | {study.name for study in canonical.studies}, key
@@ -134,7 +134,7 @@ def test_a_family_holds_for_its_releases_and_no_others(findings):
     assert judged(SLOT, "1.9.1+5f3a", creep=0.5) == ("fail", "known", False)
 
 
-def test_outside_the_quick_suite_a_family_gives_no_standing_and_what_no_family_is_like_is_new(findings):
+def test_outside_the_standard_suite_a_family_gives_no_standing_and_what_no_family_is_like_is_new(findings):
     findings()
     outside = replace(SLOT, dt=1 / 1000)
     assert judged(outside, creep=0.5) == ("fail", None, False)
@@ -350,7 +350,7 @@ def test_what_is_known_of_a_row_and_what_is_said_of_it(findings):
     assert known_of(SLOT, "creep", "1.2", None) == Known(None, False, "the engine has no list of findings")
     assert known_of(SLOT, "creep", "1.2", own) == Known(listed, True)
     assert known_of(SLOT, "creep", "2.0", own) == Known(None, True, "listed for releases >=1.0,<2 only: it is soft")
-    said = "outside the quick suite, not listed; rows like it: it is soft"
+    said = "outside the standard suite, not listed; rows like it: it is soft"
     assert known_of(outside, "creep", "1.2", own) == Known(None, False, said)
     assert known_of(outside, "creep", "2.0", own) == Known(None, True)
     assert known_of(replace(SLOT, iterations=None, dimension=3), "creep", "1.2", own) == Known(None, True)

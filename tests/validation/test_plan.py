@@ -10,6 +10,7 @@ from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
 from adapters.scene import SceneError
 from validation import identity
+from validation.catalogue import CATALOGUE
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, Slot, slot_from_dict
 from validation.running import plan
 from validation.running.plan import FULL_DT, Request, slots
@@ -27,15 +28,15 @@ def test_the_full_suite_runs_the_customary_step_of_the_profile_as_shipped_only(e
 
 
 @pytest.mark.parametrize("scene", ["bounce", "stack"])
-def test_the_full_suite_has_all_variations_at_one_step_and_all_steps_for_those_of_the_quick_suite(scene):
+def test_the_full_suite_has_all_variations_at_one_step_and_all_steps_for_those_of_the_standard_suite(scene):
     wanted = Request([scene], ["chipmunk"], suite="full")
-    full, quick = set(slots(wanted)), set(slots(replace(wanted, suite="quick")))
+    full, quick = set(slots(wanted)), set(slots(replace(wanted, suite="standard")))
     assert quick < full
     found = {}
     for slot in full:
         found.setdefault(replace(slot, dt=plan.QUICK_DT), set()).add(slot.dt)
     own = {slot for slot in full if slot.dt == plan.QUICK_DT}
-    asked = {slot for slot in own if plan.in_quick_suite(slot)}
+    asked = {slot for slot in own if plan.is_standard(slot)}
     assert quick <= asked < own == set(found)
     for slot, steps in found.items():
         assert steps >= set(FULL_DT) if slot in asked else steps == {plan.QUICK_DT}, slot
@@ -98,3 +99,33 @@ def test_a_slot_may_ask_as_much_as_it_is_told_and_no_more(field, most, least):
     for value in (least - 1, most + 1, 1.5, "2"):
         with pytest.raises(SceneError, match=rf"^slot\.{field}: .* must be a whole number in \[{least}, {most}\]$"):
             slot_from_dict(plain | {field: value})
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_the_quick_suite_has_a_few_cells_of_the_standard_one_with_every_check_of_each_scene(name):
+    canonical = CATALOGUE[name]
+    asked, stated = {}, {}
+    for suite in ("quick", "standard"):
+        asked[suite] = {
+            (canonical.minimal(each.params), count, dimension)
+            for each in canonical.variations(suite)
+            for count in each.iterations
+            for dimension in canonical.dimensions
+            if each.runs_in(dimension)
+        }
+        stated[suite] = {
+            (dimension, check.metric.partition("[")[0])
+            for params, _, dimension in asked[suite]
+            for check in canonical.checks(canonical.scene(dimension, dict(params)), plan.QUICK_DT)
+            if check.truth is not None
+        }
+    assert asked["quick"] <= asked["standard"]
+    assert len({cell[:2] for cell in asked["quick"]}) <= 8
+    assert stated["quick"] == stated["standard"]
+    assert {canonical.minimal(canonical.representative)} <= {params for params, _, _ in asked["quick"]}
+
+
+def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
+    quick, standard = (slots(Request(["impact"], ["chipmunk"], suite=suite)) for suite in ("quick", "standard"))
+    assert set(quick) < set(standard) and len(standard) == 4 * len(quick)
+    assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))

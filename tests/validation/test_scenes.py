@@ -84,7 +84,7 @@ def test_faults_are_planted_where_each_of_its_checks_is_stated(name):
     (dimension, *_) = canonical.dimensions
     stated = {
         family
-        for variation in canonical.variations("quick")
+        for variation in canonical.variations("standard")
         for family in families(canonical.checks(canonical.scene(dimension, variation.params), DT))
     }
     planted = [families(canonical.checks(canonical.scene(dimension, params), DT)) for params in canonical.planted]

@@ -31,7 +31,7 @@ def solved(name: str, dimension: int, params) -> tuple[Scene, Trajectory]:
 
 def of_the_suite(name):
     canonical = CATALOGUE[name]
-    for variation in canonical.quick:
+    for variation in canonical.variations("standard"):
         for dimension in canonical.dimensions:
             if variation.runs_in(dimension):
                 yield solved(name, dimension, variation.params)

@@ -12,7 +12,7 @@ from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of
 from validation.posed import resolve
-from validation.running.plan import QUICK_DT, in_quick_suite
+from validation.running.plan import QUICK_DT, is_standard
 from validation.settings import proofs
 from validation.settings.proofs import Proof
 from validation.settings.switching import Reading, reading, readings, side_by_side, switched
@@ -28,7 +28,7 @@ def test_a_switched_slot_is_another_cell_that_survives_json_and_is_never_listed(
     other = switched(SLOT, {"collision_slop": 1e-5, "solref": (0.02, 1.0)})
     again = slot_from_dict(json.loads(json.dumps(other.as_dict())))
     assert again == other and again.key() == other.key() != SLOT.key()
-    assert in_quick_suite(SLOT) and not in_quick_suite(other)
+    assert is_standard(SLOT) and not is_standard(other)
     assert switched(SLOT, {}) == SLOT
     assert "switched" not in SLOT.as_dict()
 
@@ -90,7 +90,7 @@ def test_every_family_has_an_experiment_and_every_experiment_a_family_that_cover
     silent = MEASURED_ONLY.get(engine, set()) | set(families) - {
         member.family.id for member in members if member.value is not None or member.diverged
     }
-    # A family that speaks about rows outside the quick suite alone has no members, and its experiments all the same.
+    # A family that speaks about rows outside the standard suite alone has no members, and its experiments all the same.
     proven = {experiment.family for experiment in experiments}
     assert set(families) - silent <= proven <= set(families) - MEASURED_ONLY.get(engine, set())
     for experiment in experiments:

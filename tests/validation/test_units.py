@@ -120,7 +120,7 @@ def in_other_units(monkeypatch):
 
 def cells(canonical):
     """Sets of parameters of the quick suite, complete, without those that differ by an iteration count alone."""
-    found = [v.params for v in canonical.quick] + [canonical.representative, *canonical.planted]
+    found = [v.params for v in canonical.variations("standard")] + [canonical.representative, *canonical.planted]
     return list({tuple(sorted(p.items())): p for p in map(canonical.complete, found)}.values())
 
 

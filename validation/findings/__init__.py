@@ -1,11 +1,11 @@
 """Known findings: families of rows that do not pass, each member with its value and band, each family with a reason.
 
     family    one engine, one scene, the profiles and metrics it speaks about, reason, source, releases it holds for
-    member    one row of the quick suite: the value that was found, and the band within which it is the same finding
+    member    one row of the standard suite: the value that was found, and the band within which it is the same finding
 
 A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and
 whether it passes or fails. A member without a value says that the check has none on this row, and its family why.
-Rows outside the quick suite have no members: a family says what they are like, it gives them no standing.
+Rows outside the standard suite have no members: a family says what they are like, it gives them no standing.
 
 They stand in the engine's folder (`validation.findings.files` reads them). An engine without findings is *unlisted*:
 its FAILs have no standing and do not fail the command.
@@ -22,7 +22,7 @@ from packaging.version import InvalidVersion
 
 from adapters import registry
 from validation.cells import Slot, format_dt
-from validation.running.plan import in_quick_suite
+from validation.running.plan import is_standard
 
 #: Identity of a row within its engine: profile, scene, dimension, params, dt, iterations, metric.
 Key = tuple[str, ...]
@@ -156,7 +156,7 @@ class Known:
         Its entry, if there is one that holds for the release that ran.
     expected
         Whether a row that does not pass must have an entry: its engine has findings, and no family says of a row
-        outside the quick suite what it is like.
+        outside the standard suite what it is like.
     remark
         What else is to be said: the family of a row outside the suite, or an entry of other releases.
     """
@@ -177,7 +177,7 @@ def known_of(slot: Slot, metric: str, version: str, findings: Findings | None) -
         if family.holds_for(version):
             return Known(finding, True)
         return Known(None, True, f"listed for releases {family.releases} only: {family.reason}")
-    like = None if in_quick_suite(slot) else findings.family_of(key)
+    like = None if is_standard(slot) else findings.family_of(key)
     if like is not None and like.holds_for(version):
-        return Known(None, False, f"outside the quick suite, not listed; rows like it: {like.reason}")
+        return Known(None, False, f"outside the standard suite, not listed; rows like it: {like.reason}")
     return Known(None, True)

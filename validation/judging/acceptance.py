@@ -17,7 +17,7 @@ from validation.findings import Family, Finding, Findings, Key, row_key, solutio
 from validation.judging.rows import Row, predictions_of
 from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
-from validation.running.plan import in_quick_suite
+from validation.running.plan import is_standard
 
 #: Starts moved by so many units in the last place show how far a value scatters.
 MOVES = (1, -1, 2, -2)
@@ -74,7 +74,7 @@ class Proposal:
 
 
 def slots_to_move(rows: Iterable[Row], engine: str, about: Callable[[Key], bool] = lambda key: True) -> list[Slot]:
-    """Slots whose scatter must be known: each cell of the quick suite that fails, or nearly, once per move.
+    """Slots whose scatter must be known: each cell of the standard suite that fails, or nearly, once per move.
 
     ``about``: which rows are to be listed.
     """
@@ -91,7 +91,7 @@ def _may_be_listed(row: Row) -> bool:
     if row.outcome != "ok" or row.value is None or row.standing == "explained" or _never(row):
         return False
     slot = slot_from_dict(row.slot)
-    return (row.physics == "fail" or is_marginal(row.value, _check(row))) and in_quick_suite(slot)
+    return (row.physics == "fail" or is_marginal(row.value, _check(row))) and is_standard(slot)
 
 
 def propose(
@@ -108,7 +108,7 @@ def propose(
     kept, refused, judged, left_out = dict(findings.members), [], set(), []
     for row in rows:
         slot = slot_from_dict(row.slot)
-        if row.engine != engine or not in_quick_suite(slot):
+        if row.engine != engine or not is_standard(slot):
             continue
         key = row_key(slot, row.metric)
         if row.outcome not in ("ok", "diverged"):

@@ -467,7 +467,7 @@ def scales(canonical: CanonicalScene, scene: Scene, dt: float) -> dict[str, floa
         "1": 1.0, "weights": 1.0, "rad": 1.0, "m": length, "m/s": speed, "m/s^2": max(gravity, speed**2 / length),
         "rad/s": speed / length, "s": scene.duration, "N s": mass * speed, "J": mass * speed**2,
     }  # fmt: skip
-    cells = [dict(each.params) for each in (*canonical.quick, *canonical.full)]
+    cells = [dict(each.params) for each in (*canonical.variations("standard"), *canonical.full)]
     found: dict[str, float] = {}
     for params in (dict(scene.params), *cells):
         for check in canonical.checks(canonical.scene(d, params), dt):

@@ -1,9 +1,11 @@
 """Which slots a run consists of: the cells that each scene declares, on every engine and profile.
 
 quick
-    dt 1/240; each scene's quick cells.
+    dt 1/240; a few cells of each scene, with every check, and every law and family of findings that speaks of it.
+standard
+    dt 1/240; the cells whose FAILs are listed row by row: whatever else a scene is asked as a matter of course.
 full
-    each scene's full cells at dt 1/240; the quick cells from 1/60 to 1/960 by halves as well, and at each engine's
+    each scene's full cells at dt 1/240; the standard cells from 1/60 to 1/960 by halves as well, and at each engine's
     customary step; representative cells moved by 1 and 2 units in the last place (the floor that comparisons use).
 """
 
@@ -112,8 +114,8 @@ def _one_profile(name: str) -> str:
     return (told.profile("shipped") or next(iter(told.roles), NOT_KNOWN)) if told else NOT_KNOWN
 
 
-def in_quick_suite(slot: Slot) -> bool:
-    """Whether the quick suite runs this slot: its FAILs are listed row by row."""
+def is_standard(slot: Slot) -> bool:
+    """Whether the standard suite runs this slot: its FAILs are listed row by row."""
     if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
         return False
     canonical, own = CATALOGUE[slot.scene], dict(slot.params).items()
@@ -123,7 +125,7 @@ def in_quick_suite(slot: Slot) -> bool:
         and slot.iterations in variation.iterations
         and variation.runs_in(slot.dimension)
         and slot.params == canonical.minimal(variation.params)
-        for variation in canonical.variations("quick")
+        for variation in canonical.variations("standard")
     ) or (slot.iterations is None and not slot.params)
 
 
@@ -141,14 +143,14 @@ def _variations(request: Request, canonical: CanonicalScene) -> Sequence[Variati
 def _steps(request: Request, engine: Engine | None, profile: str) -> Iterable[float]:
     if request.dts:
         return request.dts
-    if request.suite == "quick":
+    if request.suite != "full":
         return (QUICK_DT,)
     customary = (engine.facts.customary_dt,) if engine and engine.facts.roles.get(profile) == "shipped" else ()
     return dict.fromkeys((*FULL_DT, *customary))
 
 
 def _stepped(request: Request, slot: Slot) -> bool:
-    """Whether the suite asks for this step: for others than the quick suite's own only where that suite has the cell.
+    """Whether the suite asks for this step: others than 1/240 s only where the standard suite has the cell.
 
     What a user asks for (steps, parameters, iterations) is asked with all of them.
 
@@ -156,7 +158,7 @@ def _stepped(request: Request, slot: Slot) -> bool:
     """
     own = request.dts or request.params or request.iterations
     asked = own or slot.dt == QUICK_DT or slot.scene not in CATALOGUE
-    return bool(asked) or in_quick_suite(replace(slot, dt=QUICK_DT))
+    return bool(asked) or is_standard(replace(slot, dt=QUICK_DT))
 
 
 def _iterations(request: Request, variation: Variation, engine: Engine | None, slot: Slot) -> Iterable[int | None]:

@@ -213,8 +213,12 @@ def rebound(params: Params, height: float) -> float:
     return math.sqrt(max(height, 0.0) / params["height"])
 
 
+def _from(e: float, *heights: float) -> tuple[Variation, ...]:
+    return tuple(Variation({"e": e, "height": height}) for height in heights)
+
+
 def _from_all_heights(*restitutions: float) -> tuple[Variation, ...]:
-    return tuple(Variation({"e": e, "height": height}) for e in restitutions for height in HEIGHTS)
+    return tuple(variation for e in restitutions for variation in _from(e, *HEIGHTS))
 
 
 SCENE = CanonicalScene(
@@ -246,7 +250,9 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     track=track,
-    quick=(*_from_all_heights(0.8), *(Variation({"e": e, "height": HEIGHTS[0]}) for e in (0.5, 0.95, 1.0))),
+    # Two phases of the first impact, for an engine may miss an apex at one of them, and the edges of restitution.
+    quick=(*_from(0.8, HEIGHTS[0], HEIGHTS[3]), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
+    standard=(*_from_all_heights(0.8), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
     full=_from_all_heights(0.5, 0.8, 0.95, 1.0),
     planted=({"e": 0.8}, {"e": 1.0}),  # energy that a bounce adds shows only where it takes none away
     primary=Primary(

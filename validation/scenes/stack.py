@@ -79,7 +79,9 @@ SCENE = CanonicalScene(
     rule=columns.checks,
     sampling=columns.sampling,
     track=track,
-    quick=_heights(10),
+    # One box, the column of the bench and the tallest; starved, with three times a usual count, and with all it needs.
+    quick=(Variation({"n": 1}), Variation({"n": 10}, (None, 1, 30, 100)), Variation({"n": 20})),
+    standard=_heights(10),
     full=_heights(*HEIGHTS),
     representative={"n": 10.0},  # starves a solver that stops too soon
     planted=({"n": 2.0},),

@@ -1,6 +1,6 @@
 """Cures: which stock settings mend what an engine gets wrong as shipped on a scene, and what they cost.
 
-    as shipped          the quick cells of the scene: checks that fail
+    as shipped          the standard cells of the scene: checks that fail
     one setting         every candidate of the engine's experiments, every setting that another profile changes, and
                         ten times the iterations, each alone
     one more            where no setting is enough alone: each candidate beside the best one
@@ -111,9 +111,9 @@ class Cure:
 
 
 def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
-    """Cells of a search: all quick ones at the profile's own iterations, or those that stand for them."""
+    """Cells of a search: all standard ones at the profile's own iterations, or those that stand for them."""
     canonical = resolve(scene)
-    quick = [v.params for v in canonical.variations("quick") if v.runs_in(dimension) and None in v.iterations]
+    quick = [v.params for v in canonical.variations("standard") if v.runs_in(dimension) and None in v.iterations]
     if len(quick) > MOST_CELLS:
         searched = canonical.searched.cells if canonical.searched else ()
         quick = [canonical.representative, *canonical.planted, *searched][:MOST_CELLS]
@@ -204,7 +204,7 @@ def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Uns
     if shipped is None:
         return Unsearched(False, f"{engine} has no profile as shipped")
     if not cells:
-        return Unsearched(False, f"{scene} has no quick cell in {dimension}-D at a profile's own iterations")
+        return Unsearched(False, f"{scene} has no standard cell in {dimension}-D at a profile's own iterations")
     own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, QUICK_DT) for cell in cells]
     first = observe(own, jobs)
     for found in first.values():
@@ -212,7 +212,7 @@ def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Uns
             return Unsearched(False, found.reason)
     trials = _Trials(own, jobs)
     if not trials.start:
-        return Unsearched(False, "no check of its quick cells is judged")
+        return Unsearched(False, "no check of its standard cells is judged")
     failing = [found for found in trials.start if found.badness > 1.0]
     if not failing:
         return Unsearched(True, f"it passes all {len(trials.start)} checks")

@@ -99,7 +99,7 @@ def _cells(slot: Slot, metric: str) -> list[Slot]:
     """Cells that a metric is read from: the slot itself, or all cells of a study."""
     if study_of(slot.scene, metric) is None:
         return [slot]
-    return [slot.with_params(variation.params) for variation in resolve(slot.scene).variations("quick")]
+    return [slot.with_params(variation.params) for variation in resolve(slot.scene).variations("standard")]
 
 
 def _proof(engine: str, experiment: Experiment, seen: dict[Slot, Observation]) -> Proof:

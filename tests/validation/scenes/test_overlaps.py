@@ -117,7 +117,7 @@ def test_our_solver_is_not_asked_for_a_solution_where_there_is_none(name, params
 def test_no_other_scene_starts_with_an_overlap(name):
     canonical = CATALOGUE[name]
     for dimension in canonical.dimensions:
-        for variation in canonical.quick:
+        for variation in canonical.variations("standard"):
             assert overlap_at_the_start(canonical.scene(dimension, variation.params)) is None or not variation.runs_in(
                 dimension
             )
