@@ -34,7 +34,7 @@ def suites() -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for canonical in CATALOGUE.values():
         asked = {suite: canonical.variations(suite) for suite in SUITES}
-        counts = {
+        counts: dict[str, Any] = {
             suite: sum(len(v.iterations) * sum(map(v.runs_in, canonical.dimensions)) for v in variations)
             for suite, variations in asked.items()
         }
