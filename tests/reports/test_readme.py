@@ -52,7 +52,9 @@ RUN = {
     "crosscheck export --parquet FOLDER": ["export --parquet tables"],
     "crosscheck merge STORE": ["merge crosscheck-out --out both"],
     "crosscheck prune --keep 50 --dry-run": ["prune --keep 50 --dry-run"],
-    "crosscheck list scenes|suites|engines|checks|runs": ["list scenes", "list suites", "list engines", "list checks", "list runs"],
+    "crosscheck list scenes|suites|engines|checks|runs": [
+        "list scenes", "list suites", "list engines", "list checks", "list runs"
+    ],
     "crosscheck describe bounce": ["describe bounce", "describe bullet"],
     "crosscheck doctor": ["doctor"],
     "crosscheck nulls impact": ["nulls impact"],
