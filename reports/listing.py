@@ -38,7 +38,7 @@ def suites() -> list[dict[str, Any]]:
             suite: sum(len(v.iterations) * sum(map(v.runs_in, canonical.dimensions)) for v in variations)
             for suite, variations in asked.items()
         }
-        out.append({"name": canonical.name, **counts, "of_quick": [_cell(v) for v in asked["quick"]]})
+        out.append({"name": canonical.name} | counts | {"of_quick": [_cell(v) for v in asked["quick"]]})
     total = {suite: sum(entry[suite] for entry in out) for suite in SUITES}
     return [*out, {"name": "all", **total, "of_quick": []}]
 

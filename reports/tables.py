@@ -19,6 +19,11 @@ from validation.questions.detection import BlindSpot
 Plain = Mapping[str, Any]
 #: Scenes of a run that its line names; a quick suite of forty would take a screen of its own.
 FEW = 4
+#: Said below facts that were measured without an adapter.
+AFTERWARDS = (
+    "Chosen afterwards: the sheet leaves it open, and another choice had contradicted it; that it agrees then is no "
+    "test of it. Conditions that the reason of a contradiction names were looked for afterwards as well."
+)
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
@@ -133,19 +138,22 @@ def _engine(data: Plain, console: Console) -> None:
         for fact in data["measured"]:
             table.add_row(Text(fact["says"]), Text(fact["standing"]), Text(_said_of(fact)))
         console.print(table)
+        if any(fact["chosen"] or fact["because"] for fact in data["measured"]):
+            console.print(Text(AFTERWARDS))
 
 
 def _said_of(fact: Plain) -> str:
     """The cell that shows a fact with its number, the test that asserts it, or why nothing does."""
+    chosen = f"; chosen afterwards: {fact['chosen']}" if fact["chosen"] else ""
     if not fact["scene"]:
-        return str(fact["test"] or fact["unasked"])
+        return str(fact["test"] or fact["unasked"]) + chosen
     params = "".join(f" {name}={value:g}" for name, value in fact["params"].items())
     params += "".join(f" {name}={setting_text(value)}" for name, value in fact["settings"].items())
     sweeps = f" {fact['iterations']} iterations" if fact["iterations"] else ""
     cell = f"{fact['profile']} {fact['scene']} {fact['dimension']}-D{params}, step {format_dt(fact['dt'])} s{sweeps}"
     off = "off by " if fact["error"] else ""
     because = f"; {fact['because']}" if fact["because"] else ""
-    return f"{cell}: {fact['metric']} {off}{number(fact['found'])}{because}"
+    return f"{cell}: {fact['metric']} {off}{number(fact['found'])}{because}{chosen}"
 
 
 def _settings(scenes: Mapping[str, Sequence[Plain]], console: Console) -> None:

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from adapters.registry import load
 from adapters.scene import Sphere
 from adapters.stepping import run
+from reports.command import main
 from validation.cells import Outcome, Slot, settings_of
 from validation.field import measured
 from validation.field.measured import CONTRADICTED, SHOWN, facts_of
@@ -258,10 +260,27 @@ def test_facts_without_a_cell_name_a_test_that_there_is_or_say_why(engine):
         assert fact.scene or fact.test or len(fact.unasked) > 20
 
 
+def test_what_agrees_by_a_choice_that_was_made_afterwards_is_told_so():
+    """Fourteen agree since a step, a radius, an axis or a time was found with which they do."""
+    chosen = {engine: [fact for fact in facts_of(engine) if fact.chosen] for engine in ("chipmunk", "bullet", "mujoco")}
+    assert {engine: len(facts) for engine, facts in chosen.items()} == {"chipmunk": 1, "bullet": 6, "mujoco": 7}
+    told = CliRunner().invoke(main, ["describe", "mujoco"], env={"COLUMNS": "300"}).output
+    assert "chosen afterwards: the margin" in told and told.count("chosen afterwards: ") == 7
+    assert "that it agrees then is no test of it" in " ".join(told.split())
+
+
 def test_a_fact_is_shown_contradicted_or_refused_by_its_numbers():
     ends = {"says": "it creeps", "scene": "incline", "profile": "default", "metric": "creep", "low": 1.0, "high": 2.0}
     assert measured._fact(ends | {"found": 1.5}).standing == SHOWN
     assert measured._fact(ends | {"found": 2.5, "because": "another floor"}).standing == CONTRADICTED
-    for wrong in ({"found": 2.5}, {"found": 1.5, "because": "none needed"}, {"found": 1.5, "unasked": "both"}):
+    assert measured._fact(ends | {"found": 1.5, "chosen": "the floor"}).chosen == "the floor"
+    contradicted = {"found": 2.5, "because": "another floor", "chosen": "the floor"}
+    for wrong in (
+        contradicted,
+        {"unasked": "no floor", "scene": "", "chosen": "the floor"},
+        {"found": 2.5},
+        {"found": 1.5, "because": "none needed"},
+        {"found": 1.5, "unasked": "both"},
+    ):
         with pytest.raises(ValueError, match="it creeps"):
             measured._fact(ends | wrong)

@@ -7,6 +7,10 @@
     ``test``      a test that asserts it, where no scene asks it
     ``unasked``   why nothing of ours can show it
 
+Where a sheet does not state all of what it did (a step, a radius, when it was read), a cell of ours that answered
+otherwise was asked again under others until one agreed. That is no test of the fact: ``chosen`` names what was chosen
+so, and it is told. So were the conditions looked for that a ``because`` names.
+
 `crosscheck describe ENGINE` tells them; a test runs the cells and holds each ``found`` against what they answer.
 """
 
@@ -47,6 +51,8 @@ class Fact:
         Why our cell answers otherwise, where it does.
     test, unasked
         See this module.
+    chosen
+        What the sheet leaves open and was chosen after another choice had contradicted it; see this module.
     """
 
     says: str
@@ -65,6 +71,7 @@ class Fact:
     because: str = ""
     test: str = ""
     unasked: str = ""
+    chosen: str = ""
 
     @property
     def standing(self) -> str:
@@ -118,4 +125,6 @@ def _fact(raw: Mapping[str, Any]) -> Fact:
         raise ValueError(f"{fact.says}: one of a cell, a test and why it is not asked")
     if (fact.standing == CONTRADICTED) != bool(fact.because):
         raise ValueError(f"{fact.says}: what a cell contradicts has a reason, and nothing else has")
+    if fact.chosen and fact.standing not in (SHOWN, TESTED):
+        raise ValueError(f"{fact.says}: a choice is told of what agrees by it")
     return fact
