@@ -20,11 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Contacts
-from adapters.lift import lower_contacts, lower_pose, lower_twist
 from adapters.newton.shipped import STOPPED
+from adapters.newton.telling import told_contacts, told_trajectory
 from adapters.scene import Body, Box, HalfSpace, Scene
-from adapters.trajectory import ContactRecord, Trajectory
+from adapters.trajectory import Trajectory
 
 #: Corners of a face.
 CORNERS = 4.0
@@ -116,15 +115,15 @@ def column_moved(
     run_column(world, numbers, told)
     if not _is_told(told.place, bodies):
         return None
-    pose = np.repeat(np.array([[each.pose for each in spatial.bodies]], float), steps + 1, axis=0)
-    twist = np.repeat(np.array([[each.twist for each in spatial.bodies]], float), steps + 1, axis=0)
-    pose[1:, column[1:], 2], twist[1:, column[1:], 2] = told.place[:, 1:], told.speed[:, 1:]
-    record = _record(column, told, flat)
-    if flat:
-        samples = pose.shape[:2]
-        pose = lower_pose(pose.reshape(-1, 7))[0].reshape(*samples, 3)
-        twist = lower_twist(twist.reshape(-1, 6))[0].reshape(*samples, 3)
-    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, record, dt, "completed")
+    # Along one axis: where boxes lie, and how they lie, else is as it was.
+    pose = np.repeat(np.array([[body.pose for body in boxes]], float), steps, axis=0)
+    twist = np.repeat(np.array([[body.twist for body in boxes]], float), steps, axis=0)
+    pose[..., 2], twist[..., 2] = told.place[:, 1:], told.speed[:, 1:]
+    impulse = np.zeros((steps, many, 3))
+    impulse[..., 2] = told.impulse
+    faces = np.stack([np.roll(column, 1), column], axis=1)  # nothing is below the floor, and nothing presses there
+    record = told_contacts(told.pressed, faces, impulse, flat)
+    return told_trajectory(spatial, column[1:], pose, twist, record, dt, flat)
 
 
 def _is_told(place: np.ndarray[Any, np.dtype[Any]], bodies: list[Body]) -> bool:
@@ -134,18 +133,3 @@ def _is_told(place: np.ndarray[Any, np.dtype[Any]], bodies: list[Body]) -> bool:
     low, high = (place + sign * np.array([size[2] for size in sizes]) for sign in (-1.0, 1.0))
     deep = (high[:, :-1] - low[:, 1:] >= np.array(least)).any()
     return bool(np.isfinite(place).all() and not deep and (low[:, 2:] > high[:, :-2]).all())
-
-
-def _record(column: list[int], told: Any, flat: bool) -> ContactRecord:
-    """Impulses of all steps, face by face, on the body of the higher number."""
-    step, face = np.nonzero(told.pressed)
-    ends = np.array(column, np.int64)[np.stack([face - 1, face], axis=1)]
-    impulse = np.zeros((len(step), 3))
-    impulse[:, 2] = np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0) * told.impulse[step, face]
-    ends.sort(axis=1)
-    blank = np.zeros((len(step), 3))
-    held = Contacts(ends[:, 0], ends[:, 1], blank, blank.copy(), impulse, np.zeros(len(step)))
-    offset = np.searchsorted(step, np.arange(len(told.pressed) + 1)).astype(np.int64)
-    return ContactRecord(
-        np.arange(1, len(told.pressed) + 1, dtype=np.int64), offset, lower_contacts(held) if flat else held
-    )

@@ -41,17 +41,17 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Contacts as EngineContacts
 from adapters.law import AskedLaw, Law, Measure, Prediction
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.lift import lift
 from adapters.means import means
 from adapters.needs import needs
 from adapters.newton.column import column_moved, column_of
 from adapters.newton.profiles import PROFILES
 from adapters.newton.shipped import LEAST_APPROACH, STOPPED
+from adapters.newton.telling import told_contacts, told_trajectory
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
-from adapters.trajectory import ContactRecord, Measured, Trajectory
+from adapters.trajectory import Measured, Trajectory
 
 #: Sweeps over the contacts of one pair in each sweep over rebounds. [_restitution_manifold_inner_iterations]
 INNER = 8
@@ -207,33 +207,13 @@ def _moved(
         np.zeros((steps, pairs), np.int8),
     )  # fmt: skip
     run(layout.bodies, layout.may, layout.touching, layout.chosen, told, *layout.room)
-    pose = np.repeat(np.array([[each.pose for each in spatial.bodies]], float), steps + 1, axis=0)
-    twist = np.repeat(np.array([[each.twist for each in spatial.bodies]], float), steps + 1, axis=0)
-    pose[1:, layout.free], twist[1:, layout.free] = told.pose, told.twist
     flat = scene.dimension == 2
-    # Whose impulse it is must be clear: planes are one body here.
-    record = _record(layout, told, chosen["rebounds"], flat) if len(layout.planes) <= 1 else None
-    if flat:
-        samples = pose.shape[:2]
-        pose = lower_pose(pose.reshape(-1, 7))[0].reshape(*samples, 3)
-        twist = lower_twist(twist.reshape(-1, 6))[0].reshape(*samples, 3)
-    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, record, dt, "completed")
-
-
-def _record(layout: _Layout, told: Any, rebounds: bool, flat: bool) -> ContactRecord:
-    """Impulses of all steps, pair by pair; unknown where rebounds are solved as well."""
-    step, pair = np.nonzero(told.pressed)
-    impulse = told.impulse[step, pair].astype(float) * (np.nan if rebounds else 1.0)
-    ends = np.array(layout.pairs, np.int64).reshape(-1, 2)[pair]
-    turned = ends[:, 0] > ends[:, 1]
-    impulse[turned] *= -1.0
-    ends.sort(axis=1)
-    blank = np.zeros((len(step), 3))
-    held = EngineContacts(ends[:, 0], ends[:, 1], blank, blank.copy(), impulse, np.zeros(len(step)))
-    offset = np.searchsorted(step, np.arange(len(told.pressed) + 1)).astype(np.int64)
-    return ContactRecord(
-        np.arange(1, len(told.pressed) + 1, dtype=np.int64), offset, lower_contacts(held) if flat else held
-    )
+    record = None
+    if len(layout.planes) <= 1:  # whose impulse it is must be clear: planes are one body here
+        # Unknown where rebounds are solved as well.
+        impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
+        record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
+    return told_trajectory(spatial, layout.free, told.pose, told.twist, record, dt, flat)
 
 
 def moved(

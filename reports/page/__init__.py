@@ -30,6 +30,7 @@ from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, symbols
 from reports.speed import duration
 from reports.wording import missing_text, number
+from validation.canonical import SUITES
 from validation.cells import format_dt
 
 __all__ = ["Bench", "Source", "load_source", "render"]
@@ -164,10 +165,10 @@ def cite(source: Source) -> dict[str, str]:
     ]
     lines += ['pip install -e ".[all]" -c constraints.txt']
     suite, _, scenes = run.title.partition(": ")
-    options = "--full" if suite == "full" else "--quick"
-    lines.append(f"crosscheck run {scenes} {'--standard' if suite == 'standard' else options} --out again")
+    asked = suite if suite in SUITES else "quick"
+    lines.append(f"crosscheck run {scenes} --{asked} --out again")
     if source.bench is not None:
-        lines.append(f"crosscheck bench {options} --out again")
+        lines.append(f"crosscheck bench --{'full' if asked == 'full' else 'quick'} --out again")
     lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]
     return {"text": text, "commands": "\n".join(lines if clean else lines[1:])}
 

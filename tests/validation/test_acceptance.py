@@ -139,6 +139,25 @@ def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
     assert not propose(rows(creep=0.405), "nameless", listed(FAMILY)).refused
 
 
+@pytest.mark.parametrize("follows", [False, True])
+def test_a_law_speaks_of_iterations_that_are_asked_for_only_where_it_follows_them(monkeypatch, follows):
+    """What a profile's own sweeps do says nothing of others; one that follows them says of each count its own."""
+    asked = (lambda scene, dt, measure, sweeps: (0.05 * sweeps, 0.01)) if follows else None
+    law = Deviation(
+        "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.5, 0.01), "by design", "manual",
+        asked=asked,
+    )  # fmt: skip
+    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+
+    def explained(sweeps, creep):
+        (row,) = rows(replace(SLOT, iterations=sweeps), moved=None, creep=creep)
+        return row.standing == "explained"
+
+    assert explained(None, 0.5) and not explained(None, 0.4)
+    assert explained(8, 0.4) == follows and not explained(8, 0.5)
+    assert explained(10, 0.5) == follows and not explained(10, 0.4)
+
+
 def test_rows_whose_receipts_do_not_hold_are_refused():
     (why,) = refusals(propose(rows(outcome=Outcome.INVALID), "nameless", listed(FAMILY)))
     assert "receipts" in why

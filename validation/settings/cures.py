@@ -113,11 +113,11 @@ class Cure:
 def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
     """Cells of a search: all standard ones at the profile's own iterations, or those that stand for them."""
     canonical = resolve(scene)
-    quick = [v.params for v in canonical.variations("standard") if v.runs_in(dimension) and None in v.iterations]
-    if len(quick) > MOST_CELLS:
+    cells = [v.params for v in canonical.variations("standard") if v.runs_in(dimension) and None in v.iterations]
+    if len(cells) > MOST_CELLS:
         searched = canonical.searched.cells if canonical.searched else ()
-        quick = [canonical.representative, *canonical.planted, *searched][:MOST_CELLS]
-    return tuple(dict(params) for params in dict.fromkeys(canonical.minimal(params) for params in quick))
+        cells = [canonical.representative, *canonical.planted, *searched][:MOST_CELLS]
+    return tuple(dict(params) for params in dict.fromkeys(canonical.minimal(params) for params in cells))
 
 
 @dataclass(frozen=True)
