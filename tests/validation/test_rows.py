@@ -231,7 +231,8 @@ def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
     ((_, centre, band),) = predictions_of(row)
     assert (centre, band) == (0.5, 1e-3)
     assert law == GIVEN
-    for other in (replace(row, physics="pass"), replace(row, iterations=7), replace(row, cells=["a", "b"]),
+    asked = {**row.slot, "iterations": 7}
+    for other in (replace(row, physics="pass"), replace(row, iterations=7, slot=asked), replace(row, cells=["a", "b"]),
                   replace(row, engine_version="1.3"), replace(row, engine="other"), replace(row, profile="hard"),
                   replace(row, metric="acceleration")):  # fmt: skip
         assert predictions_of(other) == []

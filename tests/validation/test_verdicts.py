@@ -205,5 +205,7 @@ def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_a
 
     speaks = Deviation("e", ("p",), "s", "m", law, "because", "source")
     silent = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: None, "because", "source")
-    assert predicted([silent, speaks], "the scene", SimpleNamespace(dt=0.25), "its measure") == [(speaks, 0.25, 0.5)]
+    assert predicted([silent, speaks], "the scene", SimpleNamespace(dt=0.25, iterations=None), "its measure") == [
+        (speaks, 0.25, 0.5)
+    ]
     assert asked == [("the scene", 0.25, "its measure")]
