@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
+SUITE ?= quick
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
 .PHONY: run test test-long recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
@@ -22,7 +23,7 @@ $(STAMP): pyproject.toml constraints.txt
 # where they are seen; the verdicts stand on the terminal before the bench as well.
 run: $(STAMP)
 	@status=0; begun=$$(date +%s); \
-	$(BIN)/crosscheck run --quick --out $(OUT) || status=$$?; \
+	$(BIN)/crosscheck run --$(SUITE) --out $(OUT) || status=$$?; \
 	test $$status -le 1 || exit $$status; \
 	echo "matrix after $$(( $$(date +%s) - begun )) s; now time and report"; \
 	$(BIN)/crosscheck bench --quick --brief --out $(OUT) || exit 2; \
@@ -65,7 +66,7 @@ lint: $(STAMP)
 # One full report and the README's pictures, with the commit inside; needs a clean checkout and Chromium.
 publish: $(STAMP)
 	@test -z "$$(git status --porcelain)" || { echo "commit first: the report carries the commit's hash"; exit 2; }
-	$(MAKE) run OUT=$(OUT)
+	$(MAKE) run OUT=$(OUT) SUITE=standard
 	mkdir -p reports/published
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
