@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certification.fuzz.scenes import scene
@@ -63,3 +64,28 @@ def test_random_scenes_that_were_refused_for_the_end_of_a_slip_are_certified(see
     drawn = scene(seed, 3)
     certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, 5)
     assert certificate.holds, certificate.reasons
+
+
+def test_a_slow_slip_that_friction_all_but_balances_turns_as_its_equation_says():
+    """A ball on a slope, at the start 1 mm/s across it: friction turns the slip at the rate c/|u|, 1e3 a second.
+
+    With s the slip, a the pull of gravity along the slope and k = m r^2/I: ``s' = a - (1 + k) mu N s/|s|``, and
+    ``v' = a - mu N s/|s|``; here (1 + k) mu N is .98 of the pull.
+    """
+    tilt, radius, inertia, rate, steps = 0.6, 0.3, 0.036, 60, 6
+    along, pressed, slow = G * np.sin(tilt), G * np.cos(tilt), 1.0 + radius**2 / inertia
+    mu = 0.98 * along / (slow * pressed)
+    body = Body(Sphere(radius), 1.0, (inertia,) * 3, (0.0, 0.0, radius, *UPRIGHT), (0.0, 1e-3, 0.0, 0.0, 0.0, 0.0))
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT))
+    settings = Settings.reference(1.0 / rate)
+    simulation = Simulation(Model(3, [floor, body], (along, 0.0, -pressed), 0.0, mu), settings)
+
+    def speeds(t, state):
+        rubbed = mu * pressed * state[:2] / np.linalg.norm(state[:2])
+        return [along - slow * rubbed[0], -slow * rubbed[1], along - rubbed[0], -rubbed[1]]
+
+    true = solve_ivp(speeds, (0.0, steps / rate), [0.0, 1e-3, 0.0, 1e-3], "DOP853", rtol=1e-13, atol=1e-16).y[2:, -1]
+    simulation.advance(steps)
+    assert simulation.certificate["held_steps"] == 0
+    # What both orders of a phase may differ by, as a share of what speed is gained in all of them.
+    assert simulation.twist[1, :2] == pytest.approx(true, abs=settings.accuracy * np.linalg.norm(true))
