@@ -48,6 +48,7 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
@@ -93,9 +94,7 @@ class Pairs(NamedTuple):
 
     restitution: Array  # (n, n), strided: one number where all pairs have the same
     friction: Array  # (n, n), likewise
-    bounds: Array  # (n, 4): lower and upper corner of the bounding box
-    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
-    candidate: Indices  # (capacity,): a * n + b, ascending
+    boxes: Boxes
 
 
 @structure
@@ -170,7 +169,7 @@ class World(NamedTuple):
     islands: Islands
     bodies: Bodies  # (n,)
     limit: Array  # (n, 4): see `SubStep`
-    order: Indices  # (n,): see `Pairs`
+    order: Indices  # (n,): see `Boxes`
     tally: Array  # (SIZE,): to go back to where a step is made again
 
 
@@ -246,11 +245,7 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    # Sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves.
-    order = np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64)
-    room = np.zeros(capacity, np.int64)
-    bounds = np.zeros((len(order), 4))
-    return Pairs(pair_table(model.restitution), pair_table(model.friction), bounds, order, room)
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), allocate_boxes(model, capacity))
 
 
 def allocate_rows(capacity: int) -> Rows:

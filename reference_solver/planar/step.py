@@ -15,13 +15,13 @@ from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
 from reference_solver.planar.entries import enter_fixed_step
-from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import prepare, warm_start
 from reference_solver.planar.state import CONTACTS, FIXED, FREE, Bodies, Buffer, Pairs, Rows
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.vectors import copy_vectors
 
 
 @inner_kernel

@@ -31,6 +31,7 @@ from reference_solver.planar.step import copy_contacts, run_steps
 from reference_solver.records import Contacts, Frames
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.broadphase import doubled
 from reference_solver.stepping.lasting import allocate_lasting
 from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
 from reference_solver.stepping.run import run_located
@@ -49,7 +50,7 @@ class World:
         self._rows = allocate_rows(8 * n + 64)
         self._sub = allocate_sub_step(n, len(self._rows.real), allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(8 * n + 64)
-        self._world = allocate_world(self._bodies, len(self._pairs.candidate))
+        self._world = allocate_world(self._bodies, len(self._pairs.boxes.candidate))
         self._options, self._accuracy = options(settings, needs), settings.accuracy
         self._problem = allocate_problem(2, n, len(self._rows.real), uses_direct(settings))
         self.tally = new_tally()
@@ -137,9 +138,9 @@ class World:
 
     def _grow(self) -> None:
         """Double whatever was found too small; the step that stopped goes on from where it was."""
-        if self._rows.counts[CANDIDATES] >= len(self._pairs.candidate):
-            self._pairs = self._pairs._replace(candidate=np.zeros(2 * len(self._pairs.candidate), np.int64))
-            self._world = allocate_world(self._bodies, len(self._pairs.candidate))
+        if self._rows.counts[CANDIDATES] >= len(self._pairs.boxes.candidate):
+            self._pairs = self._pairs._replace(boxes=doubled(self._pairs.boxes))
+            self._world = allocate_world(self._bodies, len(self._pairs.boxes.candidate))
         elif self._ledger.used[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
             bigger = allocate_ledger(2 * len(self._ledger.real))
             for old, new in zip(self._ledger, bigger, strict=True):

@@ -29,6 +29,7 @@ from reference_solver.model import (
 )
 from reference_solver.needs import Needs
 from reference_solver.pieces import Journal, allocate_journal
+from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
@@ -86,8 +87,6 @@ BODY = np.dtype(
         ("geometry", "f8", 4),
         ("extent", "f8"),  # smallest half width [m]
         ("motion", "i8"),  # FIXED, FREE or PRESCRIBED
-        ("low", "f8", 3),  # lower corner of the bounding box
-        ("high", "f8", 3),  # upper corner
     ],
     align=True,
 )
@@ -174,8 +173,7 @@ class Detection(NamedTuple):
     found: Indices  # (FOUND,): see CANDIDATES .. KEPT
     restitution: Array  # (n, n), strided: one number where all pairs have the same
     friction: Array  # (n, n), likewise
-    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
-    candidate: Indices  # (capacity,): a * n + b, ascending
+    boxes: Boxes
     polygon: Array  # (2, 16, 5): two polygons, each made from the other by one clip
     polygon_edge: Indices  # (2, 16): number of the edge that leaves each vertex
 
@@ -229,9 +227,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
         found=np.zeros(FOUND, np.int64),
         restitution=pair_table(model.restitution),
         friction=pair_table(model.friction),
-        # sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves
-        order=np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64),
-        candidate=np.zeros(capacity, np.int64),
+        boxes=allocate_boxes(model, capacity),
         polygon=np.zeros((2, 16, 5)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
@@ -293,7 +289,7 @@ class World(NamedTuple):
     bodies: Bodies  # (n,)
     end: Bodies  # (n,): all bodies where the step ends
     limit: Array  # (n, 6): see `SubStep`
-    order: Indices  # (n,): see `Detection`
+    order: Indices  # (n,): see `Boxes`
     kept: Memory  # for the next step
     tally: Array  # (SIZE,): to go back to where a step is made again
 

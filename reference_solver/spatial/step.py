@@ -11,14 +11,15 @@ from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.entries import enter_fixed_step
-from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
 from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Buffer, Detection, Manifolds, Memory
 from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 
 
 @inner_kernel
@@ -89,19 +90,10 @@ def run_steps(
 
 
 @inner_kernel
-def sample_state(bodies: Bodies, buffer: Buffer, s: int) -> None:
-    """Write poses and twists as sample s."""
-    for i in range(len(bodies)):
-        for d in range(7):
-            buffer.pose[s, i, d] = bodies.pose[i, d]
-        for d in range(6):
-            buffer.twist[s, i, d] = bodies.twist[i, d]
-
-
-@inner_kernel
 def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None:
     """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    sample_state(bodies, buffer, s)
+    copy_vectors(bodies.pose, buffer.pose[s])
+    copy_vectors(bodies.twist, buffer.twist[s])
     start = buffer.offset[s]
     buffer.offset[s + 1] = start
     if len(buffer.real) > 0:

@@ -35,6 +35,7 @@ from reference_solver.spatial.state import (
 )
 from reference_solver.spatial.step import copy_contacts, run_steps
 from reference_solver.step_problem import StepProblem
+from reference_solver.stepping.broadphase import doubled
 from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
 from reference_solver.stepping.run import run_located
 from reference_solver.tally import new_tally
@@ -52,7 +53,7 @@ class World:
         self._memory = allocate_memory(4 * n + 16)
         self._sub_step = allocate_sub_step(n, 4 * n + 16, allocate_meeting(self._bodies))
         self._ledger = allocate_ledger(POINTS * (4 * n + 16))
-        self._world = allocate_world(self._bodies, len(self._memory), len(self._detection.candidate))
+        self._world = allocate_world(self._bodies, len(self._memory), len(self._detection.boxes.candidate))
         self._options, self._accuracy = options(settings, needs), settings.accuracy
         self._problem = allocate_problem(3, n, self._most_points, uses_direct(settings))
         self.tally = new_tally()
@@ -146,10 +147,9 @@ class World:
 
     def _grow(self) -> None:
         """Double whatever was found too small; the step that stopped is made anew."""
-        if self._detection.found[CANDIDATES] >= len(self._detection.candidate):
-            room = np.zeros(2 * len(self._detection.candidate), np.int64)
-            self._detection = self._detection._replace(candidate=room)
-            self._world = allocate_world(self._bodies, len(self._memory), len(room))
+        if self._detection.found[CANDIDATES] >= len(self._detection.boxes.candidate):
+            self._detection = self._detection._replace(boxes=doubled(self._detection.boxes))
+            self._world = allocate_world(self._bodies, len(self._memory), len(self._detection.boxes.candidate))
             return
         if self._ledger.filled[0] + POINTS * self._detection.found[MANIFOLDS] > len(self._ledger.real):
             ledger = allocate_ledger(2 * len(self._ledger.real))
@@ -164,7 +164,7 @@ class World:
         past[: len(self._sub_step.past)] = self._sub_step.past
         self._manifolds = allocate_manifolds(2 * len(self._manifolds))
         self._sub_step = self._sub_step._replace(kept=allocate_manifolds(len(self._manifolds)), past=past)
-        self._world = allocate_world(self._bodies, len(memory), len(self._detection.candidate))
+        self._world = allocate_world(self._bodies, len(memory), len(self._detection.boxes.candidate))
         self._problem = allocate_problem(3, len(self._bodies), self._most_points, bool(self._options.direct))
 
 

@@ -16,12 +16,12 @@ from reference_solver.stepping.operations import (
     end_islands,
     find_islands,
     gather,
-    is_finite,
     is_free,
     keep_end,
     keep_memory,
     sample_located,
 )
+from reference_solver.stepping.vectors import are_finite
 from reference_solver.tally import OPENED
 
 
@@ -47,7 +47,7 @@ def run_located(whole: Island, world: Any, buffer: Any, first: int, steps: int, 
 @spliced_kernel
 def step_world(whole: Island, world: Any) -> bool:
     """One step; False if an array is too small: called again, it makes the step anew."""
-    if not is_finite(whole):
+    if not are_finite(whole.bodies.twist):
         return True
     keep(whole.tally, world.tally)
     for attempt in range(len(ROOM) + 1):
