@@ -30,10 +30,10 @@ from reference_solver.planar.columns import (
     SIN,
 )
 from reference_solver.planar.direct import mend_velocities, solve_directly
-from reference_solver.planar.entries import enter_release, enter_sub_step
+from reference_solver.planar.entries import enter_fixed_step, enter_release, enter_sub_step
 from reference_solver.planar.entries import enter_settled as enter_settled_piece
 from reference_solver.planar.lasting import displace
-from reference_solver.planar.ledger import copy_ledger, enter_contacts
+from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, keep_remembered, pass_on, row_key
 from reference_solver.planar.meeting import Meeting
 from reference_solver.planar.position import correct_positions
@@ -48,20 +48,20 @@ from reference_solver.planar.state import (
     KEPT,
     REMEMBERED,
     Bodies,
-    Buffer,
     Island,
     Pairs,
     Rows,
     SubStep,
     World,
 )
-from reference_solver.planar.step import move
+from reference_solver.planar.step import copy_contacts, move, step
 from reference_solver.stepping import operations
 from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
 from reference_solver.stepping.islands import join_candidates
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
+from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
 from reference_solver.stepping.options import BLOCK
 from reference_solver.stepping.paths import Paths
@@ -481,15 +481,30 @@ def end_islands(whole: Island, world: World) -> None:
 
 
 @inner_kernel
-def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
-    """Contacts are those of the ledger."""
-    copy_vectors(whole.bodies.pose, buffer.pose[s])
-    copy_vectors(whole.bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + whole.ledger.used[0]
-        copy_ledger(whole.ledger, buffer, start)
+def contacts_entered(whole: Island, buffer: Buffer, start: int) -> int:
+    """All of the ledger."""
+    return int(copy_ledger(whole.ledger, buffer, start))
+
+
+@inner_kernel
+def most_contacts(whole: Island) -> int:
+    """As many as there is room to find."""
+    return len(whole.rows.real)
+
+
+@inner_kernel
+def make_fixed_step(whole: Island) -> bool:
+    """The step of `step.py`."""
+    done = step(whole.bodies, whole.pairs, whole.rows, whole.problem, whole.options, whole.tally)
+    if done:
+        enter_fixed_step(whole.sub.journal, whole.bodies, whole.rows, whole.options)
+    return bool(done)
+
+
+@inner_kernel
+def contacts_found(whole: Island, buffer: Buffer, start: int) -> int:
+    """Those of the last step."""
+    return int(copy_contacts(whole.rows, buffer, start))
 
 
 operations.provide_all(Island, globals())

@@ -52,6 +52,7 @@ from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.ledger import Ledger
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.structures import structure
@@ -140,15 +141,6 @@ class SubStep(NamedTuple):
 
 
 @structure
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    used: Indices  # (1,): number of contacts
-    integer: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-
-
-@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -171,18 +163,6 @@ class World(NamedTuple):
     limit: Array  # (n, 4): see `SubStep`
     order: Indices  # (n,): see `Boxes`
     tally: Array  # (SIZE,): to go back to where a step is made again
-
-
-@structure
-class Buffer(NamedTuple):
-    """Samples of a run; `integer` and `real` of length 0 where contacts are not recorded."""
-
-    pose: Array  # (s, n, 3)
-    twist: Array  # (s, n, 3)
-    offset: Indices  # (s + 1,)
-    integer: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-    journal: Journal
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -296,11 +276,6 @@ def allocate_world(bodies: Bodies, candidates: int) -> World:
     local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
     islands = allocate_islands(2, n, candidates)
     return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE))
-
-
-def allocate_ledger(capacity: int) -> Ledger:
-    """Return room for ``capacity`` contacts."""
-    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 7)))
 
 
 def grown(rows: Rows) -> Rows:

@@ -18,10 +18,10 @@ from reference_solver.spatial.block import sweep_blocks
 from reference_solver.spatial.broadphase import bound_bodies, find_overlaps
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.direct import mend_velocities, solve_directly
-from reference_solver.spatial.entries import enter_release, enter_sub_step
+from reference_solver.spatial.entries import enter_fixed_step, enter_release, enter_sub_step
 from reference_solver.spatial.entries import enter_settled as enter_settled_piece
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
-from reference_solver.spatial.ledger import copy_ledger, enter_contacts, enter_impulses
+from reference_solver.spatial.ledger import enter_contacts, enter_impulses
 from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
 from reference_solver.spatial.meeting import Meeting
 from reference_solver.spatial.motion import accelerate, displace
@@ -42,13 +42,13 @@ from reference_solver.spatial.state import (
     POINTS,
     REMEMBERED,
     Bodies,
-    Buffer,
     Detection,
     Island,
     Manifolds,
     SubStep,
     World,
 )
+from reference_solver.spatial.step import copy_contacts, step
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
@@ -60,6 +60,7 @@ from reference_solver.stepping.islands import join_candidates
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import Paths
@@ -95,7 +96,7 @@ def find_contacts(island: Island) -> int:
     found = detect_touching(
         island.bodies, island.detection, island.room, island.memory, island.sub.past, island.options, island.sub.clock
     )
-    return found if island.ledger.filled[0] + POINTS * found <= len(island.ledger.real) else -1
+    return found if island.ledger.used[0] + POINTS * found <= len(island.ledger.real) else -1
 
 
 @inner_kernel
@@ -425,7 +426,7 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
 @inner_kernel
 def begin_islands(whole: Island) -> None:
     """Counts of what is kept and entered."""
-    whole.detection.found[KEPT] = whole.ledger.filled[0] = 0
+    whole.detection.found[KEPT] = whole.ledger.used[0] = 0
 
 
 @inner_kernel
@@ -532,14 +533,31 @@ def end_islands(whole: Island, world: World) -> None:
 
 
 @inner_kernel
-def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
-    """Contacts are those of the ledger."""
-    copy_vectors(whole.bodies.pose, buffer.pose[s])
-    copy_vectors(whole.bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + copy_ledger(whole.ledger, buffer, start)
+def contacts_entered(whole: Island, buffer: Buffer, start: int) -> int:
+    """All of the ledger."""
+    return int(copy_ledger(whole.ledger, buffer, start))
+
+
+@inner_kernel
+def most_contacts(whole: Island) -> int:
+    """As many as there is room to find."""
+    return POINTS * len(whole.room)
+
+
+@inner_kernel
+def make_fixed_step(whole: Island) -> bool:
+    """The step of `step.py`."""
+    done = step(whole.bodies, whole.detection, whole.room, whole.memory, whole.problem, whole.options, whole.tally)
+    if done:
+        found = whole.room[: whole.detection.found[MANIFOLDS]]
+        enter_fixed_step(whole.sub.journal, whole.bodies, found, whole.options)
+    return bool(done)
+
+
+@inner_kernel
+def contacts_found(whole: Island, buffer: Buffer, start: int) -> int:
+    """Those of the last step."""
+    return int(copy_contacts(whole.room[: whole.detection.found[MANIFOLDS]], buffer, start))
 
 
 operations.provide_all(Island, globals())

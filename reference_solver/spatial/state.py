@@ -33,6 +33,7 @@ from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
+from reference_solver.stepping.ledger import Ledger
 from reference_solver.stepping.options import Options
 from reference_solver.structures import structure
 from reference_solver.tally import SIZE as TALLY_SIZE
@@ -155,18 +156,6 @@ Memory: TypeAlias = Any
 
 
 @structure
-class Buffer(NamedTuple):
-    """Samples of a run; `names` and `real` of length 0 where contacts are not recorded."""
-
-    pose: Array  # (s, n, 7)
-    twist: Array  # (s, n, 6)
-    offset: Indices  # (s + 1,)
-    names: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
-    journal: Journal
-
-
-@structure
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
@@ -258,15 +247,6 @@ class SubStep(NamedTuple):
 
 
 @structure
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    filled: Indices  # (1,): number of entries
-    names: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
-
-
-@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -330,11 +310,6 @@ def allocate_world(bodies: Bodies, manifolds: int, candidates: int) -> World:
         kept=allocate_memory(manifolds),
         tally=np.zeros(TALLY_SIZE),
     )
-
-
-def allocate_ledger(capacity: int) -> Ledger:
-    """Return room for ``capacity`` contacts."""
-    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 10)))
 
 
 def allocate_manifolds(capacity: int) -> Manifolds:

@@ -339,8 +339,30 @@ def end_islands(whole: Any, world: Any) -> None:
 
 
 @operation
-def sample_located(whole: Any, buffer: Any, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+def contacts_entered(whole: Any, buffer: Any, start: int) -> int:
+    """Write the contacts of the ledger from index ``start`` on; return how many."""
+    raise NotImplementedError
+
+
+# ---- The fixed step of the whole world (`stepping.run`).
+
+
+@operation
+def most_contacts(whole: Any) -> int:
+    """Contacts that there is room for."""
+    raise NotImplementedError
+
+
+@operation
+def make_fixed_step(whole: Any) -> bool:
+    """One step with one contact problem, entered in the journal; False if an array is too small."""
+    raise NotImplementedError
+
+
+@operation
+def contacts_found(whole: Any, buffer: Any, start: int) -> int:
+    """Write the contacts of the last fixed step from index ``start`` on; return how many."""
+    raise NotImplementedError
 
 
 #: What an island's dimension provides, all of it.
@@ -379,7 +401,10 @@ OF_ISLANDS = (
     keep_memory,
     keep_end,
     end_islands,
-    sample_located,
+    contacts_entered,
+    most_contacts,
+    make_fixed_step,
+    contacts_found,
 )
 
 
