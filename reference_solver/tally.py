@@ -30,7 +30,7 @@ MOMENTUM = 10
 ENERGY = 11
 #: Largest energy that a contact solve with, and without, positive targets created, as a share of all its work (E63).
 CREATED, PUMPED = 12, 13
-#: Contact solves that created energy under a positive target (restitution, Baumgarte): Kane's paradox (E63).
+#: Contact solves that created energy under a positive target (restitution): Kane's paradox (E63).
 KANE = 14
 #: Work of contacts on relative motion, of moving surfaces on free bodies, of loads, all steps [J].
 CONTACT_WORK, SURFACE_WORK, LOAD_WORK = 15, 16, 17

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference_solver.certification import Gate
+from reference_solver.certification import Gate, runge_kutta
 from reference_solver.certification.space import GRAVITY, SPACES, Space, made_by
 from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Polygon, Shape
 from reference_solver.settings import Settings
@@ -153,21 +153,16 @@ def slender_rod(dt: float = 1 / 240, steps: int = 40) -> Iterator[Gate]:
     ``(m l^2 + I) theta'' = m g l sin(theta)``, theta from the vertical (Lagrange), integrated in steps of dt / 64 by
     the classical fourth-order Runge-Kutta method.
     """
-    inertia, angle, rate = 1.0 / 3.0, 0.3, 0.0
-    pull, h = GRAVITY / (1.0 + inertia), dt / 64.0
+    inertia, state = 1.0 / 3.0, (0.3, 0.0)
+    pull = GRAVITY / (1.0 + inertia)
     for _ in range(64 * steps):
-        k1 = (rate, pull * math.sin(angle))
-        k2 = (rate + 0.5 * h * k1[1], pull * math.sin(angle + 0.5 * h * k1[0]))
-        k3 = (rate + 0.5 * h * k2[1], pull * math.sin(angle + 0.5 * h * k2[0]))
-        k4 = (rate + h * k3[1], pull * math.sin(angle + h * k3[0]))
-        angle += h / 6.0 * (k1[0] + 2.0 * k2[0] + 2.0 * k3[0] + k4[0])
-        rate += h / 6.0 * (k1[1] + 2.0 * k2[1] + 2.0 * k3[1] + k4[1])
+        state = runge_kutta.move(lambda angle, _: pull * math.sin(angle), state, dt / 64.0)
     for radius in (0.1, 2e-3):
         start = (math.sin(0.3) + radius, math.cos(0.3) + radius, 0.5 * math.pi + 0.3)
         planes = [Body(HalfSpace(normal), motion="fixed") for normal in ((1.0, 0.0), (0.0, 1.0))]
         bodies = [*planes, Body(Capsule(1.0, radius), 1.0, inertia, start)]
         simulation = Simulation(Model(2, bodies, (0.0, -GRAVITY), 0.0, 0.0), Settings.reference(dt))
         simulation.advance(steps)
-        error = float(simulation.pose[2, 2]) - 0.5 * math.pi - angle
+        error = float(simulation.pose[2, 2]) - 0.5 * math.pi - state[0]
         case = f"radius {radius:g} of half the length, {steps} steps"
         yield Gate.at_most("rod on a smooth wall: angle [rad]", case, error, 1e-10, "planar reference")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
-from reference_solver.certification import Gate
+from reference_solver.certification import Gate, runge_kutta
 from reference_solver.certification.space import GRAVITY
-from reference_solver.certification.turning import rocking_block
+from reference_solver.certification.turning_scenes import PLANE, rocking_block
 from reference_solver.model import Array, Body, Model
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, HalfSpace
@@ -49,7 +49,7 @@ def falls(quantity: str, case: str, coarse: float, fine: float) -> Iterator[Gate
 def rocking(times: Sequence[float] = (3.0, 8.0)) -> Iterator[Gate]:
     """Yield how a block rocks, and where it is when that has died out after some 70 impacts."""
     for time in times:
-        case = rocking_block(time)
+        case = rocking_block(PLANE, time)
         yield from falls("rocking", f"{time:g} s", case.error(60), case.error(240))
 
 
@@ -112,29 +112,29 @@ def _pushed(rows: list[Array], right: list[float], inertia: float) -> tuple[Arra
     return found, bool((found >= 0.0).all())
 
 
-def _acceleration(lean: Array, rate: Array, touching: tuple[int, ...], inertia: float) -> tuple[Array, Array]:
-    """Accelerations (3,) of the leans [rad/s^2], and forces of the contacts that are held [N].
+def _acceleration(touching: tuple[int, ...], inertia: float, lean: Array, rate: Array) -> Array:
+    """Accelerations (3,) of the leans [rad/s^2]. A domino that stands has its other foot to stand on.
 
-    A domino that stands has its other foot to stand on.
+    Raises
+    ------
+    ArithmeticError
+        If a contact that is held pulls.
     """
     torque = MASS * GRAVITY * (HEIGHT * np.sin(lean) - WIDTH * np.cos(lean))
     torque = np.where((lean <= 0.0) & (rate == 0.0), 0.0, torque)
     rows = [_row(lean, i) for i in touching]
     right = [-float(row @ torque) / inertia - _bend(lean, rate, i) for row, i in zip(rows, touching, strict=True)]
-    force, _ = _pushed(rows, right, inertia)
-    gained = torque + sum((f * row for f, row in zip(force, rows, strict=True)), np.zeros(3))
-    return gained / inertia, force
+    force, pushes = _pushed(rows, right, inertia)
+    if not pushes:
+        raise ArithmeticError("a contact of the dominoes pulls")
+    gained: Array = torque + sum((f * row for f, row in zip(force, rows, strict=True)), np.zeros(3))
+    return gained / inertia
 
 
-def _step(lean: Array, rate: Array, touching: tuple[int, ...], inertia: float, h: float) -> tuple[Array, Array]:
-    k1, l1 = rate, _acceleration(lean, rate, touching, inertia)[0]
-    k2 = rate + 0.5 * h * l1
-    l2 = _acceleration(lean + 0.5 * h * k1, k2, touching, inertia)[0]
-    k3 = rate + 0.5 * h * l2
-    l3 = _acceleration(lean + 0.5 * h * k2, k3, touching, inertia)[0]
-    k4 = rate + h * l3
-    l4 = _acceleration(lean + h * k3, k4, touching, inertia)[0]
-    return lean + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4), rate + h / 6.0 * (l1 + 2.0 * (l2 + l3) + l4)
+def _apart(touching: tuple[int, ...], state: tuple[Array, Array]) -> float:
+    """Least gap of those that are not held [m]."""
+    lean, _ = state
+    return min((_gap(lean[i], lean[i + 1]) for i in range(2) if i not in touching), default=math.inf)
 
 
 def _struck(lean: Array, rate: Array, closed: tuple[int, ...], inertia: float) -> tuple[Array, tuple[int, ...]]:
@@ -163,22 +163,10 @@ def toppled() -> Array:
     lean, rate, left = np.array([LEAN, 0.0, 0.0]), np.zeros(3), FALL
     touching: tuple[int, ...] = ()
     while left > 0.0:
-        length = min(TRUE_STEP, left)
-        after = _step(lean, rate, touching, inertia, length)
-        opened = [i for i in range(2) if i not in touching]
-        if any(_gap(after[0][i], after[0][i + 1]) < 0.0 for i in opened):
-            low, high = 0.0, length
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                there = _step(lean, rate, touching, inertia, middle)[0]
-                met = any(_gap(there[i], there[i + 1]) < 0.0 for i in opened)
-                low, high = (low, middle) if met else (middle, high)
-            lean, rate = _step(lean, rate, touching, inertia, high)
+        step = partial(runge_kutta.move, partial(_acceleration, touching, inertia))
+        state, left = runge_kutta.integrated(step, (lean, rate), left, TRUE_STEP, partial(_apart, touching))
+        lean, rate = state
+        if left > 0.0:
             closed = tuple(i for i in range(2) if i in touching or _gap(lean[i], lean[i + 1]) <= 1e-12)
             rate, touching = _struck(lean, rate, closed, inertia)
-            left -= high
-            continue
-        (lean, rate), left = after, left - length
-        if (_acceleration(lean, rate, touching, inertia)[1] < 0.0).any():
-            raise ArithmeticError("a contact of the dominoes pulls")
     return lean

@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 
+from reference_solver.certification import runge_kutta
 from reference_solver.certification.rotation import angle_between, tumbled, tumbling
 from reference_solver.certification.space import GRAVITY, ROUNDNESS, SPACES, Space, made_by
 from reference_solver.model import Array, Body
@@ -158,15 +159,10 @@ def hill_angle(dimension: int, lean: float, steps: int = 3000) -> float:
     By the classical fourth-order Runge-Kutta method: in steps of .25 ms its error is 1e-15.
     """
     rate = GRAVITY / ((1.0 + ROUNDNESS[dimension]) * (HILL + 0.5))
-    angle, spin, h = lean, 0.0, ROLLED / steps
+    state = (lean, 0.0)
     for _ in range(steps):
-        a1, s1 = spin, rate * math.sin(angle)
-        a2, s2 = spin + 0.5 * h * s1, rate * math.sin(angle + 0.5 * h * a1)
-        a3, s3 = spin + 0.5 * h * s2, rate * math.sin(angle + 0.5 * h * a2)
-        a4, s4 = spin + h * s3, rate * math.sin(angle + h * a3)
-        angle += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        spin += h / 6.0 * (s1 + 2.0 * s2 + 2.0 * s3 + s4)
-    return angle
+        state = runge_kutta.move(lambda angle, _: rate * math.sin(angle), state, ROLLED / steps)
+    return state[0]
 
 
 def rolling_off(space: Space, settings: Settings, phase: float) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference_solver.certification import Gate
+from reference_solver.certification import Gate, runge_kutta
 from reference_solver.model import Array, Body, Box, Model
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
@@ -71,11 +71,7 @@ def tumbled(end: float, steps: int = 40_000) -> Array:
         )
 
     for _ in range(steps):
-        k1 = rate(state)
-        k2 = rate(state + 0.5 * h * k1)
-        k3 = rate(state + 0.5 * h * k2)
-        k4 = rate(state + h * k3)
-        state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        state = runge_kutta.advance(rate, state, h)
     return state[:4] / np.linalg.norm(state[:4])
 
 

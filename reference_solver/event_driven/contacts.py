@@ -10,7 +10,7 @@ import numpy as np
 from reference_solver.event_driven.bodies import BOX, PLANE, Bodies
 from reference_solver.event_driven.box import BoxGaps
 from reference_solver.event_driven.flight import Flight
-from reference_solver.event_driven.prediction import touch_length, touching
+from reference_solver.event_driven.prediction import Flown, touch_length, touching
 from reference_solver.model import Array
 
 #: (body_a, body_b, feature): the same contact at another instant has the same key.
@@ -43,14 +43,14 @@ class Geometry:
         self.box = BoxGaps(bodies, flight) if bodies.box >= 0 else None
         self._found = np.zeros(bodies.count, np.int64)
 
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+    def flown(self) -> Flown:
         """What kernels read of the flight and the shapes."""
         f, b = self.flight, self.bodies
-        return f.x0, f.v0, f.a0, f.t0, f.late, b.radius, b.normal, b.offset
+        return Flown(b.kind, f.x0, f.v0, f.a0, f.t0, f.late, b.radius, b.normal, b.offset)
 
     def overlapping(self, i: int, t: float) -> list[int]:
         """Bodies that body i overlaps with by more than round-off."""
-        count = touching(i, t, -1.0, self.bodies.kind, *self.arrays(), self._found)
+        count = touching(i, t, -1.0, self.flown(), self._found)
         found = [int(j) for j in self._found[:count]]
         if self.box is not None:
             partners = self.box.partners() if i == self.box.box else [self.box.box]
@@ -60,7 +60,7 @@ class Geometry:
 
     def around(self, i: int, t: float, known: Collection[tuple[int, int]] = ()) -> list[Contact]:
         """Contacts of body i at time t, sorted by key; without those of the ``known`` pairs of bodies."""
-        count = touching(i, t, 1.0, self.bodies.kind, *self.arrays(), self._found)
+        count = touching(i, t, 1.0, self.flown(), self._found)
         partners = [int(j) for j in self._found[:count] if self.bodies.free[i] or self.bodies.free[j]]
         if self.box is not None:
             partners += self.box.partners() if i == self.box.box else [self.box.box]

@@ -186,8 +186,8 @@ class EventDriven:
             assert self._geometry.box is not None
             self._next[i], self._partner[i] = self._geometry.box.next_meeting(resting)
             return
-        arrays = self._geometry.arrays()
-        self._partner[i] = next_meeting(i, self.bodies.kind, self.bodies.skipped, *arrays, self._work, self._best)
+        flown = self._geometry.flown()
+        self._partner[i] = next_meeting(i, self.bodies.skipped, flown, self._work, self._best)
         self._next[i], self._late[i] = self._best
 
     def _predict_around(self, changed: set[int]) -> None:

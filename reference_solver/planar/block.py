@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_interval
 from reference_solver.model import Array
 from reference_solver.planar.columns import (
     AN,
@@ -73,7 +74,7 @@ def relax_point(bodies: Bodies, rows: Rows, c: int, row: int, options: Options, 
     if options.friction:
         bound = rows.real[c, FRICTION] * new
         old = rows.real[c, PT]
-        new = min(max(old + relaxation * (rows.local[IMPULSE, row + 1] - old), -bound), bound)
+        new = into_interval(old + relaxation * (rows.local[IMPULSE, row + 1] - old), bound)
         rows.real[c, PT] = new
         apply_tangent(bodies, bodies.twist, rows, c, new - old)
 
@@ -118,7 +119,7 @@ def change_impulse(w: Array, p: Array, u: Array, row: int, new: float) -> None:
 @inner_kernel
 def slide_row(w: Array, p: Array, u: Array, row: int, bound: float) -> None:
     """Friction row of the block by itself (E11)."""
-    change_impulse(w, p, u, row, min(max(p[row] - u[row] / w[row, row], -bound), bound))
+    change_impulse(w, p, u, row, into_interval(p[row] - u[row] / w[row, row], bound))
 
 
 @inner_kernel

@@ -49,7 +49,7 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Ro
             reference = a if candidate < 2 else b
     if ahead > 0.0:
         edge = (0 if side > 0.0 else 2) if axis == 1 else (3 if side > 0.0 else 1)  # in the order of vertices
-        _, reference, edge, _ = lasting_axis(bodies, a, b, dx, dy, reference, edge, 0, 0.0, ahead)
+        _, reference, edge, _ = lasting_axis(bodies, a, b, (dx, dy), reference, edge, 0, 0.0, ahead)
         axis, side = 1 - edge % 2, 1.0 if edge == 0 or edge == 3 else -1.0
     if reference == a:
         return clip_edge(bodies, a, b, dx, dy, axis, side, reach, rows, c)
@@ -95,7 +95,7 @@ def clip_edge(
         ax, ay = p * nx - q * ny, p * ny + q * nx
         faces = (axis * 2 + (1 if side > 0.0 else 0)) * 4 + edge * 2 + (1 if toward > 0.0 else 0)
         feature = ((0 if r < i else 1) * 16 + faces) * 2 + end
-        write_point(rows, c + found, r, i, feature, nx, ny, ax, ay, ax - dx, ay - dy, gap)
+        write_point(rows, c + found, r, i, feature, (nx, ny), (ax, ay), (ax - dx, ay - dy), gap)
         found += 1
     return found
 

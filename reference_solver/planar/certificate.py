@@ -6,10 +6,8 @@ the impulses. Every contact solve of a step, impact or force phase, opens with `
 
 from __future__ import annotations
 
-import math
-
 from reference_solver.compilation import inner_kernel, kernel
-from reference_solver.cone import cone_defect
+from reference_solver.coulomb import cone_defect
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
 from reference_solver.planar.columns import (
@@ -45,6 +43,7 @@ from reference_solver.planar.residual import row_residual
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows
 from reference_solver.stepping.accounting import LAST_PLACE, enter_creation, enter_share
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import are_finite
 from reference_solver.tally import (
     CONE,
     CONTACT_WORK,
@@ -89,7 +88,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
 def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     """Enter how well velocities and impulses solve the contact problem; velocities and impulses are not changed."""
     tally[SOLVES] += 1.0
-    if not is_finite(bodies):
+    if not are_finite(bodies.twist):
         tally[NOT_FINITE] += 1.0
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
@@ -129,16 +128,6 @@ def is_unique(bodies: Bodies, rows: Rows, options: Options) -> bool:
                 return False
         if mu * abs(rows.real[c, COUPLING]) * rows.real[c, NORMAL_MASS] >= 1.0:
             return False
-    return True
-
-
-@inner_kernel
-def is_finite(bodies: Bodies) -> bool:
-    """Whether every velocity is a number: comparisons with what is not would be silently false."""
-    for i in range(len(bodies.kind)):
-        for k in range(3):
-            if not math.isfinite(bodies.twist[i, k]):
-                return False
     return True
 
 

@@ -72,13 +72,14 @@ def axis_normal(
 
 @inner_kernel
 def lasting_axis(
-    bodies: Bodies, a: int, b: int, dx: float, dy: float, reference: int, k: int, l: int, grown: float, ahead: float
+    bodies: Bodies, a: int, b: int, way: tuple[float, float], reference: int, k: int, l: int, grown: float, ahead: float
 ) -> tuple[float, int, int, int]:
     """Axis that separates a and b longest, where the axis (reference, k, l), best by its gap, closes within ``ahead``.
 
-    ``grown``: sum of both radii [m]. Returns the separation of the cores along it, the body whose edge it is, the edge,
-    and a corner, as `separating_axis` does.
+    ``way``: from the centre of a to that of b; ``grown``: sum of both radii [m]. Returns the separation of the cores
+    along it, the body whose edge it is, the edge, and a corner, as `separating_axis` does.
     """
+    dx, dy = way
     nx, ny = axis_normal(bodies, a, b, reference, k, l, dx, dy)
     best = separation_along(bodies, a, b, nx, ny, dx, dy)
     noise = pair_noise(bodies, a, b)

@@ -60,7 +60,7 @@ def half_space_core(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c:
         gap = height + nx * x + ny * y
         if gap <= reach:
             ax, ay = x - radius * nx, y - radius * ny
-            write_point(rows, c + found, f, s, k, nx, ny, dx + ax, dy + ay, ax, ay, gap)
+            write_point(rows, c + found, f, s, k, (nx, ny), (dx + ax, dy + ay), (ax, ay), gap)
             found += 1
     return found
 
@@ -76,7 +76,7 @@ def core_core(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: 
     if separation - grown > reach:
         return 0
     if ahead > 0.0:
-        separation, reference, k, l = lasting_axis(bodies, a, b, dx, dy, reference, k, l, grown, ahead)
+        separation, reference, k, l = lasting_axis(bodies, a, b, (dx, dy), reference, k, l, grown, ahead)
     gap = separation - grown
     if reference == CORNERS:
         nx, ny = corner_line(bodies, a, b, k, l, dx, dy)
@@ -84,7 +84,7 @@ def core_core(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: 
         from_a = bodies.real[a, ROUNDING] + share_of_gap(bodies, a, b) * gap
         ax, ay = x + from_a * nx, y + from_a * ny
         feature = 4 * MOST_VERTICES * MOST_VERTICES + k * MOST_VERTICES + l
-        write_point(rows, c, a, b, feature, nx, ny, ax, ay, ax - dx, ay - dy, gap)
+        write_point(rows, c, a, b, feature, (nx, ny), (ax, ay), (ax - dx, ay - dy), gap)
         return 1
     if reference == a:
         return clip_facing_edge(bodies, a, b, dx, dy, k, reach, rows, c)
@@ -129,6 +129,6 @@ def clip_facing_edge(
             continue
         p = face + bodies.real[r, ROUNDING] + share_of_gap(bodies, r, i) * gap
         ax, ay = p * nx - q * ny, p * ny + q * nx
-        write_point(rows, c + found, r, i, feature + end, nx, ny, ax, ay, ax - dx, ay - dy, gap)
+        write_point(rows, c + found, r, i, feature + end, (nx, ny), (ax, ay), (ax - dx, ay - dy), gap)
         found += 1
     return found

@@ -27,7 +27,7 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.flight import place, put_back
 from reference_solver.planar.impact import flies, gap_noise
-from reference_solver.planar.kinematics import copy_vectors, normal_velocity
+from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.lasting import evaluate, hold
 from reference_solver.planar.press import FAR
 from reference_solver.planar.rows import still_speed
@@ -40,6 +40,7 @@ from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import OPEN, Lasting
 from reference_solver.stepping.noise import FROZEN, NOISE
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Repetitions of a phase to make it end at an impact; each squares what the one before missed it by.

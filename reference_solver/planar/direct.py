@@ -24,11 +24,12 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.kinematics import add_pressure, apply_normal, apply_tangent, copy_vectors
+from reference_solver.planar.kinematics import add_pressure, apply_normal, apply_tangent
 from reference_solver.planar.state import CONTACTS as ROW_COUNT
 from reference_solver.planar.state import Bodies, Rows
 from reference_solver.stepping.noise import MENDED
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 
 
 @inner_kernel

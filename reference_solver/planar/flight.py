@@ -106,7 +106,7 @@ def fastest(sub: SubStep, i: int, k: int, t: float) -> float:
 def bound_flight(bodies: Bodies, pairs: Pairs, sub: SubStep, options: Options, t: float) -> bool:
     """Bounds of all bodies over the sub-step up to t; False if nothing moves."""
     bound_bodies(bodies, pairs, options)
-    moves = False
+    boxes, moves = pairs.boxes, False
     for i in range(len(bodies.kind)):
         spin = t * fastest(sub, i, 2, t)
         for k in range(2):
@@ -114,8 +114,8 @@ def bound_flight(bodies: Bodies, pairs: Pairs, sub: SubStep, options: Options, t
             if way > AT_REST * bodies.real[i, EXTENT] or spin > AT_REST:
                 moves = True
             if spin > 0.0:
-                pairs.bounds[i, k] = min(pairs.bounds[i, k], bodies.pose[i, k] - bodies.real[i, REACH])
-                pairs.bounds[i, 2 + k] = max(pairs.bounds[i, 2 + k], bodies.pose[i, k] + bodies.real[i, REACH])
-            pairs.bounds[i, k] -= way
-            pairs.bounds[i, 2 + k] += way
+                boxes.low[i, k] = min(boxes.low[i, k], bodies.pose[i, k] - bodies.real[i, REACH])
+                boxes.high[i, k] = max(boxes.high[i, k], bodies.pose[i, k] + bodies.real[i, REACH])
+            boxes.low[i, k] -= way
+            boxes.high[i, k] += way
     return moves

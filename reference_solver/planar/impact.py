@@ -38,8 +38,7 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, load_speed, normal_velocity, speed_at, tangent_velocity
+from reference_solver.planar.kinematics import load_speed, normal_velocity, speed_at, tangent_velocity
 from reference_solver.planar.lasting import edge_along
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses, still_speed
@@ -59,6 +58,7 @@ from reference_solver.stepping.impacts import (
     drifts_aside,
     turns_aside,
 )
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
     LATE,
@@ -70,6 +70,7 @@ from reference_solver.stepping.noise import (
     UNSOLVED,
 )
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 

@@ -98,14 +98,6 @@ def load_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
 
 
 @inner_kernel
-def copy_vectors(source: Array, target: Array) -> None:
-    """Copy three numbers per body; a slice assignment would allocate."""
-    for i in range(len(source)):
-        for k in range(3):
-            target[i, k] = source[i, k]
-
-
-@inner_kernel
 def add_pressure(bodies: Bodies, rows: Rows, c: int) -> None:
     """Add what the impulses of row c, or its usual ones, can at most do to the velocities of its bodies.
 

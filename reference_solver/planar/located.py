@@ -1,4 +1,7 @@
-"""What a located step asks of the plane (`stepping.operations`), from the instant an island is gathered to its end."""
+"""What a located step asks of the plane (`stepping.operations`), from the instant an island is gathered to its end.
+
+And what contact solves ask (`stepping.iteration`).
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,9 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import problem_part
 from reference_solver.journal import journal_part
 from reference_solver.planar import curve, flight, impact, jam, midpoint, press, rocking, slide, time_of_impact
-from reference_solver.planar.block import prepare_blocks
-from reference_solver.planar.broadphase import pair_bodies
+from reference_solver.planar.block import prepare_blocks, sweep_blocks
+from reference_solver.planar.broadphase import find_overlaps
 from reference_solver.planar.certificate import certify, open_solve
-from reference_solver.planar.certificate import is_finite as twists_are_finite
 from reference_solver.planar.columns import (
     BODY_INTEGERS,
     BODY_REALS,
@@ -27,16 +29,17 @@ from reference_solver.planar.columns import (
     RELEASE,
     SIN,
 )
-from reference_solver.planar.entries import enter_release, enter_sub_step
+from reference_solver.planar.direct import mend_velocities, solve_directly
+from reference_solver.planar.entries import enter_fixed_step, enter_release, enter_sub_step
 from reference_solver.planar.entries import enter_settled as enter_settled_piece
-from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.lasting import displace
-from reference_solver.planar.ledger import copy_ledger, enter_contacts
+from reference_solver.planar.ledger import enter_contacts
 from reference_solver.planar.manifolds import detect, keep_remembered, pass_on, row_key
 from reference_solver.planar.meeting import Meeting
 from reference_solver.planar.position import correct_positions
+from reference_solver.planar.residual import natural_map
 from reference_solver.planar.rows import warm_start
+from reference_solver.planar.sequential_impulses import sweep_rows
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
@@ -45,22 +48,25 @@ from reference_solver.planar.state import (
     KEPT,
     REMEMBERED,
     Bodies,
-    Buffer,
     Island,
     Pairs,
     Rows,
     SubStep,
     World,
 )
-from reference_solver.planar.step import move
+from reference_solver.planar.step import copy_contacts, move, step
 from reference_solver.stepping import operations
+from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
 from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
+from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
 from reference_solver.stepping.options import BLOCK
 from reference_solver.stepping.paths import Paths
 from reference_solver.stepping.phase import NO_PHASE
+from reference_solver.stepping.vectors import copy_vectors
 
 
 @inner_kernel
@@ -329,15 +335,9 @@ def enter_settled(island: Island) -> None:
 
 
 @inner_kernel
-def is_finite(whole: Island) -> bool:
-    """Of all bodies."""
-    return bool(twists_are_finite(whole.bodies))
-
-
-@inner_kernel
 def find_islands(whole: Island, world: World, room: float) -> bool:
     """By bounding boxes of all that a body may sweep."""
-    bodies, options, limit, bounds = whole.bodies, whole.options, world.islands.limit, whole.pairs.bounds
+    bodies, options, limit, boxes = whole.bodies, whole.options, world.islands.limit, whole.pairs.boxes
     for i in range(len(bodies.kind)):
         reach = bodies.real[i, REACH] + options.margin * bodies.real[i, EXTENT]
         for k in range(2):
@@ -347,10 +347,10 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
                 way = room * way + options.margin * bodies.real[i, EXTENT]
             way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
             limit[i, k], limit[i, 2 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
-            bounds[i, k], bounds[i, 2 + k] = limit[i, k] - reach, limit[i, 2 + k] + reach
-    if not pair_bodies(bodies, whole.pairs, whole.rows, options):
+            boxes.low[i, k], boxes.high[i, k] = limit[i, k] - reach, limit[i, 2 + k] + reach
+    if not find_overlaps(bodies, whole.pairs, whole.rows, options):
         return False
-    join_candidates(whole, world.islands, whole.pairs.candidate, whole.rows.counts[CANDIDATES])
+    join_candidates(whole, world.islands, boxes.candidate, whole.rows.counts[CANDIDATES])
     return True
 
 
@@ -378,7 +378,7 @@ def gather(whole: Island, world: World, count: int) -> Island:
     whole.sub.lasting.size[BODIES] = count
     whole.rows.counts[REMEMBERED] = 0
     laws = whole.pairs
-    pairs = Pairs(laws.restitution, laws.friction, laws.bounds[:count], world.order[:count], laws.candidate)
+    pairs = Pairs(laws.restitution, laws.friction, boxes_part(laws.boxes, world.order, count))
     return Island(
         bodies_part(local, count),
         pairs,
@@ -481,15 +481,38 @@ def end_islands(whole: Island, world: World) -> None:
 
 
 @inner_kernel
-def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
-    """Contacts are those of the ledger."""
-    copy_vectors(whole.bodies.pose, buffer.pose[s])
-    copy_vectors(whole.bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + whole.ledger.used[0]
-        copy_ledger(whole.ledger, buffer, start)
+def contacts_entered(whole: Island, buffer: Buffer, start: int) -> int:
+    """All of the ledger."""
+    return int(copy_ledger(whole.ledger, buffer, start))
+
+
+@inner_kernel
+def most_contacts(whole: Island) -> int:
+    """As many as there is room to find."""
+    return len(whole.rows.real)
+
+
+@inner_kernel
+def make_fixed_step(whole: Island) -> bool:
+    """The step of `step.py`."""
+    done = step(whole.bodies, whole.pairs, whole.rows, whole.problem, whole.options, whole.tally)
+    if done:
+        enter_fixed_step(whole.sub.journal, whole.bodies, whole.rows, whole.options)
+    return bool(done)
+
+
+@inner_kernel
+def contacts_found(whole: Island, buffer: Buffer, start: int) -> int:
+    """Those of the last step."""
+    return int(copy_contacts(whole.rows, buffer, start))
 
 
 operations.provide_all(Island, globals())
+for asked, kernel in (
+    (operations.sweep_blocks, sweep_blocks),
+    (operations.sweep_rows, sweep_rows),
+    (operations.natural_map, natural_map),
+    (operations.solve_directly, solve_directly),
+    (operations.mend_velocities, mend_velocities),
+):
+    operations.provide(asked, Bodies, kernel)

@@ -38,7 +38,7 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     for k in range(rows.counts[CANDIDATES]):
         if contacts + 2 > len(rows.real):
             return False
-        a, b = pairs.candidate[k] // n, pairs.candidate[k] % n
+        a, b = pairs.boxes.candidate[k] // n, pairs.boxes.candidate[k] % n
         # What flies towards a rebound must not be slowed down before it gets there (E8).
         bounces = options.scheme == FIXED_STEP and options.restitution and pairs.restitution[a, b] > 0.0
         # The textbook asks for gaps alone; it keeps its bits.

@@ -43,18 +43,19 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.flight import keep_start, put_back
 from reference_solver.planar.impact import gap_noise
-from reference_solver.planar.iteration import sweep
-from reference_solver.planar.kinematics import apply_normal, apply_tangent, copy_vectors, tangent_velocity
+from reference_solver.planar.kinematics import apply_normal, apply_tangent, tangent_velocity
 from reference_solver.planar.lasting import displace, evaluate, hold
 from reference_solver.planar.residual import natural_map
 from reference_solver.planar.rows import measure_speed, prepare_masses
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
+from reference_solver.stepping.iteration import sweep
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.midpoint import CLOSED, CLOSING_SWEEPS, FAR_ABOVE, GAP_SHARE, LEFT_OVER, LEVERAGE
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import BLOCK, Options
 from reference_solver.stepping.sweeps import CHECK_INTERVAL
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, SURFACE_WORK
 
 

@@ -56,7 +56,8 @@ def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c:
     gap = nx * dx + ny * dy - bodies.real[f, SIZE + 2] - radius
     if gap > reach:
         return 0
-    write_point(rows, c, f, s, 0, nx, ny, dx - radius * nx, dy - radius * ny, -radius * nx, -radius * ny, gap)
+    at_f, at_s = (dx - radius * nx, dy - radius * ny), (-radius * nx, -radius * ny)
+    write_point(rows, c, f, s, 0, (nx, ny), at_f, at_s, gap)
     return 1
 
 
@@ -82,7 +83,7 @@ def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: 
         if gap <= reach:
             feature = (2 if qx > 0.0 else 0) + (1 if qy > 0.0 else 0)
             ax, ay = cs * qx - ss * qy, ss * qx + cs * qy
-            write_point(rows, c + found, f, s, feature, nx, ny, dx + ax, dy + ay, ax, ay, gap)
+            write_point(rows, c + found, f, s, feature, (nx, ny), (dx + ax, dy + ay), (ax, ay), gap)
             found += 1
     return found
 
@@ -101,7 +102,7 @@ def disc_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) 
         nx, ny = dx / distance, dy / distance
     share = share_of_gap(bodies, f, s)
     near, far = bodies.real[f, SIZE] + share * gap, bodies.real[s, SIZE] + (1.0 - share) * gap
-    write_point(rows, c, f, s, 0, nx, ny, near * nx, near * ny, -far * nx, -far * ny, gap)
+    write_point(rows, c, f, s, 0, (nx, ny), (near * nx, near * ny), (-far * nx, -far * ny), gap)
     return 1
 
 
@@ -128,5 +129,5 @@ def disc_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -
     nx, ny = -(cs * ex - ss * ey), -(ss * ex + cs * ey)
     near = bodies.real[f, SIZE] + share_of_gap(bodies, f, s) * gap
     ax, ay = near * nx, near * ny
-    write_point(rows, c, f, s, 0, nx, ny, ax, ay, ax + dx, ay + dy, gap)
+    write_point(rows, c, f, s, 0, (nx, ny), (ax, ay), (ax + dx, ay + dy), gap)
     return 1

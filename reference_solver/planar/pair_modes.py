@@ -9,6 +9,7 @@ points is free, and chosen in proportion to their normal impulses.
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_interval
 from reference_solver.model import Array
 
 #: A mode is accepted if no row misses by more than this share of the pressure: some ten roundings, and as much as
@@ -68,7 +69,7 @@ def accept(w: Array, local: Array, mu1: float, mu2: float) -> bool:
             moved = max(moved, 0.0)
         else:
             bound = mu1 * p[0] if i == 1 else mu2 * p[2]
-            moved = min(max(moved, -bound), bound)
+            moved = into_interval(moved, bound)
         if abs(moved - p[i]) > allowed:
             return False
         local[VELOCITY, i] = u

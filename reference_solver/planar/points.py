@@ -24,24 +24,21 @@ def write_point(
     f: int,
     s: int,
     feature: int,
-    nx: float,
-    ny: float,
-    fx: float,
-    fy: float,
-    sx: float,
-    sy: float,
+    n: tuple[float, float],
+    at_f: tuple[float, float],
+    at_s: tuple[float, float],
     gap: float,
 ) -> None:
-    """Store one point given from first to second: normal (nx, ny), arms (fx, fy) of first, (sx, sy) of second."""
+    """Store one point given from first to second: normal ``n``, arms ``at_f`` of first, ``at_s`` of second."""
     rows.integer[c, FEATURE] = feature
     rows.real[c, GAP] = gap
     if f < s:
         rows.integer[c, A], rows.integer[c, B] = f, s
-        rows.real[c, NX], rows.real[c, NY] = nx, ny
-        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = fx, fy
-        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = sx, sy
+        rows.real[c, NX], rows.real[c, NY] = n
+        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = at_f
+        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = at_s
     else:
         rows.integer[c, A], rows.integer[c, B] = s, f
-        rows.real[c, NX], rows.real[c, NY] = -nx, -ny
-        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = sx, sy
-        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = fx, fy
+        rows.real[c, NX], rows.real[c, NY] = -n[0], -n[1]
+        rows.real[c, ARM_A], rows.real[c, ARM_A + 1] = at_s
+        rows.real[c, ARM_B], rows.real[c, ARM_B + 1] = at_f

@@ -22,14 +22,15 @@ from reference_solver.planar.columns import (
     TARGET,
 )
 from reference_solver.planar.impact import doubt, flies, gap_noise
-from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors, normal_velocity, tangent_velocity
+from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
 from reference_solver.planar.midpoint import reach_end, turn_rows
 from reference_solver.planar.rows import measure_speed, still_speed, warm_start
 from reference_solver.planar.state import CONTACTS, FREE, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that

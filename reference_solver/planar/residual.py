@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_interval
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, SPEED, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
@@ -32,7 +33,7 @@ def row_residual(rows: Rows, c: int, normal_speed: float, slip: float, options: 
         bound = rows.real[c, FRICTION] * normal_impulse
         tangent = rows.real[c, PT]
         moved = tangent - slip * rows.real[c, TANGENT_MASS]
-        slip_defect = abs(tangent - min(max(moved, -bound), bound))
+        slip_defect = abs(tangent - into_interval(moved, bound))
         slip_scale = max(rows.real[c, TANGENT_MASS] * rows.real[c, SPEED], IMPULSE_SHARE * normal_impulse)
         if slip_defect > 0.0:
             worst = slip_defect / slip_scale if slip_scale > 0.0 else 1.0

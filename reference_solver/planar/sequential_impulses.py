@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_interval
 from reference_solver.planar.columns import FRICTION, NORMAL_MASS, PN, PT, PUSH, PUSH_TARGET, TANGENT_MASS, TARGET
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, normal_velocity, tangent_velocity
 from reference_solver.planar.state import CONTACTS, Bodies, Rows
@@ -22,7 +23,7 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float) 
             u = tangent_velocity(bodies.twist, rows, c)
             old = rows.real[c, PT]
             bound = rows.real[c, FRICTION] * rows.real[c, PN]
-            new = min(max(old - relaxation * u * rows.real[c, TANGENT_MASS], -bound), bound)
+            new = into_interval(old - relaxation * u * rows.real[c, TANGENT_MASS], bound)
             rows.real[c, PT] = new
             apply_tangent(bodies, bodies.twist, rows, c, new - old)
 

@@ -48,9 +48,11 @@ from reference_solver.planar.columns import (
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.shapes import MOST_VERTICES
+from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import Lasting, allocate_lasting
+from reference_solver.stepping.ledger import Ledger
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
 from reference_solver.structures import structure
@@ -93,9 +95,7 @@ class Pairs(NamedTuple):
 
     restitution: Array  # (n, n), strided: one number where all pairs have the same
     friction: Array  # (n, n), likewise
-    bounds: Array  # (n, 4): lower and upper corner of the bounding box
-    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
-    candidate: Indices  # (capacity,): a * n + b, ascending
+    boxes: Boxes
 
 
 @structure
@@ -141,15 +141,6 @@ class SubStep(NamedTuple):
 
 
 @structure
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    used: Indices  # (1,): number of contacts
-    integer: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-
-
-@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -170,20 +161,8 @@ class World(NamedTuple):
     islands: Islands
     bodies: Bodies  # (n,)
     limit: Array  # (n, 4): see `SubStep`
-    order: Indices  # (n,): see `Pairs`
+    order: Indices  # (n,): see `Boxes`
     tally: Array  # (SIZE,): to go back to where a step is made again
-
-
-@structure
-class Buffer(NamedTuple):
-    """Samples of a run; `integer` and `real` of length 0 where contacts are not recorded."""
-
-    pose: Array  # (s, n, 3)
-    twist: Array  # (s, n, 3)
-    offset: Indices  # (s + 1,)
-    integer: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 7): point, normal, impulse on B (world axes), gap
-    journal: Journal
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -246,11 +225,7 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    # Sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves.
-    order = np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64)
-    room = np.zeros(capacity, np.int64)
-    bounds = np.zeros((len(order), 4))
-    return Pairs(pair_table(model.restitution), pair_table(model.friction), bounds, order, room)
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), allocate_boxes(model, capacity))
 
 
 def allocate_rows(capacity: int) -> Rows:
@@ -301,11 +276,6 @@ def allocate_world(bodies: Bodies, candidates: int) -> World:
     local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
     islands = allocate_islands(2, n, candidates)
     return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE))
-
-
-def allocate_ledger(capacity: int) -> Ledger:
-    """Return room for ``capacity`` contacts."""
-    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 7)))
 
 
 def grown(rows: Rows) -> Rows:

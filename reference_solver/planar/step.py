@@ -1,4 +1,4 @@
-"""The step, and the loop over steps that a whole run is one call of.
+"""The fixed step (`stepping.run` has the loop over steps).
 
 detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
 """
@@ -9,18 +9,16 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
-from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
 from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
-from reference_solver.planar.entries import enter_fixed_step
-from reference_solver.planar.iteration import solve_velocities
-from reference_solver.planar.kinematics import copy_vectors
 from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import correct_positions
 from reference_solver.planar.rows import prepare, warm_start
-from reference_solver.planar.state import CONTACTS, FIXED, FREE, Bodies, Buffer, Pairs, Rows
+from reference_solver.planar.state import CONTACTS, FIXED, FREE, Bodies, Pairs, Rows
+from reference_solver.stepping.iteration import solve_velocities
+from reference_solver.stepping.ledger import Buffer
 from reference_solver.stepping.options import BLOCK, Options
 
 
@@ -68,56 +66,12 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, options: Op
 
 
 @kernel
-def run_steps(
-    bodies: Bodies,
-    pairs: Pairs,
-    rows: Rows,
-    problem: Problem,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Make steps ``first`` .. ``steps`` - 1, sampling after every ``stride`` of them (0: never).
-
-    Returns the number of steps done: fewer than ``steps`` when an array must grow, or when the contact buffer
-    could not take a full sample more. The caller grows it and calls again.
-    """
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(rows.real) > len(buffer.real):
-            return k
-        keep_state(buffer.journal, bodies.pose, bodies.twist)
-        if not step(bodies, pairs, rows, problem, options, tally):
-            return k
-        enter_fixed_step(buffer.journal, bodies, rows, options)
-        close_step(buffer.journal)
-        if sampled:
-            sample(bodies, rows, buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample(bodies: Bodies, rows: Rows, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    copy_vectors(bodies.pose, buffer.pose[s])
-    copy_vectors(bodies.twist, buffer.twist[s])
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        copy_contacts(rows, buffer, start)
-        buffer.offset[s + 1] = start + rows.counts[CONTACTS]
-
-
-@kernel
-def copy_contacts(rows: Rows, buffer: Buffer, start: int) -> None:
-    """Contacts of the last step, from index ``start`` on."""
+def copy_contacts(rows: Rows, buffer: Buffer, start: int) -> int:
+    """Write the contacts of the last step from index ``start`` on; return how many."""
     for c in range(rows.counts[CONTACTS]):
         k = start + c
         nx, ny, pn, pt = rows.real[c, NX], rows.real[c, NY], rows.real[c, PN], rows.real[c, PT]
-        buffer.integer[k, 0], buffer.integer[k, 1], buffer.integer[k, 2] = (
+        buffer.names[k, 0], buffer.names[k, 1], buffer.names[k, 2] = (
             rows.integer[c, A],
             rows.integer[c, B],
             rows.integer[c, FEATURE],
@@ -126,3 +80,4 @@ def copy_contacts(rows: Rows, buffer: Buffer, start: int) -> None:
         buffer.real[k, 2], buffer.real[k, 3] = nx, ny
         buffer.real[k, 4], buffer.real[k, 5] = pn * nx - pt * ny, pn * ny + pt * nx
         buffer.real[k, 6] = rows.real[c, GAP]
+    return int(rows.counts[CONTACTS])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.planar.broadphase import pair_bodies
+from reference_solver.planar.broadphase import find_overlaps
 from reference_solver.planar.columns import EXTENT, GAP, NX, NY, OTHER, PN, TARGET, A, B
 from reference_solver.planar.flight import bound_flight, place, put_back
 from reference_solver.planar.impact import describe, gap_noise, soft_speed
@@ -106,13 +106,13 @@ def next_impact(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options:
     """First time before ``end`` at which any two bodies meet, ``end`` if none do; -1 if there is no room (E27)."""
     if not bound_flight(bodies, pairs, sub, options, end):
         return end
-    if not pair_bodies(bodies, pairs, rows, options):
+    if not find_overlaps(bodies, pairs, rows, options):
         return -1.0
     begin_paths(bodies, sub, end)
     n = len(bodies.kind)
     m = 0
     for k in range(rows.counts[CANDIDATES]):
-        key = pairs.candidate[k]
+        key = pairs.boxes.candidate[k]
         while m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) < key:
             m += 1
         own = m if m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) == key else -1

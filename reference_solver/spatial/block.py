@@ -9,9 +9,10 @@ unique, but the wrench on the bodies, and with it every velocity, is.
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_disc
 from reference_solver.spatial.block_newton import solve_by_newton
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
-from reference_solver.spatial.one_contact import coulomb_impulse, into_disc
+from reference_solver.spatial.one_contact import coulomb_impulse
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.sticking import stick
 from reference_solver.spatial.vector import Vector, add, cross, length, row, sub

@@ -52,23 +52,14 @@ def half_space_capsule(
 
 
 @inner_kernel
-def _write(
-    bodies: Bodies,
-    manifolds: Manifolds,
-    m: int,
-    p: int,
-    f: int,
-    s: int,
-    feature: int,
-    core: Vector,
-    n: Vector,
-    gap: float,
-    radius: float,
-) -> None:
-    """Point p below `core`, a point of capsule s's segment minus the centre of f; n leads from f to s."""
+def arms_below(bodies: Bodies, f: int, s: int, core: Vector, n: Vector, gap: float) -> tuple[Vector, Vector]:
+    """Arms of the contact point below ``core``, a point of capsule s's segment minus the centre of f.
+
+    ``n`` leads from f to s.
+    """
     between = sub(row(bodies.pose, s, 0), row(bodies.pose, f, 0))
-    arm = add_scaled(core, -(radius + (1.0 - share_of_gap(bodies, f, s)) * gap), n)
-    write_point(manifolds, m, p, f, s, feature, arm, sub(arm, between), gap)
+    arm = add_scaled(core, -(bodies.geometry[s, 1] + (1.0 - share_of_gap(bodies, f, s)) * gap), n)
+    return arm, sub(arm, between)
 
 
 @inner_kernel
@@ -85,7 +76,8 @@ def sphere_capsule(bodies: Bodies, f: int, s: int, reach: float, manifolds: Mani
         return 0, normal
     if distance > MEETING * min(bodies.extent[f], bodies.extent[s]):
         normal = scale(1.0 / distance, core)
-    _write(bodies, manifolds, m, 0, f, s, 0, core, normal, gap, radius)
+    at_f, at_s = arms_below(bodies, f, s, core, normal, gap)
+    write_point(manifolds, m, 0, f, s, 0, at_f, at_s, gap)
     return 1, normal
 
 
@@ -131,7 +123,8 @@ def capsule_capsule(bodies: Bodies, f: int, s: int, reach: float, manifolds: Man
     low, high = max(-a, middle - width), min(a, middle + width)
     aligned = length(across) < ALONG and abs(dot(normal, e)) < ALONG
     if not aligned or low >= high:
-        _write(bodies, manifolds, m, 0, f, s, 0, core, normal, gap, radius)
+        at_f, at_s = arms_below(bodies, f, s, core, normal, gap)
+        write_point(manifolds, m, 0, f, s, 0, at_f, at_s, gap)
         return 1, normal
     count = 0
     for end in range(2):
@@ -140,7 +133,8 @@ def capsule_capsule(bodies: Bodies, f: int, s: int, reach: float, manifolds: Man
         core = add_scaled(between, y, g)
         gap = dot(normal, add_scaled(core, -x, e)) - bodies.geometry[f, 1] - radius
         if gap <= reach:
-            _write(bodies, manifolds, m, count, f, s, 1 + end, core, normal, gap, radius)
+            at_f, at_s = arms_below(bodies, f, s, core, normal, gap)
+            write_point(manifolds, m, count, f, s, 1 + end, at_f, at_s, gap)
             count += 1
     return count, normal
 
@@ -192,7 +186,8 @@ def box_capsule(bodies: Bodies, f: int, s: int, reach: float, manifolds: Manifol
         t = low if end == 0 else high
         gap = dot(local, add_scaled(c, t, e)) - support_of_box(local, h) - radius
         if gap <= reach:
-            _write(bodies, manifolds, m, count, f, s, feature + end, add_scaled(between, t, along), normal, gap, radius)
+            at_f, at_s = arms_below(bodies, f, s, add_scaled(between, t, along), normal, gap)
+            write_point(manifolds, m, count, f, s, feature + end, at_f, at_s, gap)
             count += 1
     return count, normal
 

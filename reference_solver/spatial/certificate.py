@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel, kernel
-from reference_solver.cone import cone_defect
+from reference_solver.coulomb import cone_defect
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
 from reference_solver.spatial.kinematics import add_pressure, apply_wrench, point_velocity, relative_twist, velocity_at
@@ -30,6 +30,7 @@ from reference_solver.spatial.vector import (
 )
 from reference_solver.stepping.accounting import LAST_PLACE, enter_creation, enter_share
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import are_finite
 from reference_solver.tally import (
     CONE,
     CONTACT_WORK,
@@ -75,7 +76,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
 def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
     """Enter how well velocities and impulses solve the contact problem; velocities and impulses are not changed."""
     tally[SOLVES] += 1.0
-    if not is_finite(bodies):
+    if not are_finite(bodies.twist):
         tally[NOT_FINITE] += 1.0
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
@@ -119,16 +120,6 @@ def is_unique(bodies: Bodies, manifolds: Manifolds) -> bool:
         k = manifolds.matrix[m, 0]
         if max(abs(k[2]), abs(k[4])) > COUPLED * k[5]:
             return False
-    return True
-
-
-@inner_kernel
-def is_finite(bodies: Bodies) -> bool:
-    """Whether every velocity is a number: comparisons with what is not would be silently false."""
-    for i in range(len(bodies)):
-        for k in range(6):
-            if not math.isfinite(bodies.twist[i, k]):
-                return False
     return True
 
 

@@ -25,6 +25,7 @@ from reference_solver.spatial.vector import (
     scale,
     sub,
 )
+from reference_solver.stepping.broadphase import Boxes
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.noise import DRIFT
 from reference_solver.stepping.options import Options
@@ -229,9 +230,9 @@ def move_along(bodies: Bodies, t: float, whole: bool) -> None:
 
 
 @inner_kernel
-def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
+def bound_flight(bodies: Bodies, boxes: Boxes, options: Options, t: float) -> bool:
     """Bounds of all bodies over the sub-step up to t; False if nothing moves."""
-    bound_bodies(bodies, options)
+    bound_bodies(bodies, boxes, options)
     moves = False
     for i in range(len(bodies)):
         share = 2.0 if bodies.closing[i] else 1.0
@@ -252,8 +253,8 @@ def bound_flight(bodies: Bodies, options: Options, t: float) -> bool:
             moves = moves or way > AT_REST * bodies.extent[i]
             if turns and bodies.kind[i] != HALF_SPACE:
                 far = reach_of(bodies, i) + radius_of(bodies, i)
-                bodies.low[i, k] = min(bodies.low[i, k], bodies.pose[i, k] - far)
-                bodies.high[i, k] = max(bodies.high[i, k], bodies.pose[i, k] + far)
-            bodies.low[i, k] -= way
-            bodies.high[i, k] += way
+                boxes.low[i, k] = min(boxes.low[i, k], bodies.pose[i, k] - far)
+                boxes.high[i, k] = max(boxes.high[i, k], bodies.pose[i, k] + far)
+            boxes.low[i, k] -= way
+            boxes.high[i, k] += way
     return moves

@@ -8,7 +8,6 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import collect_momentum
 from reference_solver.spatial.prepare import measure_speed, set_response, still_speed
@@ -32,20 +31,14 @@ from reference_solver.stepping.impacts import (
     drifts_aside,
     turns_aside,
 )
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import NOISE, PASSED_ON, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
 
 #: A normal whose cosine with a box's axis is short of one by this is that of the face: 1e-6 rad.
 FLUSH = 5e-13
-
-
-@inner_kernel
-def copy_twists(source: Array, target: Array) -> None:
-    """Copy six numbers per body; a slice assignment would allocate."""
-    for i in range(len(source)):
-        for k in range(6):
-            target[i, k] = source[i, k]
 
 
 @inner_kernel
@@ -134,7 +127,7 @@ def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -
 @spliced_kernel
 def collide_now(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> int:
     """Impacts of all touching points together, from ``before`` to ``first`` (E21); what they were."""
-    copy_twists(bodies.before, bodies.twist)
+    copy_vectors(bodies.before, bodies.twist)
     found = set_impact_targets(bodies, manifolds, options)
     if found != NO_IMPACT:
         open_solve(bodies, 0.0, tally)
@@ -145,7 +138,7 @@ def collide_now(bodies: Bodies, manifolds: Manifolds, problem: Problem, options:
             for p in range(manifolds.points[m]):
                 for k in range(3):
                     manifolds.hit[m, p, k] = manifolds.impulse[m, p, k]
-    copy_twists(bodies.twist, bodies.first)
+    copy_vectors(bodies.twist, bodies.first)
     return found
 
 
@@ -252,7 +245,7 @@ def release(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Opt
             for k in range(3):
                 manifolds.hit[m, p, k] = 0.0
     prepare_wrenches(bodies, manifolds, options)
-    copy_twists(bodies.twist, bodies.before)
+    copy_vectors(bodies.twist, bodies.before)
     open_solve(bodies, 0.0, tally)
     solve_velocities(bodies, manifolds, problem, options, tally)
     certify(bodies, manifolds, options, tally)

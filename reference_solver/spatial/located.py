@@ -1,21 +1,27 @@
-"""What a located step asks of space (`stepping.operations`), from the instant an island is gathered to its end."""
+"""What a located step asks of space (`stepping.operations`), from the instant an island is gathered to its end.
+
+And what contact solves ask (`stepping.iteration`).
+"""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import problem_part
 from reference_solver.journal import journal_part, keep_state
 from reference_solver.model import Array
 from reference_solver.spatial import flight, impact, jam, midpoint, phase, slide, time_of_impact
-from reference_solver.spatial.broadphase import bound_bodies, pair_bodies
+from reference_solver.spatial.block import sweep_blocks
+from reference_solver.spatial.broadphase import bound_bodies, find_overlaps
 from reference_solver.spatial.certificate import certify, open_solve, point_work
-from reference_solver.spatial.entries import enter_release, enter_sub_step
+from reference_solver.spatial.direct import mend_velocities, solve_directly
+from reference_solver.spatial.entries import enter_fixed_step, enter_release, enter_sub_step
 from reference_solver.spatial.entries import enter_settled as enter_settled_piece
-from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
-from reference_solver.spatial.ledger import copy_ledger, enter_contacts, enter_impulses
+from reference_solver.spatial.ledger import enter_contacts, enter_impulses
 from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
 from reference_solver.spatial.meeting import Meeting
 from reference_solver.spatial.motion import accelerate, displace
@@ -23,7 +29,9 @@ from reference_solver.spatial.operations import Spatial
 from reference_solver.spatial.operations import displace as displace_from_start
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import warm_start
+from reference_solver.spatial.residual import natural_map
 from reference_solver.spatial.separation import radius_of
+from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import (
     CANDIDATES,
     FIXED,
@@ -34,27 +42,30 @@ from reference_solver.spatial.state import (
     POINTS,
     REMEMBERED,
     Bodies,
-    Buffer,
     Detection,
     Island,
     Manifolds,
     SubStep,
     World,
 )
-from reference_solver.spatial.step import sample_state
+from reference_solver.spatial.step import copy_contacts, step
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
 from reference_solver.spatial.vector import add, row, times_transposed
 from reference_solver.stepping import operations
 from reference_solver.stepping.accounting import keep
+from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import HELD, LEFT, MOST_SOFT_IN_SPACE, UNSETTLED
 from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.lasting import CONTACTS as LASTING
+from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import Paths
 from reference_solver.stepping.phase import NO_PHASE
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Contacts of a phase that cost little: with more of them phases that creep try the patience of the step the sooner.
@@ -85,7 +96,7 @@ def find_contacts(island: Island) -> int:
     found = detect_touching(
         island.bodies, island.detection, island.room, island.memory, island.sub.past, island.options, island.sub.clock
     )
-    return found if island.ledger.filled[0] + POINTS * found <= len(island.ledger.real) else -1
+    return found if island.ledger.used[0] + POINTS * found <= len(island.ledger.real) else -1
 
 
 @inner_kernel
@@ -103,7 +114,7 @@ def weigh_clusters(island: Island) -> None:
 @inner_kernel
 def begin_solve(island: Island) -> None:
     """Velocities of the start, and what a manifold needs to be solved as a whole."""
-    impact.copy_twists(island.bodies.twist, island.bodies.before)
+    copy_vectors(island.bodies.twist, island.bodies.before)
     for i in range(len(island.bodies)):
         for d in range(3):
             island.bodies.momentum_before[i, d] = island.bodies.angular_momentum[i, d]
@@ -153,7 +164,7 @@ def end_rocking(island: Island, length: float) -> tuple[float, float]:
 @inner_kernel
 def end_solve(island: Island) -> None:
     """Velocities of the end, and the tally before the work of the force phase."""
-    impact.copy_twists(island.bodies.twist, island.bodies.last)
+    copy_vectors(island.bodies.twist, island.bodies.last)
     keep(island.tally, island.sub.saved)
 
 
@@ -269,7 +280,7 @@ def cut_work(
             both = add(velocity_at(v, w, manifolds, m, p), velocity_at(v_start, w_start, manifolds, m, p))
             done, moved, _ = point_work(bodies, manifolds, m, p, both)
             tally[CONTACT_WORK], tally[SURFACE_WORK] = tally[CONTACT_WORK] + done, tally[SURFACE_WORK] + moved
-    impact.copy_twists(bodies.first, bodies.twist)
+    copy_vectors(bodies.first, bodies.twist)
 
 
 @inner_kernel
@@ -388,20 +399,10 @@ def enter_settled(island: Island) -> None:
 
 
 @inner_kernel
-def is_finite(whole: Island) -> bool:
-    """Of all bodies."""
-    for i in range(len(whole.bodies)):
-        for k in range(6):
-            if not math.isfinite(whole.bodies.twist[i, k]):
-                return False
-    return True
-
-
-@inner_kernel
 def find_islands(whole: Island, world: World, room: float) -> bool:
     """By bounding boxes of all that a body, turned at will, may sweep."""
-    bodies, options, limit = whole.bodies, whole.options, world.islands.limit
-    bound_bodies(bodies, options)
+    bodies, options, limit, boxes = whole.bodies, whole.options, world.islands.limit, whole.detection.boxes
+    bound_bodies(bodies, boxes, options)
     for i in range(len(bodies)):
         far = flight.reach_of(bodies, i) + radius_of(bodies, i) if bodies.kind[i] != HALF_SPACE else math.inf
         for k in range(3):
@@ -412,20 +413,20 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
             way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
             limit[i, k], limit[i, 3 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
             if bodies.turning[i]:
-                bodies.low[i, k] = min(bodies.low[i, k], bodies.pose[i, k] - far)
-                bodies.high[i, k] = max(bodies.high[i, k], bodies.pose[i, k] + far)
-            bodies.low[i, k] -= way
-            bodies.high[i, k] += way
-    if not pair_bodies(bodies, whole.detection, options):
+                boxes.low[i, k] = min(boxes.low[i, k], bodies.pose[i, k] - far)
+                boxes.high[i, k] = max(boxes.high[i, k], bodies.pose[i, k] + far)
+            boxes.low[i, k] -= way
+            boxes.high[i, k] += way
+    if not find_overlaps(bodies, whole.detection, options):
         return False
-    join_candidates(whole, world.islands, whole.detection.candidate, whole.detection.found[CANDIDATES])
+    join_candidates(whole, world.islands, boxes.candidate, whole.detection.found[CANDIDATES])
     return True
 
 
 @inner_kernel
 def begin_islands(whole: Island) -> None:
     """Counts of what is kept and entered."""
-    whole.detection.found[KEPT] = whole.ledger.filled[0] = 0
+    whole.detection.found[KEPT] = whole.ledger.used[0] = 0
 
 
 @inner_kernel
@@ -444,8 +445,7 @@ def gather(whole: Island, world: World, count: int) -> Island:
         laws.found,
         laws.restitution,
         laws.friction,
-        world.order[:count],
-        laws.candidate,
+        boxes_part(laws.boxes, world.order, count),
         laws.polygon,
         laws.polygon_edge,
     )
@@ -533,13 +533,39 @@ def end_islands(whole: Island, world: World) -> None:
 
 
 @inner_kernel
-def sample_located(whole: Island, buffer: Buffer, s: int) -> None:
-    """Contacts are those of the ledger."""
-    sample_state(whole.bodies, buffer, s)
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + copy_ledger(whole.ledger, buffer, start)
+def contacts_entered(whole: Island, buffer: Buffer, start: int) -> int:
+    """All of the ledger."""
+    return int(copy_ledger(whole.ledger, buffer, start))
+
+
+@inner_kernel
+def most_contacts(whole: Island) -> int:
+    """As many as there is room to find."""
+    return POINTS * len(whole.room)
+
+
+@inner_kernel
+def make_fixed_step(whole: Island) -> bool:
+    """The step of `step.py`."""
+    done = step(whole.bodies, whole.detection, whole.room, whole.memory, whole.problem, whole.options, whole.tally)
+    if done:
+        found = whole.room[: whole.detection.found[MANIFOLDS]]
+        enter_fixed_step(whole.sub.journal, whole.bodies, found, whole.options)
+    return bool(done)
+
+
+@inner_kernel
+def contacts_found(whole: Island, buffer: Buffer, start: int) -> int:
+    """Those of the last step."""
+    return int(copy_contacts(whole.room[: whole.detection.found[MANIFOLDS]], buffer, start))
 
 
 operations.provide_all(Island, globals())
+for asked, kernel in (
+    (operations.sweep_blocks, sweep_blocks),
+    (operations.sweep_rows, sweep_points),
+    (operations.natural_map, natural_map),
+    (operations.solve_directly, solve_directly),
+    (operations.mend_velocities, mend_velocities),
+):
+    operations.provide(asked, np.recarray, kernel)

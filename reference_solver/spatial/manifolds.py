@@ -43,7 +43,7 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
-        a, b = detection.candidate[k] // n, detection.candidate[k] % n
+        a, b = detection.boxes.candidate[k] // n, detection.boxes.candidate[k] % n
         # What flies towards a rebound must not be slowed down before it gets there (E8).
         bounces = options.restitution and restitution_of(bodies, detection, a, b) > 0.0
         # The textbook asks for gaps alone; it keeps its bits.

@@ -17,8 +17,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.features import follow, name_features
 from reference_solver.spatial.flight import place_at, reach_of
-from reference_solver.spatial.impact import clear_point, copy_twists, doubt, set_reference_speed
-from reference_solver.spatial.iteration import solve_velocities
+from reference_solver.spatial.impact import clear_point, doubt, set_reference_speed
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, velocity_at
 from reference_solver.spatial.manifolds import set_frame
 from reference_solver.spatial.motion import (
@@ -49,11 +48,13 @@ from reference_solver.spatial.vector import (
     times,
     times_transposed,
 )
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.midpoint import CLOSED, CLOSING_SWEEPS, FAR_ABOVE, GAP_SHARE, LEFT_OVER, LEVERAGE
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.sweeps import CHECK_INTERVAL
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 
@@ -83,7 +84,7 @@ def press_at_mid_drift(
             if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
                 manifolds.target[m, p] = -manifolds.gap[m, p] / time
     prepare_wrenches(bodies, manifolds, options)
-    copy_twists(bodies.twist, bodies.last)  # what the bodies would have at mid-drift without forces
+    copy_vectors(bodies.twist, bodies.last)  # what the bodies would have at mid-drift without forces
     accelerate(bodies, 0.5 * time)
     open_solve(bodies, 0.5 * time, tally)
     warm_start(bodies, manifolds, options)
@@ -102,7 +103,7 @@ def drift(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Opti
     without features that can be followed keep their levers.
     """
     lasting, m, known = sub_step.lasting, 0, 0
-    copy_twists(bodies.first, bodies.twist)
+    copy_vectors(bodies.first, bodies.twist)
     keep_levers(manifolds, sub_step)
     for i in range(len(bodies)):
         for d in range(7):
@@ -309,7 +310,7 @@ def close_gaps(bodies: Bodies, manifolds: Manifolds, options: Options) -> bool:
                 widest = max(widest, abs(closable(bodies, manifolds, m, p)))
     if widest == 0.0:
         return False
-    copy_twists(bodies.twist, bodies.last)
+    copy_vectors(bodies.twist, bodies.last)
     for i in range(len(bodies)):
         for d in range(6):
             bodies.twist[i, d] = 0.0
@@ -330,7 +331,7 @@ def close_gaps(bodies: Bodies, manifolds: Manifolds, options: Options) -> bool:
             farthest = max(farthest, length(row(bodies.twist, i, 0)) + turned)
     if farthest <= LEVERAGE * widest:
         displace(bodies, bodies.twist)
-    copy_twists(bodies.last, bodies.twist)
+    copy_vectors(bodies.last, bodies.twist)
     for i in range(len(bodies)):
         if bodies.gyroscopic[i]:
             w = spin_of(bodies, i, row(bodies.angular_momentum, i, 0))
@@ -355,8 +356,8 @@ def displace(bodies: Bodies, way: Array) -> None:
 @inner_kernel
 def take_back(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
     """Velocities without the impulses of the rows, so that a solve may find other ones; their work in the tally."""
-    copy_twists(bodies.twist, bodies.start)
-    copy_twists(bodies.twist, bodies.before)
+    copy_vectors(bodies.twist, bodies.start)
+    copy_vectors(bodies.twist, bodies.before)
     for m in range(len(manifolds)):
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for p in range(manifolds.points[m]):

@@ -88,12 +88,3 @@ def _solve_symmetric(k, q):
         s * (c12 * q[0] + c22 * q[1] + c23 * q[2]),
         s * (c13 * q[0] + c23 * q[1] + c33 * q[2]),
     )
-
-
-@inner_kernel
-def into_disc(p1: float, p2: float, radius: float) -> tuple[float, float]:
-    """Nearest point of the disc of that radius."""
-    size = math.sqrt(p1 * p1 + p2 * p2)
-    if size <= radius:
-        return p1, p2
-    return radius * p1 / size, radius * p2 / size

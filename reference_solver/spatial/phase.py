@@ -12,7 +12,7 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.features import follow, name_features
-from reference_solver.spatial.impact import carries, copy_twists
+from reference_solver.spatial.impact import carries
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate, momentum_of, put_orientation
 from reference_solver.spatial.operations import Spatial, displace
@@ -36,6 +36,7 @@ from reference_solver.stepping.phase import (
     step_phase,
     write_path,
 )
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
 
 #: Gap of a contact that is held, as a share of the smaller half width: more is for the frozen solve to close (E20).
@@ -193,11 +194,11 @@ def enter_phase(
     lasting, space = sub_step.lasting, Spatial(bodies, bodies.pose, bodies.twist)
     if sub_step.noted[0] != NOTED or sub_step.clock[JAMMED] > 0.0:
         return NO_PHASE
-    copy_twists(bodies.first, bodies.twist)
+    copy_vectors(bodies.first, bodies.twist)
     time, outcome = find_phase(space, lasting, left)
     sub_step.clock[OUTCOME] = outcome
     if outcome == FAILED:
-        copy_twists(bodies.last, bodies.twist)
+        copy_vectors(bodies.last, bodies.twist)
         return NO_PHASE
     accounting.go_back(tally, sub_step.struck)
     keep_end(bodies, sub_step)
@@ -206,7 +207,7 @@ def enter_phase(
             bodies.curved[i] = 1
             write_path(lasting, i, time, bodies.path[i])
     go_back(space, lasting)
-    copy_twists(bodies.first, bodies.twist)
+    copy_vectors(bodies.first, bodies.twist)
     accelerate(bodies, time)
     for i in range(len(bodies)):
         for d in range(6):

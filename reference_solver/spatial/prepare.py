@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import back_into_disc
 from reference_solver.model import Array
 from reference_solver.spatial.kinematics import apply_wrench, load_speed, point_velocity, relative_twist, velocity_at
 from reference_solver.spatial.manifolds import friction_of, restitution_of
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
-from reference_solver.stepping.options import BAUMGARTE, Options
+from reference_solver.stepping.options import Options
 
 #: Approach speeds below this fraction of what the loads of one step bring about are a resting body's noise. As
 #: targets they would differ from point to point and lift a corner of a face: all its weight would change places.
@@ -69,7 +70,7 @@ def set_matrix(matrix: Array, r: Array, offset: Vector) -> None:
 def set_target(
     bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, restitution: float, options: Options
 ) -> None:
-    """Normal velocity b_n to reach (E7, E8, E15); u is the normal velocity before forces.
+    """Normal velocity b_n to reach (E7, E8); u is the normal velocity before forces.
 
     Without restitution a gap may be closed within the step, down to the slop, not more; an overlap asks for nothing.
     A gap within round-off counts as touching: divided by dt it would be noise to answer in every step. With
@@ -85,8 +86,6 @@ def set_target(
             target = -(gap - options.slop) / options.dt
     elif u < -RESTING_NOISE * load_speed(bodies, manifolds, m, p, options.dt):
         target = -restitution * u
-    if options.correction == BAUMGARTE:
-        target = max(target, options.beta * (-gap - options.slop) / options.dt)
     manifolds.target[m, p] = target
 
 
@@ -127,10 +126,8 @@ def warm_start(bodies: Bodies, manifolds: Manifolds, options: Options) -> None:
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for p in range(manifolds.points[m]):
             bound = manifolds.friction[m] * manifolds.impulse[m, p, 2]
-            size = (manifolds.impulse[m, p, 0] ** 2 + manifolds.impulse[m, p, 1] ** 2) ** 0.5
-            if size > bound:
-                manifolds.impulse[m, p, 0] *= bound / size
-                manifolds.impulse[m, p, 1] *= bound / size
+            t1, t2 = back_into_disc(manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1], bound)
+            manifolds.impulse[m, p, 0], manifolds.impulse[m, p, 1] = t1, t2
             impulse = row(manifolds.impulse[m], p, 0)
             force = add(force, impulse)
             moment = add(moment, cross(row(manifolds.offset[m], p, 0), impulse))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_disc
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
-from reference_solver.spatial.one_contact import into_disc
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import Vector
 from reference_solver.stepping.options import Options

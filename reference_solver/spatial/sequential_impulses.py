@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
+from reference_solver.coulomb import into_disc
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, respond, velocity_at
-from reference_solver.spatial.one_contact import disc_friction, into_disc
+from reference_solver.spatial.one_contact import disc_friction
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, row
 from reference_solver.stepping.options import Options

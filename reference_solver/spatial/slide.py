@@ -8,8 +8,7 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.impact import clear_point, copy_twists, doubt, set_reference_speed
-from reference_solver.spatial.iteration import solve_velocities
+from reference_solver.spatial.impact import clear_point, doubt, set_reference_speed
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
 from reference_solver.spatial.phase import is_exact
@@ -18,9 +17,11 @@ from reference_solver.spatial.state import Bodies, Manifolds, SubStep
 from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
 from reference_solver.stepping.clock import BRIEF
+from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.slides import CLOSE, SAME_TIME, SHORTER, STICK_SOLVES, STUCK, closing_speed
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import RESIDUAL, UNCONVERGED
 
 #: Slip below this share of a contact's reference speed is none: the residual leaves as much.
@@ -44,7 +45,7 @@ def press(
     """
     begin_press(bodies, manifolds, options, length, left, struck)
     accelerate(bodies, length)
-    copy_twists(bodies.twist, bodies.start)
+    copy_vectors(bodies.twist, bodies.start)
     warm_start(bodies, manifolds, options)
     solve_velocities(bodies, manifolds, problem, options, tally)
 
@@ -57,7 +58,7 @@ def begin_press(
 
     ``struck``: impacts came first, so that lasting contacts may part as well.
     """
-    copy_twists(bodies.first, bodies.twist)
+    copy_vectors(bodies.first, bodies.twist)
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
@@ -92,10 +93,10 @@ def flies(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, length
 @inner_kernel
 def certify_press(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array, length: float) -> None:
     """Certify the force phase that is used, among those that were tried."""
-    copy_twists(bodies.twist, bodies.last)
-    copy_twists(bodies.start, bodies.twist)
+    copy_vectors(bodies.twist, bodies.last)
+    copy_vectors(bodies.start, bodies.twist)
     open_solve(bodies, length, tally)
-    copy_twists(bodies.last, bodies.twist)
+    copy_vectors(bodies.last, bodies.twist)
     if len(manifolds) > 0:
         certify(bodies, manifolds, options, tally)
         doubt(bodies, manifolds, options, tally)
@@ -169,15 +170,15 @@ def press_until_stick(
     the start alone there is none, but for rebounds whose series may end.
     """
     if len(manifolds) == 0:
-        copy_twists(bodies.first, bodies.twist)
+        copy_vectors(bodies.first, bodies.twist)
         accelerate(bodies, left)
-        copy_twists(bodies.twist, bodies.start)
+        copy_vectors(bodies.twist, bodies.start)
         return left
     if not (struck and options.restitution) and sub_step.clock[BRIEF] == 0.0:
         begin_press(bodies, manifolds, options, left, left, struck)
-        copy_twists(bodies.first, bodies.last)
+        copy_vectors(bodies.first, bodies.last)
         if not is_exact(bodies, manifolds, sub_step, left):
-            copy_twists(bodies.twist, bodies.start)
+            copy_vectors(bodies.twist, bodies.start)
             return left
     residual, unconverged = tally[RESIDUAL], tally[UNCONVERGED]
     press(bodies, manifolds, problem, options, tally, left, left, struck)
@@ -187,7 +188,7 @@ def press_until_stick(
         if end >= left * (1.0 - SAME_TIME) or abs(end - length) <= SAME_TIME * length:
             break
         if k == 0:
-            copy_twists(bodies.twist, bodies.last)
+            copy_vectors(bodies.twist, bodies.last)
             if sub_step.clock[BRIEF] == 0.0 and not is_exact(bodies, manifolds, sub_step, length):
                 break
         if end < length and length - slipped <= CLOSE * length:

@@ -29,9 +29,11 @@ from reference_solver.model import (
 )
 from reference_solver.needs import Needs
 from reference_solver.pieces import Journal, allocate_journal
+from reference_solver.stepping.broadphase import Boxes, allocate_boxes
 from reference_solver.stepping.clock import CLOCK_SIZE
 from reference_solver.stepping.islands import Islands, allocate_islands
 from reference_solver.stepping.lasting import MOST_ROWS, Lasting, allocate_lasting
+from reference_solver.stepping.ledger import Ledger
 from reference_solver.stepping.options import Options
 from reference_solver.structures import structure
 from reference_solver.tally import SIZE as TALLY_SIZE
@@ -86,8 +88,6 @@ BODY = np.dtype(
         ("geometry", "f8", 4),
         ("extent", "f8"),  # smallest half width [m]
         ("motion", "i8"),  # FIXED, FREE or PRESCRIBED
-        ("low", "f8", 3),  # lower corner of the bounding box
-        ("high", "f8", 3),  # upper corner
     ],
     align=True,
 )
@@ -156,26 +156,13 @@ Memory: TypeAlias = Any
 
 
 @structure
-class Buffer(NamedTuple):
-    """Samples of a run; `names` and `real` of length 0 where contacts are not recorded."""
-
-    pose: Array  # (s, n, 7)
-    twist: Array  # (s, n, 6)
-    offset: Indices  # (s + 1,)
-    names: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
-    journal: Journal
-
-
-@structure
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
     found: Indices  # (FOUND,): see CANDIDATES .. KEPT
     restitution: Array  # (n, n), strided: one number where all pairs have the same
     friction: Array  # (n, n), likewise
-    order: Indices  # (n,): bodies by ascending lower x, as of the last sort
-    candidate: Indices  # (capacity,): a * n + b, ascending
+    boxes: Boxes
     polygon: Array  # (2, 16, 5): two polygons, each made from the other by one clip
     polygon_edge: Indices  # (2, 16): number of the edge that leaves each vertex
 
@@ -229,9 +216,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
         found=np.zeros(FOUND, np.int64),
         restitution=pair_table(model.restitution),
         friction=pair_table(model.friction),
-        # sorted before the first sweep: from an arbitrary order insertion sort would take n^2 / 4 moves
-        order=np.argsort([body.pose[0] for body in model.bodies], kind="stable").astype(np.int64),
-        candidate=np.zeros(capacity, np.int64),
+        boxes=allocate_boxes(model, capacity),
         polygon=np.zeros((2, 16, 5)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
@@ -262,15 +247,6 @@ class SubStep(NamedTuple):
 
 
 @structure
-class Ledger(NamedTuple):
-    """Contacts of one step, impulses summed over its sub-steps, sorted by (body_a, body_b, feature)."""
-
-    filled: Indices  # (1,): number of entries
-    names: Indices  # (k, 3): body A, body B, feature
-    real: Array  # (k, 10): point, normal, impulse on B (world axes), gap
-
-
-@structure
 class Island(NamedTuple):
     """Bodies that can meet within a step, or all of them, and what their step works on."""
 
@@ -293,7 +269,7 @@ class World(NamedTuple):
     bodies: Bodies  # (n,)
     end: Bodies  # (n,): all bodies where the step ends
     limit: Array  # (n, 6): see `SubStep`
-    order: Indices  # (n,): see `Detection`
+    order: Indices  # (n,): see `Boxes`
     kept: Memory  # for the next step
     tally: Array  # (SIZE,): to go back to where a step is made again
 
@@ -334,11 +310,6 @@ def allocate_world(bodies: Bodies, manifolds: int, candidates: int) -> World:
         kept=allocate_memory(manifolds),
         tally=np.zeros(TALLY_SIZE),
     )
-
-
-def allocate_ledger(capacity: int) -> Ledger:
-    """Return room for ``capacity`` contacts."""
-    return Ledger(np.zeros(1, np.int64), np.zeros((capacity, 3), np.int64), np.zeros((capacity, 10)))
 
 
 def allocate_manifolds(capacity: int) -> Manifolds:

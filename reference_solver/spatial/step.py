@@ -1,4 +1,4 @@
-"""The step, and the loop over steps that a whole run is one call of.
+"""The fixed step (`stepping.run` has the loop over steps).
 
 detect -> prepare (samples u before forces) -> accelerate -> warm start -> solve -> move -> remember
 """
@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
-from reference_solver.journal import close_step, keep_state
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.entries import enter_fixed_step
-from reference_solver.spatial.iteration import solve_velocities
 from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
 from reference_solver.spatial.position import correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
-from reference_solver.spatial.state import MANIFOLDS, POINTS, Bodies, Buffer, Detection, Manifolds, Memory
+from reference_solver.spatial.state import Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.stepping.iteration import solve_velocities
+from reference_solver.stepping.ledger import Buffer
 from reference_solver.stepping.options import Options
 
 
@@ -53,59 +52,6 @@ def step(
         displace(bodies, options.dt)
     remember(bodies, detection, manifolds, memory)
     return True
-
-
-@kernel
-def run_steps(
-    bodies: Bodies,
-    detection: Detection,
-    room: Manifolds,
-    memory: Memory,
-    problem: Problem,
-    options: Options,
-    tally: Array,
-    buffer: Buffer,
-    first: int,
-    steps: int,
-    stride: int,
-) -> int:
-    """Make steps ``first`` .. ``steps`` - 1, sampling after every ``stride`` of them (0: never).
-
-    Returns the number of steps done: fewer than ``steps`` when an array must grow, or when the contact buffer
-    could not take a full sample more. The caller grows it and calls again.
-    """
-    for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + POINTS * len(room) > len(buffer.real):
-            return k
-        keep_state(buffer.journal, bodies.pose, bodies.twist)
-        if not step(bodies, detection, room, memory, problem, options, tally):
-            return k
-        enter_fixed_step(buffer.journal, bodies, room[: detection.found[MANIFOLDS]], options)
-        close_step(buffer.journal)
-        if sampled:
-            sample(bodies, room[: detection.found[MANIFOLDS]], buffer, (k + 1) // stride - 1)
-    return steps
-
-
-@inner_kernel
-def sample_state(bodies: Bodies, buffer: Buffer, s: int) -> None:
-    """Write poses and twists as sample s."""
-    for i in range(len(bodies)):
-        for d in range(7):
-            buffer.pose[s, i, d] = bodies.pose[i, d]
-        for d in range(6):
-            buffer.twist[s, i, d] = bodies.twist[i, d]
-
-
-@inner_kernel
-def sample(bodies: Bodies, manifolds: Manifolds, buffer: Buffer, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
-    sample_state(bodies, buffer, s)
-    start = buffer.offset[s]
-    buffer.offset[s + 1] = start
-    if len(buffer.real) > 0:
-        buffer.offset[s + 1] = start + copy_contacts(manifolds, buffer, start)
 
 
 @kernel

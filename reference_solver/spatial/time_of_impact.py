@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.spatial.box_box import EXACT_ADVANTAGE
-from reference_solver.spatial.broadphase import pair_bodies
+from reference_solver.spatial.broadphase import find_overlaps
 from reference_solver.spatial.flight import axis_drift, bound_flight, copy_body, curvature, place_at
 from reference_solver.spatial.impact import soft_speed
 from reference_solver.spatial.kinematics import point_velocity
@@ -137,15 +137,15 @@ def next_impact(
     bodies: Bodies, detection: Detection, manifolds: Manifolds, sub_step: SubStep, options: Options, end: float
 ) -> float:
     """First time before ``end`` at which any two bodies meet, ``end`` if none do; -1 if there is no room (E27)."""
-    if not bound_flight(bodies, options, end):
+    if not bound_flight(bodies, detection.boxes, options, end):
         return end
-    if not pair_bodies(bodies, detection, options):
+    if not find_overlaps(bodies, detection, options):
         return -1.0
     begin_paths(bodies, sub_step.meeting.paths, end)
     n = len(bodies)
     m = 0
     for k in range(detection.found[CANDIDATES]):
-        key = detection.candidate[k]
+        key = detection.boxes.candidate[k]
         a, b = key // n, key % n
         while m < len(manifolds) and manifolds.body_a[m] * n + manifolds.body_b[m] < key:
             m += 1

@@ -52,7 +52,7 @@ def detect_touching(
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
-        key = detection.candidate[k]
+        key = detection.boxes.candidate[k]
         pair = pair_key(bodies, key // n, key % n)
         while old < len(memory) and memory.pair[old] < pair:
             old += 1

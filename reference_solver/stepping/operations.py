@@ -1,9 +1,9 @@
 """What the step asks of a dimension, by name.
 
 A kernel that calls one of these functions is compiled once for each dimension: the callee is chosen by the type of the
-first argument, the dimension's ``Bodies`` or its ``Island``, while numba infers types. Callees are compiled as part of
-their caller, so that the caller's machine code is found on disk again by the next process. Uncompiled, a table does the
-same.
+first argument, the dimension's ``Bodies`` (in space an array of records) or its ``Island``, while numba infers types.
+Callees are compiled as part of their caller, so that the caller's machine code is found on disk again by the next
+process. Uncompiled, a table does the same.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
+import numpy as np
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
@@ -38,7 +39,7 @@ def operation(function: Callable[..., Any]) -> Any:
 
     @overload(function, jit_options=options, strict=False)
     def pick(first: Any, *others: Any) -> Any:
-        found = table.get(getattr(first, "instance_class", type(None)))
+        found = table.get(getattr(first, "instance_class", np.recarray))
         return None if found is None else found.py_func
 
     function.table = table  # type: ignore[attr-defined]
@@ -100,6 +101,39 @@ def feature_limits(bodies: Any, lasting: Any, k: int, place: int) -> None:
     Positive within, infinite where there is no such end. From the ends of lines and faces, and from where the normal
     looks out of an edge or a corner no more.
     """
+    raise NotImplementedError
+
+
+# ---- Contact solves (`stepping.iteration`): rows of the plane, manifolds of space.
+
+
+@operation
+def sweep_blocks(bodies: Bodies, rows: Any, options: Any, relaxation: float) -> None:
+    """One sweep over all manifolds, the rows of each solved together (E12)."""
+    raise NotImplementedError
+
+
+@operation
+def sweep_rows(bodies: Bodies, rows: Any, options: Any, relaxation: float) -> None:
+    """One sweep, row after row (E10, E11)."""
+    raise NotImplementedError
+
+
+@operation
+def natural_map(bodies: Bodies, rows: Any, options: Any) -> float:
+    """Largest scaled natural-map residual over all rows, dimensionless (E14)."""
+    raise NotImplementedError
+
+
+@operation
+def solve_directly(bodies: Bodies, rows: Any, options: Any, problem: Any, budget: int, fresh: bool) -> float:
+    """Set the impulses that the direct solver finds within `budget` factorisations; returns their residual."""
+    raise NotImplementedError
+
+
+@operation
+def mend_velocities(bodies: Bodies, rows: Any, options: Any) -> None:
+    """Build velocities anew from impulses, should they differ by more than round-off."""
     raise NotImplementedError
 
 
@@ -273,12 +307,6 @@ def enter_settled(island: Any) -> None:
 
 
 @operation
-def is_finite(whole: Any) -> bool:
-    """Whether every velocity is a number: comparisons with what is not would be silently false."""
-    raise NotImplementedError
-
-
-@operation
 def find_islands(whole: Any, world: Any, room: float) -> bool:
     """Join the free bodies that may meet within ``room`` times the way they go; False if an array is too small."""
     raise NotImplementedError
@@ -311,8 +339,30 @@ def end_islands(whole: Any, world: Any) -> None:
 
 
 @operation
-def sample_located(whole: Any, buffer: Any, s: int) -> None:
-    """Write the state, and the contacts where the buffer has room for any, as sample s."""
+def contacts_entered(whole: Any, buffer: Any, start: int) -> int:
+    """Write the contacts of the ledger from index ``start`` on; return how many."""
+    raise NotImplementedError
+
+
+# ---- The fixed step of the whole world (`stepping.run`).
+
+
+@operation
+def most_contacts(whole: Any) -> int:
+    """Contacts that there is room for."""
+    raise NotImplementedError
+
+
+@operation
+def make_fixed_step(whole: Any) -> bool:
+    """One step with one contact problem, entered in the journal; False if an array is too small."""
+    raise NotImplementedError
+
+
+@operation
+def contacts_found(whole: Any, buffer: Any, start: int) -> int:
+    """Write the contacts of the last fixed step from index ``start`` on; return how many."""
+    raise NotImplementedError
 
 
 #: What an island's dimension provides, all of it.
@@ -345,14 +395,16 @@ OF_ISLANDS = (
     misses_end,
     solve_end,
     enter_settled,
-    is_finite,
     find_islands,
     begin_islands,
     gather,
     keep_memory,
     keep_end,
     end_islands,
-    sample_located,
+    contacts_entered,
+    most_contacts,
+    make_fixed_step,
+    contacts_found,
 )
 
 

@@ -68,23 +68,3 @@ def derivative_bound(paths: Paths, i: int, turning: bool, order: int, t: float, 
         bound += factor * math.sqrt(square)
         factor *= (later - t) / (j + 1)
     return bound * ROUNDED_UP
-
-
-@inner_kernel
-def path_range(paths: Paths, i: int, k: int, t: float, later: float) -> tuple[float, float]:
-    """Bounds of displacement k of body i over [t, later]: the least and the largest of its Bernstein coefficients.
-
-    A polynomial on an interval is a mean of them (G. Farin, Curves and Surfaces for CAGD, 2002, chapter 5).
-    """
-    degree = COEFFICIENTS - 1
-    low, high = math.inf, -math.inf
-    for b in range(COEFFICIENTS):
-        value, factor, size = 0.0, 1.0, 0.0
-        for j in range(b + 1):
-            # binomial(b, j) / binomial(degree, j) times the coefficient of (s / (later - t))^j
-            term = factor * derivative(paths, i, k, j, t)
-            value += term
-            size += abs(term)
-            factor *= (later - t) / (j + 1) * ((b - j) / (degree - j) if j < degree else 0.0)
-        low, high = min(low, value - 1e-15 * size), max(high, value + 1e-15 * size)
-    return low, high

@@ -1,11 +1,11 @@
-"""A run of located steps, and the step of the whole world: islands of bodies that can meet, each by itself (E29)."""
+"""Runs of located and of fixed steps, and the step of the whole world: islands of bodies that can meet (E29)."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from reference_solver.compilation import kernel, spliced_kernel
-from reference_solver.journal import close_step
+from reference_solver.compilation import inner_kernel, kernel, spliced_kernel
+from reference_solver.journal import close_step, keep_state
 from reference_solver.stepping.accounting import keep
 from reference_solver.stepping.clock import CONFINED, ESCAPED, LEFT, UNSETTLED
 from reference_solver.stepping.driver import step_island
@@ -13,15 +13,18 @@ from reference_solver.stepping.islands import LEFT_BOUNDS, MADE, NO_ROOM, ROOM, 
 from reference_solver.stepping.operations import (
     Island,
     begin_islands,
+    contacts_entered,
+    contacts_found,
     end_islands,
     find_islands,
     gather,
-    is_finite,
     is_free,
     keep_end,
     keep_memory,
-    sample_located,
+    make_fixed_step,
+    most_contacts,
 )
+from reference_solver.stepping.vectors import are_finite, copy_vectors
 from reference_solver.tally import OPENED
 
 
@@ -40,14 +43,44 @@ def run_located(whole: Island, world: Any, buffer: Any, first: int, steps: int, 
             return k
         close_step(whole.sub.journal)
         if sampled:
-            sample_located(whole, buffer, (k + 1) // stride - 1)
+            s = (k + 1) // stride - 1
+            sample_state(whole, buffer, s)
+            if len(buffer.real) > 0:
+                buffer.offset[s + 1] += contacts_entered(whole, buffer, buffer.offset[s])
     return steps
+
+
+@kernel
+def run_steps(whole: Island, buffer: Any, first: int, steps: int, stride: int) -> int:
+    """Make fixed steps of all bodies; otherwise as `run_located`."""
+    for k in range(first, steps):
+        sampled = stride > 0 and (k + 1) % stride == 0
+        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + most_contacts(whole) > len(buffer.real):
+            return k
+        keep_state(whole.sub.journal, whole.bodies.pose, whole.bodies.twist)
+        if not make_fixed_step(whole):
+            return k
+        close_step(whole.sub.journal)
+        if sampled:
+            s = (k + 1) // stride - 1
+            sample_state(whole, buffer, s)
+            if len(buffer.real) > 0:
+                buffer.offset[s + 1] += contacts_found(whole, buffer, buffer.offset[s])
+    return steps
+
+
+@inner_kernel
+def sample_state(whole: Island, buffer: Any, s: int) -> None:
+    """Write poses and twists as sample s, without contacts yet."""
+    copy_vectors(whole.bodies.pose, buffer.pose[s])
+    copy_vectors(whole.bodies.twist, buffer.twist[s])
+    buffer.offset[s + 1] = buffer.offset[s]
 
 
 @spliced_kernel
 def step_world(whole: Island, world: Any) -> bool:
     """One step; False if an array is too small: called again, it makes the step anew."""
-    if not is_finite(whole):
+    if not are_finite(whole.bodies.twist):
         return True
     keep(whole.tally, world.tally)
     for attempt in range(len(ROOM) + 1):

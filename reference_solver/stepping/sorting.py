@@ -17,3 +17,13 @@ def sift_down(key: Indices, root: int, end: int) -> None:
             return
         key[root], key[child] = key[child], key[root]
         root = child
+
+
+@inner_kernel
+def sort_keys(key: Indices, count: int) -> None:
+    """Sort the first keys."""
+    for root in range(count // 2 - 1, -1, -1):
+        sift_down(key, root, count)
+    for end in range(count - 1, 0, -1):
+        key[0], key[end] = key[end], key[0]
+        sift_down(key, 0, end)

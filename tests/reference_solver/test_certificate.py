@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver import tally as entries
 from reference_solver.certificate import GATES, reasons
-from reference_solver.cone import cone_defect, into_cone
+from reference_solver.coulomb import cone_defect, into_cone
 from reference_solver.exact_contact import coulomb_solutions
 from reference_solver.planar.certificate import certify as certify_planar
 from reference_solver.planar.certificate import open_solve as open_planar

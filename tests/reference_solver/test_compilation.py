@@ -45,7 +45,7 @@ def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):
 
 def test_another_checkout_of_the_same_sources_finds_the_machine_code(tmp_path):
     code = (
-        "import reference_solver.cone as c; print(c.__file__);"
+        "import reference_solver.coulomb as c; print(c.__file__);"
         "print(c.into_cone(1.0, 2.0, 0.5), sum(c.into_cone.stats.cache_hits.values()))"
     )
     answers = []

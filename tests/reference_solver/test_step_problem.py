@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, StepProblem
-from reference_solver.cone import cone_defect
+from reference_solver.coulomb import cone_defect
 
 DT, G = 1.0 / 240.0, 9.81
 UP = (1.0, 0.0, 0.0, 0.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
+from reference_solver.certification import runge_kutta
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.truth import certify
 from reference_solver.model import Array, Model
@@ -68,26 +70,7 @@ def integrated(
     rate: Rate, state: Array, time: float, until: Callable[[Array], float] | None = None
 ) -> tuple[Array, float]:
     """Return the state after ``time`` [s], or where ``until`` falls below zero before, and what is left of the time."""
-    left = time
-    while left > 0.0:
-        length = min(STEP, left)
-        after = _step(rate, state, length)
-        if until is not None and until(after) < 0.0:
-            low, high = 0.0, length
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if until(_step(rate, state, middle)) < 0.0 else (middle, high)
-            return _step(rate, state, high), left - high
-        state, left = after, left - length
-    return state, 0.0
-
-
-def _step(rate: Rate, state: Array, h: float) -> Array:
-    k1 = rate(state)
-    k2 = rate(state + 0.5 * h * k1)
-    k3 = rate(state + 0.5 * h * k2)
-    k4 = rate(state + h * k3)
-    return np.asarray(state + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4))
+    return runge_kutta.integrated(partial(runge_kutta.advance, rate), state, time, STEP, until)
 
 
 def spun(q: Array, w: Array) -> Array:

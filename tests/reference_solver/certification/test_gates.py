@@ -14,9 +14,9 @@ from reference_solver.certification import (
     random_scenes,
     rotation,
     turning,
-    turning_in_space,
 )
 from reference_solver.certification.space import SPACES
+from reference_solver.certification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 
 #: Piles of more than a minute of CPU each: `crosscheck certify` measures them, and `make test-long`.
 LONG = ("50 spheres", "8 spatial boxes")
@@ -56,16 +56,14 @@ ALONE = [
     (rotation.error, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    *[(turning.errors, name) for name in turning.CASES],
-    *[(turning.order, name) for name in turning.CASES],
-    *[(turning.impulse_order, name) for name in turning.SMOOTH],
+    *[(gate, PLANE, name) for gate in (turning.errors, turning.order) for name in CASES[2]],
+    *[(turning.impulse_order, PLANE, name) for name in SMOOTH[2]],
     (turning.long_board,),
     (random_scenes.gates,),
     (falling.dominoes,),
     (falling.rocking,),
     *[pytest.param((piles.laws, name), marks=[pytest.mark.long] if name in LONG else []) for name in piles.KINDS],
-    *[(turning_in_space.errors, name) for name in turning_in_space.CASES],
-    *[(turning_in_space.order, name) for name in turning_in_space.CASES],
+    *[(gate, SPATIAL, name) for gate in (turning.errors, turning.order) for name in CASES[3]],
     (detection.seams, SPACES[0], "polygon"),
     (detection.slender_rod,),
 ]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_solver.cone import cone_defect
+from reference_solver.coulomb import cone_defect
 from reference_solver.spatial.one_contact import coulomb_impulse
 
 

@@ -1,15 +1,23 @@
-"""Sweeping until done: a fixed number of sweeps, or a residual stop with over-relaxation estimated on the way."""
+"""Sweeping until done: a fixed number of sweeps, or a residual stop with over-relaxation estimated on the way.
+
+Of both dimensions: ``rows`` are the rows of the plane or the manifolds of space.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
-from reference_solver.planar.block import sweep_blocks
-from reference_solver.planar.direct import mend_velocities, solve_directly
-from reference_solver.planar.residual import natural_map
-from reference_solver.planar.sequential_impulses import sweep_rows
-from reference_solver.planar.state import Bodies, Rows
+from reference_solver.stepping.operations import (
+    Bodies,
+    mend_velocities,
+    natural_map,
+    solve_directly,
+    sweep_blocks,
+    sweep_rows,
+)
 from reference_solver.stepping.options import BLOCK, Options
 from reference_solver.stepping.sweeps import (
     CHECK_INTERVAL,
@@ -29,7 +37,7 @@ from reference_solver.tally import UNCONVERGED
 
 
 @inner_kernel
-def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> None:
+def sweep(bodies: Bodies, rows: Any, options: Options, relaxation: float) -> None:
     """One sweep of the solver chosen."""
     if options.solver == BLOCK:
         sweep_blocks(bodies, rows, options, relaxation)
@@ -38,7 +46,7 @@ def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float) -> No
 
 
 @inner_kernel
-def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array) -> None:
+def sweep_to_residual(bodies: Bodies, rows: Any, problem: Problem, options: Options, tally: Array) -> None:
     """Sweep until the residual is reached, with the factor given or estimated.
 
     Young's theory is linear; contacts that change between sticking, sliding and open may send large factors round
@@ -89,7 +97,7 @@ def sweep_to_residual(bodies: Bodies, rows: Rows, problem: Problem, options: Opt
 
 
 @inner_kernel
-def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array, times: int) -> float:
+def hand_over(bodies: Bodies, rows: Any, problem: Problem, options: Options, tally: Array, times: int) -> float:
     """Let the direct solver improve the impulses; returns the residual (E14) measured on its answer.
 
     Asked again in the same step (`times`) it may do more, and every second time it starts from zero impulses: what the
@@ -102,7 +110,7 @@ def hand_over(bodies: Bodies, rows: Rows, problem: Problem, options: Options, ta
 
 
 @inner_kernel
-def solve_velocities(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array) -> None:
+def solve_velocities(bodies: Bodies, rows: Any, problem: Problem, options: Options, tally: Array) -> None:
     """Sweep as `Options` asks and enter residual and sweeps in the tally."""
     if options.residual >= 0.0:
         sweep_to_residual(bodies, rows, problem, options, tally)

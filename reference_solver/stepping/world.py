@@ -1,0 +1,125 @@
+"""What the worlds of both dimensions share: running, sampling, room that grows (interface: ``simulation.py``)."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any, Self
+
+import numpy as np
+
+from reference_solver.direct.problem import allocate_problem
+from reference_solver.model import Array, Model
+from reference_solver.needs import Needs
+from reference_solver.pieces import allocate_journal
+from reference_solver.records import Contacts, Frames
+from reference_solver.settings import Settings
+from reference_solver.stepping.ledger import Buffer, allocate_ledger, contacts_of, copy_ledger
+from reference_solver.stepping.operations import Bodies, Island
+from reference_solver.stepping.options import FIXED_STEP, options, uses_direct
+from reference_solver.stepping.run import run_located, run_steps
+from reference_solver.tally import new_tally
+
+
+class SteppedWorld:
+    """One model being stepped; a dimension adds its arrays, and how they grow."""
+
+    #: Contacts a body that there is room for in a sample, before it is known how many are needed.
+    typical: int
+
+    _bodies: Bodies
+    _sub: Any
+    _world: Any
+    #: Tables of the laws of pairs: nothing writes to them.
+    _laws: tuple[Array, Array]
+
+    def __init__(self, model: Model, settings: Settings, needs: Needs, contacts: int) -> None:
+        n, d = len(model.bodies), model.dimension
+        self._dimension = d
+        self._options, self._accuracy = options(settings, needs), settings.accuracy
+        self._ledger = allocate_ledger(d, contacts)
+        self._problem = allocate_problem(d, n, contacts, uses_direct(settings))
+        self.tally = new_tally()
+        self.journal = allocate_journal(d, n, 0)
+
+    @property
+    def pose(self) -> Array:
+        """Current poses (n, 3 | 7)."""
+        return np.asarray(self._bodies.pose)
+
+    @property
+    def twist(self) -> Array:
+        """Current twists (n, 3 | 6)."""
+        return np.asarray(self._bodies.twist)
+
+    def run(self, steps: int, stride: int, contacts: bool) -> Frames:
+        """Make ``steps`` steps, sampling after every ``stride`` (0: never)."""
+        samples = steps // stride if stride else 0
+        # At most a million rows (100 MB) before it is known that they are needed.
+        room = self._most_contacts() + min(self.typical * samples * len(self.pose), 1_000_000) if contacts else 0
+        buffer = self._buffer(samples, room)
+        done = 0
+        while True:
+            done = self._run(buffer, done, steps, stride)
+            if done == steps:
+                break
+            if contacts and buffer.offset[done // stride] + self._most_contacts() > len(buffer.real):
+                buffer = self._doubled(buffer)
+            else:
+                self._grow()
+        return Frames(buffer.pose, buffer.twist, buffer.offset, contacts_of(buffer, int(buffer.offset[-1])))
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step."""
+        buffer = self._buffer(0, self._most_contacts())
+        if self._options.scheme == FIXED_STEP:
+            return contacts_of(buffer, self._write_found(buffer))
+        return contacts_of(buffer, copy_ledger(self._ledger, buffer, 0))
+
+    def copy(self) -> Self:
+        """Return a world of its own in the same state.
+
+        Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
+        and of another type, for which all kernels would be compiled anew.
+        """
+        return deepcopy(self, {id(table): table for table in self._laws})
+
+    def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
+        whole = self._whole(self._sub._replace(journal=self.journal))
+        if self._options.scheme == FIXED_STEP:
+            return int(run_steps(whole, buffer, done, steps, stride))
+        self._sub.lasting.accuracy[0] = self._accuracy
+        return int(run_located(whole, self._world, buffer, done, steps, stride))
+
+    def _whole(self, sub: Any) -> Island:
+        """All bodies as one island, with what its step works on."""
+        raise NotImplementedError
+
+    def _most_contacts(self) -> int:
+        """Contacts that there is room for."""
+        raise NotImplementedError
+
+    def _write_found(self, buffer: Buffer) -> int:
+        """Write the contacts of the last fixed step; return how many."""
+        raise NotImplementedError
+
+    def _grow(self) -> None:
+        """Double whatever was found too small; the step that stopped is made anew."""
+        raise NotImplementedError
+
+    def _buffer(self, samples: int, room: int) -> Buffer:
+        empty = allocate_ledger(self._dimension, room)
+        pose, twist = (np.zeros((samples, *array.shape)) for array in (self.pose, self.twist))
+        return Buffer(pose, twist, np.zeros(samples + 1, np.int64), empty.names, empty.real)
+
+    def _doubled(self, buffer: Buffer) -> Buffer:
+        """Twice the room for contacts, and what has been recorded so far."""
+        bigger = self._buffer(len(buffer.pose), 2 * (len(buffer.real) + self._most_contacts()))
+        for old, new in zip(buffer, bigger, strict=True):
+            new[: len(old)] = old
+        return bigger
+
+    def _grow_ledger(self) -> None:
+        bigger = allocate_ledger(self._dimension, 2 * len(self._ledger.real))
+        for old, new in zip(self._ledger, bigger, strict=True):
+            new[: len(old)] = old
+        self._ledger = bigger
