@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Solver = Literal["scalar", "block"]
-PositionCorrection = Literal["split", "none"]
+PositionCorrection = Literal["split", "baumgarte", "none"]
 Scheme = Literal["fixed", "located", "midpoint"]
 
 #: Difference of both orders of a phase, as a share of the motion in it: mostly 50 to 1000 times the error that is made.
@@ -33,7 +33,8 @@ class Settings:
     relaxation
         Over-relaxation factor in (0, 2); None estimates it from the measured residuals (E13).
     position_correction
-        ``split``: pseudo-velocities move bodies out of overlap and are forgotten (E16). ``none``.
+        ``split``: pseudo-velocities move bodies out of overlap and are forgotten (E16). ``baumgarte``: a bias in
+        the velocity row, which injects ``beta * overlap / dt`` (E15). ``none``.
     beta
         Fraction of the overlap beyond `slop` that is removed in one step, in (0, 1].
     slop
@@ -81,7 +82,7 @@ class Settings:
         _require("residual", residual, residual is None or 0.0 < residual < 1.0, "None or between 0 and 1")
         factor = self.relaxation
         _require("relaxation", factor, factor is None or 0.0 < factor < 2.0, "None or between 0 and 2")
-        corrections = ("split", "none")
+        corrections = ("split", "baumgarte", "none")
         _require("position_correction", self.position_correction, self.position_correction in corrections, corrections)
         _require("beta", self.beta, 0.0 < self.beta <= 1.0, "in (0, 1]")
         _require("slop", self.slop, math.isfinite(self.slop) and self.slop >= 0.0, "a length of at least 0")
@@ -89,6 +90,9 @@ class Settings:
         _require(
             "scheme", self.scheme, self.scheme in ("fixed", "located", "midpoint"), "'fixed', 'located' or 'midpoint'"
         )
+        if self.scheme != "fixed":
+            allowed = ("split", "none")
+            _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
         _require("accuracy", self.accuracy, 1e-12 <= self.accuracy <= 1e-4, "in [1e-12, 1e-4]")
 

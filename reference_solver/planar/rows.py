@@ -43,7 +43,7 @@ from reference_solver.planar.kinematics import (
 )
 from reference_solver.planar.state import CONTACTS, Bodies, Pairs, Rows
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.options import BAUMGARTE, Options
 
 
 @inner_kernel
@@ -79,7 +79,7 @@ def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
 
 @inner_kernel
 def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
-    """Normal velocity b_n to reach (E7, E8).
+    """Normal velocity b_n to reach (E7, E8, E15).
 
     A gap may be closed within the step, down to the slop, not more; an overlap asks for nothing. A gap within
     round-off counts as touching: divided by dt it would be noise that the solver had to answer in every step.
@@ -89,6 +89,8 @@ def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Option
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     noise = ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
     target = -(gap - options.slop) / options.dt if gap > options.slop + noise else 0.0
+    if options.correction == BAUMGARTE:
+        target = max(target, options.beta * (-gap - options.slop) / options.dt)
     if options.restitution and u < 0.0:
         rebound = -pairs.restitution[a, b] * u
         if rebound > 0.0:

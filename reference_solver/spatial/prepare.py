@@ -10,7 +10,7 @@ from reference_solver.spatial.manifolds import friction_of, restitution_of
 from reference_solver.spatial.state import Bodies, Detection, Manifolds
 from reference_solver.spatial.vector import Vector, add, cross, dot, length, row, scale, times
 from reference_solver.stepping.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.options import BAUMGARTE, Options
 
 #: Approach speeds below this fraction of what the loads of one step bring about are a resting body's noise. As
 #: targets they would differ from point to point and lift a corner of a face: all its weight would change places.
@@ -70,7 +70,7 @@ def set_matrix(matrix: Array, r: Array, offset: Vector) -> None:
 def set_target(
     bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: float, restitution: float, options: Options
 ) -> None:
-    """Normal velocity b_n to reach (E7, E8); u is the normal velocity before forces.
+    """Normal velocity b_n to reach (E7, E8, E15); u is the normal velocity before forces.
 
     Without restitution a gap may be closed within the step, down to the slop, not more; an overlap asks for nothing.
     A gap within round-off counts as touching: divided by dt it would be noise to answer in every step. With
@@ -86,6 +86,8 @@ def set_target(
             target = -(gap - options.slop) / options.dt
     elif u < -RESTING_NOISE * load_speed(bodies, manifolds, m, p, options.dt):
         target = -restitution * u
+    if options.correction == BAUMGARTE:
+        target = max(target, options.beta * (-gap - options.slop) / options.dt)
     manifolds.target[m, p] = target
 
 

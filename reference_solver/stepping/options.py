@@ -10,7 +10,7 @@ from reference_solver.structures import structure
 
 SCALAR, BLOCK = 0, 1
 FIXED_STEP, LOCATED, MIDPOINT = 0, 1, 2
-NO_CORRECTION, SPLIT = 0, 1
+NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 
 @structure
@@ -49,7 +49,7 @@ def options(settings: Settings, needs: Needs) -> Options:
         residual=-1.0 if settings.residual is None else float(settings.residual),
         max_sweeps=settings.max_sweeps,
         relaxation=0.0 if settings.relaxation is None else float(settings.relaxation),
-        correction={"none": NO_CORRECTION, "split": SPLIT}[settings.position_correction],
+        correction={"none": NO_CORRECTION, "split": SPLIT, "baumgarte": BAUMGARTE}[settings.position_correction],
         beta=float(settings.beta),
         slop=float(settings.slop),
         margin=float(settings.margin),

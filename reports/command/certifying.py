@@ -33,6 +33,7 @@ PARTS = (
     "impact",
     "friction",
     "columns",
+    "overlaps",
     "conservation",
     "rotation",
     "random_scenes",

@@ -70,7 +70,7 @@ def test_bad_models_are_refused_naming_the_field(make, field):
         {"residual": 0.0},
         {"max_sweeps": 0},
         {"relaxation": 2.0},
-        {"position_correction": "baumgarte"},
+        {"position_correction": "ngs"},
         {"beta": 0.0},
         {"slop": -1.0},
         {"solver": "newton"},

@@ -10,6 +10,7 @@ from reference_solver.certification import (
     falling,
     friction,
     impact,
+    overlaps,
     piles,
     random_scenes,
     rotation,
@@ -52,6 +53,7 @@ IN_BOTH = [
     (detection.first_impacts,),
 ]
 ALONE = [
+    (overlaps.gates,),
     (rotation.order, "classical"),
     (rotation.error, "reference"),
     (rotation.angular_momentum, "classical"),

@@ -110,15 +110,19 @@ def test_overhang_stands_until_the_centre_of_mass_leaves_the_edge(build, referen
         assert bool(abs(simulation.pose[1, 2]) < 1e-9) is stands
 
 
-def test_split_impulse_moves_bodies_apart_and_leaves_them_no_speed(build, classical):
+def test_baumgarte_injects_beta_delta_over_dt_and_split_impulse_nothing(build, classical):
     overlap, beta = 0.01, 0.2
     bodies = [build.floor(), build.disc(0.0, 0.5 - overlap)]
-    for correction, share in (("split", beta), ("none", 0.0)):
+    speeds = {}
+    for correction in ("baumgarte", "split", "none"):
         simulation = build.simulation(bodies, replace(classical, position_correction=correction, slop=0.0, beta=beta))
         simulation.advance(1)
+        speeds[correction] = simulation.twist[1, 1]
         moved = simulation.pose[1, 1] - 0.5 + overlap
-        assert moved == pytest.approx(share * overlap, rel=1e-12, abs=1e-15)
-        assert simulation.twist[1, 1] == 0.0
+        assert moved == pytest.approx(0.0 if correction == "none" else beta * overlap, rel=1e-12, abs=1e-15)
+    assert speeds == pytest.approx(
+        {"baumgarte": beta * overlap / build.dt, "split": 0.0, "none": 0.0}, rel=1e-12, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.5, 0.9])

@@ -112,3 +112,11 @@ def test_overlap_goes_without_a_gain_of_speed(build, reference):
     simulation.advance(50)
     assert np.abs(simulation.twist).max() <= 1e-12
     assert simulation.pose[1, 2] >= 0.5 - 1e-9 and simulation.pose[2, 2] - simulation.pose[1, 2] >= 1.0 - 1e-9
+
+
+def test_baumgarte_pays_for_overlap_with_speed(build, classical):
+    """An overlap delta leaves at beta (delta - slop) / dt: what the profiles avoid."""
+    settings = dataclasses.replace(classical, position_correction="baumgarte", beta=0.2, slop=0.0)
+    simulation = build.simulation([build.floor(), build.sphere((0.0, 0.0, 0.49))], settings)
+    simulation.advance(1)
+    assert simulation.twist[1, 2] == pytest.approx(0.2 * 0.01 / build.dt, rel=1e-12)
