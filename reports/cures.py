@@ -128,7 +128,9 @@ def _told_apart(before: float | None, after: float | None, truth: float) -> tupl
     """The three numbers in the fewest digits, at least three, that tell the first two apart."""
     enough = (n for n in range(3, 18) if number(before, n) != number(after, n))
     digits = next(enough, 3)
-    return number(before, digits), number(after, digits), number(truth, digits)
+    missing = "no value"  # the engine gave no answer there
+    was, now = (missing if value is None else number(value, digits) for value in (before, after))
+    return was, now, number(truth, digits)
 
 
 def cure_paste(cure: Cure) -> str:
