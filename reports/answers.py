@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from reports.cures import decided_by, told_cures
-from reports.findings import severity
+from reports.findings import REFUSED, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
 from validation.metrics import SILENT, WORDS
@@ -28,7 +28,8 @@ CLEAR = 0.8
 SAME = 0.05
 
 
-#: Said of a scene of which no engine of the run gave anything that is judged.
+#: Said of a scene of which no engine of the run gave anything that is judged, and where none could be asked.
+UNJUDGED_SCENE = "no verdict: nothing of it is judged"
 UNASKED = "no verdict: it cannot be asked of the engines of this run"
 
 
@@ -56,17 +57,21 @@ class Answer:
 
 @dataclass(frozen=True)
 class Choice:
-    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest, if any."""
+    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest, if any.
+
+    ``asked`` is whether any engine of the run could be asked the scene at all.
+    """
 
     scene: str
     good: tuple[str, ...]
     nearest: str
+    asked: bool = True
 
     @property
     def line(self) -> str:
         """``engine/profile (0.2 ms/s), another/profile``."""
         if not self.good and not self.nearest:
-            return UNASKED
+            return UNJUDGED_SCENE if self.asked else UNASKED
         return ", ".join(self.good) if self.good else f"nobody passes every row; nearest is {self.nearest}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -95,7 +100,8 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
         near = min(shares, key=lambda key: shares[key], default=None)
         nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
-        found.append(Choice(scene, tuple(names), nearest))
+        asked = any(row["scene"] == scene and row["outcome"] not in REFUSED for row in rows)
+        found.append(Choice(scene, tuple(names), nearest, asked))
     return found
 
 
@@ -236,10 +242,10 @@ def _digits(row: Plain) -> int:
 
 
 def _follows(rows: Sequence[Plain], name: str) -> bool:
-    """Whether the truth changes with this parameter while all others stay."""
+    """Whether the truth of one metric changes with this parameter while all others stay."""
     seen: dict[str, set[float]] = defaultdict(set)
     for row in rows:
-        rest = repr(sorted((k, v) for k, v in row["params"].items() if k not in (name, "duration")))
+        rest = row["metric"] + repr(sorted((k, v) for k, v in row["params"].items() if k not in (name, "duration")))
         seen[rest].add(round(row["truth"], 9))
     return any(len(truths) > 1 for truths in seen.values())
 

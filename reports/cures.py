@@ -116,10 +116,21 @@ def cure_text(cure: Cure, where: str = "") -> str:
     settings = ", ".join(f"{name}={setting_text(value)}" for name, value in cure.changes.items())
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
-    numbers = f"{cure.metric}{f' at {at}' if at else ''} {number(cure.before, 3)} -> {number(cure.after, 3)}{unit}"
+    before, after, truth = _told_apart(cure.before, cure.after, cure.truth)
+    aim = f" (true: {truth})" if truth not in ("0", after) else ""
+    numbers = f"{cure.metric}{f' at {at}' if at else ''} {before} -> {after}{unit}{aim}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
     cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
     return f"{where} by {settings}: {numbers}{left}{cost}"
+
+
+def _told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
+    """The three numbers in the fewest digits, at least three, that tell the first two apart."""
+    enough = (n for n in range(3, 18) if number(before, n) != number(after, n))
+    digits = next(enough, 3)
+    missing = "no value"  # the engine gave no answer there
+    was, now = (missing if value is None else number(value, digits) for value in (before, after))
+    return was, now, number(truth, digits)
 
 
 def cure_paste(cure: Cure) -> str:

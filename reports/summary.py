@@ -118,15 +118,21 @@ def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> No
 
 def _answers(rows: Sequence[Plain], console: Console) -> None:
     found = answers(rows)
-    if all(row["outcome"] in REFUSED for row in rows):
-        nothing = "Nothing was judged: no engine of this run can be asked any of it"
-    elif any(row["physics"] != "pass" for row in rows):
-        nothing = "Only rows at other iteration counts, or without a verdict, do not pass"
-    else:
-        nothing = "Every row passes"
-    _heading("What is wrong, and what cures it" if found else nothing, console)
+    _heading("What is wrong, and what cures it" if found else _nothing_wrong(rows), console)
     for answer in found:
         console.print(_folded(answer.line, console))
+
+
+def _nothing_wrong(rows: Sequence[Plain]) -> str:
+    """What is said of a run in which no profile fails at its own iteration count."""
+    if all(row["outcome"] in REFUSED for row in rows):
+        return "Nothing was judged: no engine of this run can be asked any of it"
+    judged = [row for row in rows if row["tolerance"] is not None and row["outcome"] not in REFUSED]
+    if not judged:
+        return "Nothing was judged: no number of this run has a finite tolerance"
+    if any(row["physics"] != "pass" for row in judged):
+        return "Only rows at other iteration counts fail, or have no value, as is listed"
+    return "Every row that is judged passes"
 
 
 def _where(

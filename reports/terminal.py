@@ -9,6 +9,13 @@ from __future__ import annotations
 from rich.console import Console
 
 
+class _Terminal(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the command which status that is: rich would end with 1, which says that a verdict is bad."""
+        self.quiet = True
+        raise  # the BrokenPipeError that is being handled
+
+
 def terminal(stderr: bool = False, width: int | None = None) -> Console:
     """Return a console on stdout, or on stderr, that reads no markup and no emoji codes in any text."""
-    return Console(stderr=stderr, width=width, markup=False, emoji=False)
+    return _Terminal(stderr=stderr, width=width, markup=False, emoji=False)

@@ -58,7 +58,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     if unknown:
         raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such family of {engine} in {FAMILIES}")
     changed = [change for change in proposal.changes if change.asks]
-    console.print(_table(engine, proposal.changes))
+    if changed:
+        console.print(_table(engine, changed))
     chosen, written = _decide(changed, families, console)
     folder = files.findings_folder(engine)
     if folder is None:

@@ -45,7 +45,7 @@ class _Group(click.Group):
         except ModuleNotFoundError as error:
             _leave(f"{error.name or error}: is not installed here; crosscheck doctor says what is", statuses.INCOMPLETE)
         except BrokenPipeError:
-            _silence_stdout()  # whoever read our output has seen enough, but not all of it
+            _silence_stdout()
             sys.exit(statuses.RESULTS)
         except OSError as error:
             _silence_stdout()
@@ -56,6 +56,9 @@ class _Group(click.Group):
             return super().invoke(ctx)
         except KeyboardInterrupt:
             ctx.exit(statuses.INTERRUPTED)
+        except BrokenPipeError:  # click would end with 1, which is a verdict
+            _silence_stdout()  # whoever read our output has seen enough, but not all of it
+            ctx.exit(statuses.RESULTS)
 
 
 def _leave(line: str, status: int) -> NoReturn:

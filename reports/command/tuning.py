@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from adapters import registry
 from adapters.engine import EngineError
 from adapters.engine_folder import DECISIVE, candidates_of, cured_of, folder_of
 from adapters.registry import load, profile_of
@@ -56,6 +57,7 @@ def tune(
     console = terminal(stderr=True)
     if which:
         sys.exit(0 if _decisive(engine, jobs, as_json) else 1)
+    registry.find(engine)
     if not candidates_of(engine):
         raise EngineError(f"tune: nobody has named stock settings of {engine} to try (experiments.py in its folder)")
     profile = profile or profile_of(engine, "tuned")

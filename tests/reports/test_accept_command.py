@@ -128,6 +128,18 @@ def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_anothe
         assert all(cell[-2] != " " for cell in line[1:5]) and all(cell[1] != " " for cell in (line[0], line[5]))
 
 
+def test_the_table_has_the_families_that_would_change_and_no_others(out, findings):
+    findings.mkdir()
+    other = FAMILY.replace('"starved"', '"elsewhere"').replace('"stack"', '"bounce"').replace("drift", "apex")
+    (findings / files.FAMILIES).write_text(FAMILY + other)
+    asked = accept(out).stderr
+    assert "starved" in asked and "elsewhere" not in asked
+    accept(out, "--family", "starved")
+    files.findings_of.cache_clear()
+    again = accept(out)
+    assert again.exit_code == 0 and "rows per family" not in again.stderr
+
+
 def test_an_unknown_family_is_a_wrong_call(out, findings):
     result = accept(out, "--family", "unheard-of")
     assert result.exit_code == 2

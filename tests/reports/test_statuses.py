@@ -52,7 +52,13 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
 def test_results_that_are_not_there_are_a_wrong_call(tmp_path):
     result = call("report", "--out", tmp_path)
     assert result.exit_code == statuses.WRONG_CALL
-    assert "there are no results" in one_line(result)
+    assert "there are no results" in (line := one_line(result)) and "crosscheck run makes them" in line
+
+
+def test_an_engine_that_is_not_there_is_called_so_by_tune():
+    result = call("tune", "nosuch")
+    assert result.exit_code == statuses.WRONG_CALL
+    assert "there is no engine called 'nosuch'" in one_line(result)
 
 
 @pytest.mark.parametrize("command", [["report"], ["list", "runs"], ["compare", "latest", "latest"], SMALL])
@@ -78,6 +84,19 @@ def test_a_full_stdout_is_said_in_one_line(arguments):
                               stderr=subprocess.PIPE, text=True, cwd=ROOT)  # fmt: skip
     assert done.returncode == statuses.RESULTS
     assert done.stderr.startswith("crosscheck:") and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no broken pipes on Windows")
+@pytest.mark.parametrize("arguments", [["list", "scenes"], ["describe", "bounce", "--json"]])
+def test_a_reader_that_goes_away_is_no_verdict(arguments):
+    """``crosscheck show --all | head``: status 1 would say that something is alarming."""
+    read, write = os.pipe()
+    os.close(read)  # nobody reads any more
+    done = subprocess.run([sys.executable, "-m", "reports.command", *arguments], stdout=write,
+                          stderr=subprocess.PIPE, text=True, cwd=ROOT)  # fmt: skip
+    os.close(write)
+    assert done.returncode == statuses.RESULTS
+    assert done.stderr == ""
 
 
 def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):

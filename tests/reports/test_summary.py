@@ -97,6 +97,16 @@ def test_an_answer_that_never_changes_is_told_in_one_clause_with_its_cure():
     assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101 whatever e is asked; tuned cures it"
 
 
+def test_a_parameter_is_named_only_if_the_truth_of_one_number_follows_it():
+    """Numbers of one cell have truths of their own, whatever its parameters are."""
+    rows = [row("impact", 2, "mujoco", "default", "known", 0.1, truth, e=e, v=1.0) | {"metric": f"restitution[{i}]"}
+            for e in (0.5, 1.0) for i, truth in ((1, 0.3), (2, 0.9))]  # fmt: skip
+    (answer,) = answers(rows)
+    assert answer.wrong.endswith("whatever is asked")
+    rows += [rows[0] | {"params": {"e": 0.5, "v": 2.0}, "truth": 0.4}]
+    assert answers(rows)[0].wrong.endswith("whatever v is asked")
+
+
 def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
     rows = [row("bounce", 2, "bullet", "default", "known", 0.25, 0.64, e=0.8, height=1.0)]
     (answer,) = answers(rows)
@@ -161,6 +171,22 @@ def test_a_run_in_which_nothing_could_be_asked_says_so_and_why():
     assert "Nothing was judged" in text
     for wrong in ("nearest is", "iteration counts", "Every row passes", "NAME", "within tolerance", "explain ID"):
         assert wrong not in text
+
+
+def shown_only(rows):
+    """The rows as a scene file gives them for numbers that it states nothing about."""
+    return [each | {"truth": None, "tolerance": None, "error": None, "physics": None, "standing": None}
+            for each in rows]  # fmt: skip
+
+
+def test_numbers_that_are_shown_without_a_truth_are_no_failures():
+    judged, shown_beside = [row("impact", 2, "bullet", "tuned")], shown_only([row("impact", 2, "bullet", "tuned")])
+    assert "Every row that is judged passes" in shown(judged + shown_beside, 100)
+    text = "\n".join(shown(shown_beside, 100))
+    assert "Nothing was judged: no number of this run has a finite tolerance" in text
+    assert "impact  no verdict: nothing of it is judged" in text
+    starved = [row("impact", 2, "bullet", "tuned", "known", 0.1, iterations=1)]
+    assert any(line.startswith("Only rows at other iteration counts fail") for line in shown(judged + starved, 100))
 
 
 def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():

@@ -101,7 +101,7 @@ class Store:
         write = create if write is None else write
         self.path = folder if folder.is_file() else folder / FILE
         if not create and not self.path.exists():
-            raise MissingError(f"out: there are no results at {self.path}")
+            raise MissingError(f"out: there are no results at {self.path}; crosscheck run makes them")
         with self._guarded("use"):
             if write:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
