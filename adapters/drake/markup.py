@@ -17,6 +17,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from adapters.markup import MOST_MADE, Element
 from adapters.plain import NAME, is_visible, one_line
 from adapters.scene import SceneError
@@ -25,6 +27,9 @@ from adapters.scene import SceneError
 GRAVITY, STEP = (0.0, 0.0, -9.8), 0.001
 #: A number as everybody reads it.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_VERSION = re.compile(r"\d{1,3}\.\d{1,3}")
+#: Share of the largest moment of inertia that the other two may miss it by: round-off of a body that is flat.
+_FLAT = 1e-9
 _TRUE, _FALSE = ("1", "true"), ("0", "false")
 
 
@@ -53,6 +58,8 @@ class Place:
 _ONE, _MANY, _FLAG = Place(), Place(many=True), Place(flag=True)
 _SCALAR, _SIZE = Place(numbers=(1,)), Place(numbers=(1,), positive=True)
 _POSE, _VECTOR = Place(numbers=(6, 7)), Place(numbers=(3,))
+#: Moments of inertia, and what they are where they are not stated [kg m^2]. [SDFormat 1.12, <inertia>]
+MOMENTS = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
 #: What is read, by the element that it stands in.
 READ: Mapping[str, Mapping[str, Place]] = {
     "sdf": {"world": _MANY, "model": _MANY},
@@ -64,7 +71,7 @@ READ: Mapping[str, Mapping[str, Place]] = {
     "link": {"pose": _POSE, "inertial": _ONE, "collision": _MANY, "self_collide": _FLAG, "velocity_decay": _ONE},
     "velocity_decay": {},
     "inertial": {"pose": _POSE, "mass": _SIZE, "inertia": _ONE},
-    "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), _SCALAR),
+    "inertia": dict.fromkeys(MOMENTS, _SCALAR),
     "collision": {"pose": _POSE, "geometry": _ONE, "surface": _ONE, "drake:proximity_properties": _ONE},
     "geometry": dict.fromkeys(("plane", "sphere", "box", "cylinder", "capsule"), _ONE),
     "plane": {"normal": _VECTOR, "size": Place(numbers=(2,))},
@@ -206,15 +213,12 @@ def cleaned(root: Element, drop: bool) -> Stated:
     made = sum(element.tag in ("link", "collision") for element in root.walk())
     if made > MOST_MADE:
         raise SceneError(f"model: {made} links and their shapes are more than the {MOST_MADE} that are read")
-    if "version" not in root.attributes:
-        raise SceneError(f"model: {root}: states no version of SDF")
+    if not _VERSION.fullmatch(root.attributes.get("version", "")):
+        raise SceneError(f"model: {root}: states no version of SDF, as in <sdf version='1.9'>")
     stated = Stated()
     _clean(root, drop, stated)
     for holder in [element for element in root.walk() if element.tag in ("world", "model")]:
-        for joint in [e for e in holder.children if e.tag == "joint" and e.attributes.get("type") != "fixed"]:
-            kind = one_line(joint.attributes.get("type", "nameless"), 20)
-            why = f"a {kind} joint holds a link; bodies of a scene are free or fixed"
-            _refuse(f"{joint}: {why}", drop, stated, "; it and what hangs on it")
+        for joint in [e for e in holder.children if _holds(e)]:
             cut(holder, joint)
     _state(root, stated)
     return stated
@@ -233,6 +237,11 @@ def cut(holder: Element, joint: Element) -> None:
         owner = next((e for e in holder.children if e.tag == "model" and e.attributes.get("name") == model), holder)
         owner.children = [e for e in owner.children if e.tag != "link" or e.attributes.get("name") != link]
         left += [e for e in holder.children if e.tag == "joint" and _said(e, "parent") == name]
+
+
+def _holds(element: Element) -> bool:
+    """Whether it is a joint that lets a link move, but not freely."""
+    return element.tag == "joint" and element.attributes.get("type") != "fixed"
 
 
 def _said(element: Element, tag: str) -> str:
@@ -262,6 +271,12 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
             why = "models inside models are not read" if nested else NO_PLACE.get(e.tag, NOWHERE)
             _refuse(f"{e}: {why}", drop, stated)
             continue
+        if _holds(e):
+            kind = one_line(e.attributes.get("type", "nameless"), 20)
+            line = f"{e}: a {kind} joint holds a link; bodies of a scene are free or fixed"
+            _refuse(line, drop, stated, "; it and what hangs on it")
+            kept.append(e)
+            continue
         unread = _unread_shape(e)
         if unread is not None:
             why = NO_PLACE.get(unread.tag, "a scene has spheres, boxes, cylinders, capsules and planes")
@@ -277,6 +292,8 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         _make_alike(element, drop, stated)
     if element.tag == "geometry" and len(kept) != 1:
         raise SceneError(f"model: {kept[1]}: is a second shape" if kept else f"model: {element}: has no shape")
+    if element.tag == "inertia":
+        _check_inertia(element)
     for needed in NEEDED.get(element.tag, ()):
         if child(element, needed) is None:
             raise SceneError(f"model: {element}: has no <{needed}>")
@@ -315,6 +332,17 @@ def _check(element: Element, place: Place) -> None:
     if len(words) not in place.numbers:
         counts = " or ".join(map(str, place.numbers))
         raise SceneError(f"model: {element}: has {len(words)} numbers, needs {counts}")
+
+
+def _check_inertia(inertia: Element) -> None:
+    """Raise `SceneError` unless a body can have these moments: none is larger than the other two together."""
+    xx, yy, zz, xy, xz, yz = (
+        float(found.text) if (found := child(inertia, tag)) else default for tag, default in MOMENTS.items()
+    )
+    first, second, third = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if not first > 0.0 or not third - second - first <= _FLAT * third:
+        said = f"{first:.4g}, {second:.4g} and {third:.4g} kg m^2"
+        raise SceneError(f"model: {inertia}: no body has principal moments of {said}")
 
 
 def _make_alike(element: Element, drop: bool, stated: Stated) -> None:

@@ -113,7 +113,7 @@ class _Reading:
         try:
             parser.AddModelsFromString(text_of(told(root)), "sdf")
             plant.Finalize()
-        except RuntimeError as error:
+        except (RuntimeError, ValueError) as error:
             raise SceneError(f"model: Drake does not read it: {_complaint(error)}") from None
         self.root, self.drop, self.stated, self.plant = root, drop, stated, plant
         self.diagram = builder.Build()
@@ -272,8 +272,9 @@ class _Reading:
     def _defaults(self, parts: list[_Part], names: list[str]) -> None:
         """Say what was filled in."""
         free = [(part, name) for part, name in zip(parts, names, strict=True) if part.free]
-        for tags, what in ((("mass",), "mass 1 kg"), (("inertia",), "moments of inertia 1 kg m^2")):
-            of = [name for part, name in free if child(part.link, "inertial", *tags) is None]
+        for what, tags in (("mass 1 kg", ["mass"]), ("moments of inertia 1 kg m^2", ["ixx", "iyy", "izz"])):
+            stated = [{e.tag for e in part.link.walk()} for part, _ in free]
+            of = [name for (_, name), said in zip(free, stated, strict=True) if not said.issuperset(tags)]
             if of:
                 self.notes.append(f"{what} of {one_line(', '.join(of), 120)}: SDF's own, the model states none")
         if any(
