@@ -292,6 +292,9 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         _make_alike(element, drop, stated)
     if element.tag == "geometry" and len(kept) != 1:
         raise SceneError(f"model: {kept[1]}: is a second shape" if kept else f"model: {element}: has no shape")
+    normal = child(element, "normal") if element.tag == "plane" else None
+    if normal and not any(float(word) for word in normal.text.split()):
+        raise SceneError(f"model: {normal}: is no direction")
     if element.tag == "inertia":
         _check_inertia(element)
     for needed in NEEDED.get(element.tag, ()):
@@ -352,10 +355,13 @@ def _make_alike(element: Element, drop: bool, stated: Stated) -> None:
     if element.tag != "ode" and None in found:
         return  # Drake takes the one for both
     a, b = (float(e.text) if e else FRICTIONAL for e in found)
+    # Drake's solvers take what holds in motion; of two directions none is more than the other.
+    kept, gone = (a, second) if element.tag == "ode" else (b, first)
     if a != b:
-        _refuse(f"{element}: friction {a:g} and {b:g} {how}; a scene has one number", drop, stated, f"; {b:g}")
+        line = f"{element}: friction {a:g} and {b:g} {how}; a scene has one number"
+        _refuse(line, drop, stated, f"; <{gone}>")
     element.children = [e for e in element.children if e.tag not in (first, second)]
-    element.children += [Element(tag, {}, element.line, [], repr(a)) for tag in (first, second)]
+    element.children += [Element(tag, {}, element.line, [], repr(kept)) for tag in (first, second)]
 
 
 def _state(root: Element, stated: Stated) -> None:

@@ -113,7 +113,7 @@ class _Reading:
         try:
             parser.AddModelsFromString(text_of(told(root)), "sdf")
             plant.Finalize()
-        except (RuntimeError, ValueError) as error:
+        except (RuntimeError, ValueError, SystemExit) as error:  # it leaves where its C++ would end the process
             raise SceneError(f"model: Drake does not read it: {_complaint(error)}") from None
         self.root, self.drop, self.stated, self.plant = root, drop, stated, plant
         self.diagram = builder.Build()
@@ -214,7 +214,7 @@ class _Reading:
             line = f"{model}: its links pass through each other, self_collide is not true; in a scene all bodies touch"
             if not self.drop:
                 raise SceneError(f"model: {line}")
-            yield line
+            yield f"{line}; that they pass"
 
     # ---- bodies ----
 
@@ -342,7 +342,7 @@ def _numbers(values: Any) -> tuple[float, ...]:
     return tuple(float(value) + 0.0 for value in values)
 
 
-def _complaint(error: Exception) -> str:
+def _complaint(error: BaseException) -> str:
     """What the parser says, with the line in the model instead of its own name for the text."""
     said = one_line(" ".join(str(error).split()), 300)
     where = _WHERE.match(said)
