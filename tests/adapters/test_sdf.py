@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 pytest.importorskip("pydrake", reason="Drake is set apart: pip install 'contact-crosscheck[drake]'")
 
@@ -19,6 +20,7 @@ from adapters.model import read as read_apart
 from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Pair, Scene, SceneError, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling
+from reports.command import main
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "tests" / "models"
@@ -277,6 +279,28 @@ def test_drake_s_solvers_take_friction_in_motion_which_is_why_the_two_must_be_al
 def test_it_is_read_in_another_process():
     text = (MODELS / "boxes_in_frames.sdf").read_text()
     assert read_apart("drake", ".sdf", text, False) == read(text, False)
+
+
+def test_a_world_runs_as_made_on_drake_and_rigid_elsewhere(tmp_path):
+    pytest.importorskip("mujoco")
+    words = ["--engine", "drake", "--engine", "mujoco", "--profile", "model", "--profile", "default", "--jobs", "1"]
+    words += ["--param", "duration=0.2", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(main, ["run", str(MODELS / "moon_slope.world"), *words])
+    assert done.exit_code in (0, 1), done.output
+    rows = json.loads(done.stdout)
+    kinds = {(row["engine"], row["profile"], row["dimension"], row["dt"]) for row in rows}
+    assert kinds == {(engine, profile, dimension, dt) for dimension in (2, 3) for engine, profile, dt in (
+        ("drake", "model", 0.001), ("drake", "default", 1 / 240), ("mujoco", "default", 1 / 240))}  # fmt: skip
+    assert {row["outcome"] for row in rows} == {"ok"}
+    assert "drake/model runs it with its own contacts, solver and step" in done.stderr
+
+
+def test_what_is_refused_is_one_line_of_the_command_and_nothing_runs(tmp_path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(main, ["run", str(MODELS / "refused_door.sdf"), "--engine", "drake", "--out", str(out)])
+    assert done.exit_code == 2 and not out.exists()
+    (line,) = done.stderr.splitlines()
+    assert "line 5: <joint> 'hinge': a revolute joint holds a link" in line
 
 
 FUZZ = """
