@@ -12,6 +12,7 @@ profile that runs the model as Drake would; other engines are asked for rigid bo
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -34,21 +35,17 @@ _ALONG = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class _Refused(Exception):
-    """An element has no place in a scene.
+    """Elements have no place in a scene.
 
     Parameters
     ----------
-    element
-        Which one.
-    why
-        In half a sentence.
-    gone
-        What is left out instead, with the element that holds it; None where nothing can be.
+    found
+        Each with what holds it, and why in half a sentence.
     """
 
-    def __init__(self, element: Element, why: str, gone: tuple[Element, Element] | None = None) -> None:
-        super().__init__(f"{element}: {why}")
-        self.gone = gone
+    def __init__(self, *found: tuple[Element, Element, str]) -> None:
+        super().__init__(f"{found[0][1]}: {found[0][2]}")
+        self.found = found
 
 
 @dataclass(frozen=True)
@@ -73,23 +70,25 @@ def read(text: str, drop: bool) -> Model:
     """
     root = parsed(text, "sdf", "a model of SDF begins with <sdf>")
     stated = cleaned(root, drop)
+    if stated.dropped:
+        _drop_empty(root)
     while True:
         try:
             return _Reading(root, drop, stated).model()
         except _Refused as refused:
-            if not drop or refused.gone is None:
+            if not drop:
                 raise SceneError(f"model: {refused}") from None
-            stated.dropped.append(str(refused))
-            holder, gone = refused.gone
-            if gone.tag == "joint":
-                cut(holder, gone)
-            else:
-                holder.children = [e for e in holder.children if e is not gone]
+            for holder, element, why in refused.found:
+                stated.dropped.append(f"{element}: {why}")
+                if element.tag == "joint":
+                    cut(holder, element)
+                else:
+                    holder.children = [e for e in holder.children if e is not element]
             _drop_empty(root)
 
 
 def _drop_empty(root: Element) -> None:
-    """A model without links is none."""
+    """A model of which all links were left out is none."""
     for holder in [e for e in root.walk() if e.tag in ("sdf", "world")]:
         holder.children = [e for e in holder.children if e.tag != "model" or child(e, "link")]
 
@@ -138,7 +137,7 @@ class _Reading:
             raise SceneError("model: has no free body: nothing can move")
         names = unique(self._name(part, parts) for part in parts)
         dropped = list(self.stated.dropped) + list(self._apart(parts))
-        bodies = tuple(self._body(part, name) for part, name in zip(parts, names, strict=True))
+        bodies = tuple(self._bodies(parts, names))
         self._defaults(parts, names)
         scene = Scene(self._title(), 1, 3, bodies, self._pairs(parts, bodies), self.stated.gravity, DURATION)
         self.notes.append("restitution 0 in all engines: Drake's contacts have none, and a model's own is refused")
@@ -158,12 +157,14 @@ class _Reading:
             for joint in map(plant.get_joint, plant.GetJointIndices())
             if joint.type_name() == "weld" and not plant.IsAnchored(joint.child_body())
         ]
+        found = []
         for holder in [e for e in self.root.walk() if e.tag in ("world", "model")]:
             for e in [e for e in holder.children if e.tag == "joint"]:
                 name = e.attributes.get("name")
                 if (name, holder.attributes["name"]) in held or (holder.tag == "world" and name in dict(held)):
-                    why = "holds two links together that move; a scene's body is one link"
-                    raise _Refused(e, why, (holder, e))
+                    found.append((holder, e, "holds two links together that move; a scene's body is one link"))
+        if found:
+            raise _Refused(*found)
         if held:
             raise SceneError(f"model: {one_line(held[0][0], 60)}: holds two links together that move")
 
@@ -187,14 +188,18 @@ class _Reading:
 
     def _links(self, parts: list[_Part]) -> None:
         """Each free link has one shape."""
+        count = Counter(id(part.link) for part in parts)
+        found = []
         for name, model in self.models.items():
             instance = self.plant.GetModelInstanceByName(name)
             for link in (e for e in model.children if e.tag == "link"):
-                own = sum(part.link is link for part in parts)
+                own = count[id(link)]
                 if own == 1 or self.plant.IsAnchored(self.plant.GetBodyByName(link.attributes["name"], instance)):
                     continue
                 why = "has several shapes that touch; a scene's body has one" if own else "has no shape that touches"
-                raise _Refused(link, why, (model, link))
+                found.append((model, link, why))
+        if found:
+            raise _Refused(*found)
 
     def _name(self, part: _Part, parts: list[_Part]) -> str:
         """The shortest of model, model::link and model::link::collision that is its own."""
@@ -229,6 +234,18 @@ class _Reading:
         kind = Cylinder if isinstance(shape, drake.Cylinder) else Capsule
         return kind(0.5 * float(shape.length()), float(shape.radius()))
 
+    def _bodies(self, parts: list[_Part], names: list[str]) -> list[Body]:
+        found: list[Body] = []
+        refused: list[tuple[Element, Element, str]] = []
+        for part, name in zip(parts, names, strict=True):
+            try:
+                found.append(self._body(part, name))
+            except _Refused as one:
+                refused += one.found
+        if refused:
+            raise _Refused(*refused)
+        return found
+
     def _body(self, part: _Part, name: str) -> Body:
         shape = self._shape(part.geometry)
         held = self.plant.EvalBodyPoseInWorld(self.context, part.body)
@@ -240,7 +257,7 @@ class _Reading:
         place = np.where(np.abs(place) < ROUNDING * np.abs(place).max(), 0.0, place)
         if isinstance(shape, HalfSpace):
             if part.free:
-                raise _Refused(part.link, "its shape is a plane, which cannot move", (part.model, part.link))
+                raise _Refused((part.model, part.link, "its shape is a plane, which cannot move"))
             normal = unit(turn[:, 2])
             return Body(name, HalfSpace(normal, float(np.dot(normal, place)) + 0.0), motion="fixed")
         if not part.free:
@@ -249,14 +266,14 @@ class _Reading:
         centre = np.array(inertia.get_com())
         if np.abs(centre - own.translation()).max() > ALIGNED * shape.smallest_size:
             why = "its centre of mass is not its shape's; a scene's body has both in one place"
-            raise _Refused(part.link, why, (part.model, part.link))
+            raise _Refused((part.model, part.link, why))
         about = inertia.Shift(centre).CalcRotationalInertia().CopyToFullMatrix3()
         moments = inside.T @ about @ inside
         rest = np.abs(moments - np.diag(np.diag(moments))).max()
         if rest > ALIGNED * np.diag(moments).max():
             if not isinstance(shape, Sphere):
                 why = "its principal axes are not its shape's; a scene's body has both in one direction"
-                raise _Refused(part.link, why, (part.model, part.link))
+                raise _Refused((part.model, part.link, why))
             axes = np.linalg.eigh(about)[1]  # a ball has no axes but those of its inertia
             axes[:, 2] *= np.linalg.det(axes)
             moments, turn = axes.T @ about @ axes, held.rotation().matrix() @ axes

@@ -229,6 +229,15 @@ def test_what_has_no_place_is_refused_by_its_element_or_left_out_and_said(text, 
         assert len(found.dropped) == 1
 
 
+def test_of_many_that_have_no_place_each_is_said_once_and_the_rest_runs():
+    several = "".join(link(f"k{n}", INERTIAL) + link(f"h{n}", HIGH + BALL) for n in range(100))
+    found = read(model(several + link("l"), "", COLLIDE), True)
+    assert [body.name for body in found.scene.bodies] == ["m"] and len(found.dropped) == 200
+    assert {line.partition(": its")[0].partition(": has")[0] for line in found.dropped} == {
+        f"line 1: <link> '{name}{n}'" for n in range(100) for name in "kh"
+    }
+
+
 @pytest.mark.parametrize("name", ["door.sdf", "include.world", "mesh.sdf", "bounce.sdf"])
 def test_models_that_are_refused_run_with_what_is_left(name):
     text = (MODELS / f"refused_{name}").read_text()
