@@ -8,22 +8,35 @@ folder and may use the engine's own compiler. Text from outside is handed to it 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from multiprocessing.connection import Connection
 from typing import Any
+
+import numpy as np
 
 from adapters import registry
 from adapters.engine import EngineError, Setting
 from adapters.isolation import Child, Lost
 from adapters.plain import one_line, plain
-from adapters.scene import Scene, SceneError, scene_from_dict
+from adapters.scene import Body, Pair, Scene, SceneError, scene_from_dict
 
 #: Seconds that a reader may take, and address space that it may use [bytes]: a model of a thousand geoms takes a
 #: second, and an engine's library alone may map most of a gigabyte.
 PATIENCE, MEMORY = 60.0, 2 * 2**30
 #: Name of the profile that runs a model as its own engine would.
 PROFILE = "model"
+#: Simulated time of a model, which states none [s].
+DURATION = 2.0
+#: Components of directions below this are the round-off of angles that a compiler turned into them.
+ROUNDING = 1e-14
+#: A centre of mass or an axis this far from its shape's, relative to its size, is its shape's.
+ALIGNED = 1e-9
+
+
+class ReaderMissing(EngineError):
+    """The engine that reads a model is not installed; the message names the extra that installs it."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +102,14 @@ def read(engine: str, suffix: str, text: str, drop: bool) -> Model:
     ------
     SceneError
         Naming the element that has no place in a scene, or saying that the text is no model.
+    ReaderMissing
+        If the engine is not installed.
     EngineError
-        If the engine is not installed, or its compiler ended or hung.
+        If its compiler ended or hung.
     """
-    registry.load(engine)  # says how to install it
+    found = registry.find(engine)
+    if found.engine is None:
+        raise ReaderMissing(f"model: {suffix} is read by {engine}, which is not installed: {found.reason}")
     child = Child(_serve, MEMORY)
     try:
         child.send(json.dumps([engine, suffix, text, drop]).encode())
@@ -119,3 +136,33 @@ def _serve(connection: Connection) -> None:
     except Exception as error:  # a compiler's own complaints are the reader's to catch; this is something else
         answer = {"failed": f"model: {type(error).__name__}: {error}"}
     connection.send_bytes(json.dumps(answer).encode())
+
+
+# ---- what readers have in common -------------------------------------------------------------------------------------
+
+
+def unit(vector: Any) -> tuple[float, ...]:
+    """A direction or a quaternion with the round-off of its components taken off, of length 1."""
+    clean = np.where(np.abs(vector) < ROUNDING, 0.0, vector)
+    return tuple(float(x) + 0.0 for x in clean / np.linalg.norm(clean))
+
+
+def unique(names: Iterable[str]) -> list[str]:
+    """Names that bodies of a scene can have: of what several are called, the later ones are numbered."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in (one_line(name, 60) for name in names):
+        seen[name] += 1
+        found.append(name if seen[name] == 1 and name != "*" else f"{name}~{seen[name]}")
+    return found
+
+
+def pairs_of(frictions: Mapping[tuple[int, int], float], bodies: Sequence[Body]) -> tuple[Pair, ...]:
+    """Friction of pairs of bodies, by their numbers: the most common as the default, the others by name."""
+    usual = Counter(frictions.values()).most_common(1)[0][0] if frictions else 0.0
+    others = [
+        Pair(bodies[i].name, bodies[j].name, friction=friction)
+        for (i, j), friction in frictions.items()
+        if friction != usual
+    ]
+    return (Pair(friction=usual), *others)

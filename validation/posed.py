@@ -19,7 +19,9 @@ from adapters.scene import SceneError
 from validation.canonical import CanonicalScene, Primary
 from validation.catalogue import CATALOGUE, matching
 
-_FILE = re.compile(r"(?P<path>.+\.(?:toml|json|xml|urdf|sdf))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL)
+_FILE = re.compile(
+    r"(?P<path>.+\.(?:toml|json|xml|urdf|sdf|world))(?:@(?P<digest>[0-9a-f]{8}))?", re.IGNORECASE | re.DOTALL
+)
 #: Endings of scene files; others are models of an engine.
 _OWN = (".toml", ".json")
 #: Texts of pinned scene files by pinned name.

@@ -13,10 +13,12 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.drake.landing import slowest_rebound
-from adapters.drake.profiles import PROFILES, checked
+from adapters.drake.profiles import OWN, PROFILES, checked
+from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
 from adapters.drake.translation import frictions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
+from adapters.model import PROFILE
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
@@ -79,6 +81,7 @@ class DrakeEngine(Engine):
         ),
     )
     profiles = PROFILES
+    reads = MappingProxyType({".sdf": read, ".world": read})
     expected = (
         Expected(
             "memory",
@@ -100,7 +103,7 @@ class DrakeEngine(Engine):
                 return f"{body.name}.motion: the adapter moves no body as prescribed"
         if any(restitution > 0.0 for restitution, _ in scene.materials()):
             return "pairs: contacts of drake have no restitution"
-        if frictions(scene) is None:
+        if profile != PROFILE and frictions(scene) is None:  # a model brings its bodies' own numbers
             return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
         return None
 
@@ -113,7 +116,7 @@ class DrakeEngine(Engine):
             For a scene that `refuses` names, a bad step or setting.
         """
         dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
+        reason = self.refuses(scene, PROFILE if OWN in chosen else "")
         if reason:
             raise EngineError(reason)
         return DrakeSimulation(scene, dt, chosen)

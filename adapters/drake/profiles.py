@@ -15,7 +15,7 @@ from typing import Any
 
 from adapters import settings
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
-from adapters.engine import ProfileRule, Setting
+from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
 
 #: Names of the engine's own approximations.
@@ -33,10 +33,20 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
         "stiction_tolerance": settings.number(1e-12, 1.0),
     }
 )
+#: Setting that a model brings: what each body's contacts are made of, in the order of the bodies. A row is friction;
+#: the kind of surface: ``none``, ``rigid`` or ``compliant``; how finely it is resolved [m]; modulus [Pa]; stiffness of
+#: a point [N/m]; dissipation [s/m]; relaxation time [s].
+OWN = "own"
+_KINDS_OF_A_ROW: tuple[settings.Check, ...] = (
+    settings.number(0.0, 1e6),
+    settings.word("none", "rigid", "compliant"),
+    *[settings.number(0.0, 1e300)] * 5,
+)
 _PLANT, _GRAPH = "MultibodyPlantConfig", "SceneGraphConfig.default_proximity_properties"
 
 
-def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting]:
+def rule(approximation: str, why: str) -> list[Setting]:
+    """Settings with which Drake runs as shipped but for its approximation of contact; boxes have surfaces."""
     return [
         Setting("approximation", approximation, why, f"{_PLANT}.discrete_contact_approximation"),
         Setting(
@@ -50,6 +60,10 @@ def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting
     ]
 
 
+def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting]:
+    return rule(approximation, why)
+
+
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": partial(_rule, "lagged", "as shipped"),
     "sap": partial(_rule, "sap", "the convex approximation, solved to its end"),
@@ -60,5 +74,12 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
-    return settings.checked("drake", KINDS, asked)
+    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`. `OWN` may be missing."""
+    found = settings.checked("drake", KINDS, {name: value for name, value in asked.items() if name != OWN})
+    for row in asked.get(OWN, ()):
+        if not isinstance(row, tuple) or len(row) != len(_KINDS_OF_A_ROW):
+            raise EngineError(f"{OWN}: {row!r} must be a row of {len(_KINDS_OF_A_ROW)} values")
+        for check, value in zip(_KINDS_OF_A_ROW, row, strict=True):
+            if wanted := check(value):
+                raise EngineError(f"{OWN}: {value!r} must be {wanted}")
+    return found | ({OWN: asked[OWN]} if OWN in asked else {})

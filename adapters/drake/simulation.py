@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drake.profiles import APPROXIMATIONS
+from adapters.drake.profiles import APPROXIMATIONS, OWN
 from adapters.drake.translation import frictions, pair_of
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 
@@ -30,7 +30,10 @@ class DrakeSimulation(Simulation):
         plant.set_contact_model(drake.ContactModel.kHydroelasticWithFallback)
         plant.set_stiction_tolerance(settings["stiction_tolerance"])
         plant.mutable_gravity_field().set_gravity_vector(list(scene.gravity))
-        self.frictions = frictions(scene) or []
+        own = settings.get(OWN)
+        if own is not None and len(own) != len(scene.bodies):
+            raise EngineError(f"{OWN}: has {len(own)} rows, needs one for each of {len(scene.bodies)} bodies")
+        self.frictions = (frictions(scene) or []) if own is None else [row[0] for row in own]
         self.owner: dict[Any, int] = {}
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         plant.Finalize()
@@ -63,17 +66,7 @@ class DrakeSimulation(Simulation):
             place = drake.RigidTransform()
         else:
             body, place = self.plant.world_body(), self._place(asked)
-        held = drake.ProximityProperties()
-        friction = self.frictions[index]
-        drake.AddContactMaterial(
-            dissipation=self.settings["dissipation"],
-            # Two in series: each has twice the pair's.
-            point_stiffness=2.0 * self.settings["point_stiffness"],
-            friction=drake.CoulombFriction(friction, friction),
-            properties=held,
-        )
-        # Times of a pair add up.
-        held.AddProperty("material", "relaxation_time", 0.5 * self.settings["relaxation_time"])
+        held = self._held(index, shape, free)
         if isinstance(shape, HalfSpace):
             normal = np.array(shape.normal)
             place = drake.HalfSpace.MakePose(normal, shape.offset * normal)
@@ -83,16 +76,37 @@ class DrakeSimulation(Simulation):
         else:
             assert isinstance(shape, Box)
             made = drake.Box(*(2.0 * half for half in shape.half_extents))
-        if self.settings["boxes"] == "hydroelastic" and not isinstance(shape, Sphere):
-            if free:
-                drake.AddCompliantHydroelasticProperties(shape.smallest_size, self.settings["modulus"], held)
-            elif isinstance(shape, HalfSpace):
-                drake.AddRigidHydroelasticProperties(held)
-            else:
-                drake.AddRigidHydroelasticProperties(shape.smallest_size, held)
         geometry = self.plant.RegisterCollisionGeometry(body, place, made, f"shape {index}", held)
         self.owner[geometry] = index
         return body
+
+    def _held(self, index: int, shape: Any, free: bool) -> Any:
+        """What a body's contacts are made of: what its model says, or the settings."""
+        drake, settings, held = self.drake, self.settings, self.drake.ProximityProperties()
+        friction = self.frictions[index]
+        if OWN in settings:
+            _, kind, resolution, modulus, stiffness, dissipation, relaxation = settings[OWN][index]
+        else:
+            surface = settings["boxes"] == "hydroelastic" and not isinstance(shape, Sphere)
+            kind = "none" if not surface else "compliant" if free else "rigid"
+            resolution, modulus = shape.smallest_size, settings["modulus"]
+            # Two in series: each has twice the pair's. Times of a pair add up.
+            stiffness, relaxation = 2.0 * settings["point_stiffness"], 0.5 * settings["relaxation_time"]
+            dissipation = settings["dissipation"]
+        drake.AddContactMaterial(
+            dissipation=dissipation,
+            point_stiffness=stiffness,
+            friction=drake.CoulombFriction(friction, friction),
+            properties=held,
+        )
+        held.AddProperty("material", "relaxation_time", relaxation)
+        if kind == "compliant":
+            drake.AddCompliantHydroelasticProperties(resolution, modulus, held)
+        elif kind == "rigid" and isinstance(shape, HalfSpace):
+            drake.AddRigidHydroelasticProperties(held)
+        elif kind == "rigid":
+            drake.AddRigidHydroelasticProperties(resolution, held)
+        return held
 
     def _load(self) -> None:
         """Forces and torques of the scene, for good."""

@@ -1,25 +1,17 @@
-"""The text of an MJCF or URDF model: read without harm, rid of what does not move bodies, before MuJoCo compiles it.
+"""What stands in an MJCF or URDF model: it is rid of what does not move bodies, before MuJoCo compiles it.
 
-MuJoCo's own parser opens files that a model includes and reserves whatever a model asks for. So the text is parsed here
-first: no document types or entities, no files, no more bodies than a scene may have. What has no place in a scene is
-refused with its element and line, or left out where that is wanted.
+What has no place in a scene is refused with its element and line, or left out where that is wanted; so is what reaches
+outside the text, and a model that would make more bodies than a scene may have.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from xml.etree import ElementTree
-from xml.parsers import expat
+from collections.abc import Collection, Mapping
 
+from adapters.markup import MOST_MADE, Element, named
 from adapters.plain import NAME, is_visible, one_line
 from adapters.scene import SceneError
 
-#: Most elements, and most levels of them: a model of a thousand bodies has some ten thousand, ten deep.
-MOST_ELEMENTS, MOST_LEVELS = 50_000, 64
-#: Most bodies and geoms that a model may make of its elements: as many bodies as a scene file may have.
-MOST_MADE = 1000
 #: Elements that stay.
 KEPT = frozenset(
     ("mujoco", "compiler", "option", "flag", "default", "worldbody", "body", "geom", "inertial", "freejoint", "joint",
@@ -50,75 +42,6 @@ NO_PLACE = {
 }
 
 
-@dataclass
-class Element:
-    """One element, with the line it begins on."""
-
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[Element] = field(default_factory=list)
-
-    def __str__(self) -> str:
-        name = self.attributes.get("name", "")
-        shown = f" {one_line(name, NAME)!r}" if name and "@" not in name else ""
-        return f"line {self.line}: <{one_line(self.tag, NAME)}>{shown}"
-
-    def walk(self) -> Iterator[Element]:
-        """The element and all below it, in the order of the text."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
-
-    def without(self, gone: Element) -> bool:
-        """Take ``gone`` out of what is below this element; whether it was there."""
-        kept = [child for child in self.children if child is not gone]
-        if len(kept) < len(self.children):
-            self.children = kept
-            return True
-        return any(child.without(gone) for child in self.children)
-
-
-def parsed(text: str, tag: str = "mujoco", otherwise: str = "a model of MJCF begins with <mujoco>") -> Element:
-    """Root of the model, which is called ``tag``.
-
-    Raises
-    ------
-    SceneError
-        If it is not XML, has entities, or is nested too deep or too long; with the line.
-    """
-    parser, count = expat.ParserCreate(), 0
-    stack: list[Element] = []
-    roots: list[Element] = []
-
-    def refuse(*_: object) -> None:
-        raise SceneError(f"model: line {parser.CurrentLineNumber}: document types and entities are not read")
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        element = Element(tag, dict(attributes), parser.CurrentLineNumber)
-        if count > MOST_ELEMENTS or len(stack) >= MOST_LEVELS:
-            raise SceneError(
-                f"model: {element}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_LEVELS}"
-            )
-        (stack[-1].children if stack else roots).append(element)
-        stack.append(element)
-
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
-    parser.StartElementHandler, parser.EndElementHandler = start, lambda tag: stack.pop()
-    try:
-        parser.Parse(text.encode(), True)
-    except (expat.ExpatError, ValueError) as error:
-        if isinstance(error, SceneError):
-            raise
-        raise SceneError(f"model: is not XML: {one_line(error)}") from None
-    root = roots[0]
-    if root.tag != tag:
-        raise SceneError(f"model: {root}: {otherwise}")
-    return root
-
-
 def cleaned(root: Element, drop: bool) -> list[str]:
     """Rid the model of what does not move bodies; returns what was left out besides.
 
@@ -139,16 +62,6 @@ def cleaned(root: Element, drop: bool) -> list[str]:
         if top.tag == "worldbody":
             named(top, ("body", "geom"))
     return dropped
-
-
-def named(root: Element, tags: Collection[str]) -> None:
-    """Give elements a name by their line where they have none."""
-    taken: Counter[str] = Counter()
-    for element in root.walk():
-        if element.tag in tags and "name" not in element.attributes:
-            name = f"{element.tag}@{element.line}"
-            taken[name] += 1
-            element.attributes["name"] = name if taken[name] == 1 else f"{name}-{taken[name]}"
 
 
 def rid_of(
@@ -226,14 +139,3 @@ def _made(element: Element) -> float:
             raise SceneError(f"model: {element}: count is not a number") from None
         return inside * max(1.0, count)
     return inside + (element.tag in ("body", "geom"))
-
-
-def text_of(root: Element) -> str:
-    """The model as text again."""
-
-    def built(element: Element) -> ElementTree.Element:
-        made = ElementTree.Element(element.tag, element.attributes)
-        made.extend(built(child) for child in element.children)
-        return made
-
-    return ElementTree.tostring(built(root), encoding="unicode")

@@ -18,20 +18,14 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Setting
-from adapters.model import Model
+from adapters.markup import Element, parsed, text_of
+from adapters.model import ALIGNED, DURATION, Model, pairs_of, unique, unit
 from adapters.mujoco.combination import Contact, contact_of
-from adapters.mujoco.markup import Element, cleaned, parsed, text_of
+from adapters.mujoco.markup import cleaned
 from adapters.mujoco.options import option_settings
 from adapters.mujoco.refusal import Refused
 from adapters.plain import one_line
-from adapters.scene import Body, Box, HalfSpace, Pair, Scene, SceneError, Shape, Sphere
-
-#: Simulated time of a model, which states none [s].
-DURATION = 2.0
-#: Components of directions below this are the round-off of angles that the compiler turned into them.
-ROUNDING = 1e-14
-#: A centre of mass or an axis this far from its shape's, relative to its size, is its shape's.
-ALIGNED = 1e-9
+from adapters.scene import Body, Box, HalfSpace, Scene, SceneError, Shape, Sphere
 
 
 def read(text: str, drop: bool) -> Model:
@@ -42,7 +36,7 @@ def read(text: str, drop: bool) -> Model:
     SceneError
         Naming the element that has no place in a scene, or with the compiler's complaint.
     """
-    root = parsed(text)
+    root = parsed(text, "mujoco", "a model of MJCF begins with <mujoco>")
     dropped = cleaned(root, drop)
     return read_tree(root, drop, dropped, ("body", "geom", "joint", "pair"), root.without, [])
 
@@ -133,7 +127,7 @@ class _Reading:
         gravity = tuple(float(g) + 0.0 for g in m.opt.gravity)
         if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
             gravity = (0.0, 0.0, 0.0)
-        pairs = tuple(_pairs(contacts, bodies))
+        pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
         self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)
@@ -190,12 +184,7 @@ class _Reading:
         for g in shaped:
             weld = int(m.body_weldid[m.geom_bodyid[g]])
             found.append(self._name("body", weld) if weld else self._name("geom", g))
-        seen: Counter[str] = Counter()
-        unique = []
-        for name in (one_line(name, 60) for name in found):
-            seen[name] += 1
-            unique.append(name if seen[name] == 1 and name != "*" else f"{name}~{seen[name]}")
-        return unique
+        return unique(found)
 
     def _body(self, g: int, name: str) -> Body:
         m, d = self.compiled, self.data
@@ -206,7 +195,7 @@ class _Reading:
         if isinstance(shape, HalfSpace):
             if weld:
                 raise Refused("geom", self._name("geom", g), "a plane cannot move")
-            normal = _unit(turn[:, 2])
+            normal = unit(turn[:, 2])
             return Body(name, HalfSpace(normal, float(np.dot(normal, d.geom_xpos[g])) + 0.0), motion="fixed")
         if not weld:
             return Body(name, shape, pose=(*place, *_quaternion(self.mujoco, turn)), motion="fixed")
@@ -303,22 +292,7 @@ class _Reading:
         return settings
 
 
-def _pairs(contacts: Mapping[tuple[int, int], Contact], bodies: tuple[Body, ...]) -> Iterator[Pair]:
-    """Friction of all pairs: the most common as the default, the others by name."""
-    usual = Counter(contact.friction for contact in contacts.values()).most_common(1)[0][0] if contacts else 0.0
-    yield Pair(friction=usual)
-    for (i, j), contact in contacts.items():
-        if contact.friction != usual:
-            yield Pair(bodies[i].name, bodies[j].name, friction=contact.friction)
-
-
-def _unit(vector: Any) -> tuple[float, ...]:
-    """A direction with its round-off taken off."""
-    clean = np.where(np.abs(vector) < ROUNDING, 0.0, vector)
-    return tuple(float(x) + 0.0 for x in clean / np.linalg.norm(clean))
-
-
 def _quaternion(mujoco: Any, turn: Any) -> tuple[float, ...]:
     quaternion = np.zeros(4)
     mujoco.mju_mat2Quat(quaternion, turn.ravel())
-    return _unit(quaternion)
+    return unit(quaternion)

@@ -9,9 +9,10 @@ neither fixed nor floating, meshes and cylinders have no place in a scene.
 
 from __future__ import annotations
 
+from adapters.markup import Element, named, parsed
 from adapters.model import Model
 from adapters.mujoco import model
-from adapters.mujoco.markup import Element, named, parsed, rid_of
+from adapters.mujoco.markup import rid_of
 from adapters.plain import one_line
 from adapters.scene import SceneError
 

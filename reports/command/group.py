@@ -12,6 +12,7 @@ import click
 
 from adapters.engine import EngineError
 from adapters.isolation import IsolationError
+from adapters.model import ReaderMissing
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports.command import statuses
@@ -36,6 +37,8 @@ class _Group(click.Group):
                 return super().main(*args, **kwargs)
             finally:
                 sys.stdout.flush()  # a full disk must be noticed here, not while the interpreter ends
+        except ReaderMissing as error:
+            _leave(str(error), statuses.INCOMPLETE)
         except WRONG_CALL as error:
             _leave(str(error), statuses.WRONG_CALL)
         except TOO_LITTLE as error:

@@ -53,7 +53,7 @@ from validation.workers import TIMEOUT, run_cells
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
-    """Run SCENES (names, globs or files; all by default) and judge them; models (MJCF .xml, URDF .urdf) as well.
+    """Run SCENES (names, globs or files; all by default) and judge them; models as well (.xml, .urdf, .sdf).
 
     With --invariance nothing is stored or judged against a truth: the representative cell of each scene, engine and
     profile is run again with bodies renumbered, the world turned, mirrored, carried along or moved away, with a body

@@ -174,6 +174,10 @@ def test_friction_of_a_pair_is_a_harmonic_mean():
     smooth = (Pair("a", "b", 0.0, 0.5), Pair("b", "c", 0.0, 0.0), Pair("a", "c", 0.0, 0.0))
     scene = Scene("three", 1, 3, tuple(three), smooth, (0.0, 0.0, 0.0), 9.0)
     assert frictions(scene) == [0.5, 0.5, 0.0]
+    # Of three numbers each pair has another: 2 a b/(a + b) of 0.6, 0.3 and 0.5.
+    table = (Pair("a", "b", 0.0, 0.4), Pair("a", "c", 0.0, 0.6 / 1.1), Pair("b", "c", 0.0, 0.375))
+    assert frictions(replace(scene, pairs=table)) == pytest.approx([0.6, 0.3, 0.5], rel=1e-14)
+    assert ENGINE.refuses(replace(scene, pairs=table), "default") is None
     odd = replace(scene, pairs=(Pair("a", "b", 0.0, 0.9), Pair("b", "c", 0.0, 0.9), Pair("a", "c", 0.0, 0.1)))
     assert "harmonic" in ENGINE.refuses(odd, "default")
 

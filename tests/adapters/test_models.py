@@ -126,6 +126,11 @@ def test_hostile_and_wrong_models_are_one_line(text, said):
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
 
 
+def test_the_compiler_s_complaint_names_the_line_of_the_text():
+    with pytest.raises(SceneError, match=r"does not compile it: .*'sise'.* line 4"):
+        reading.read(model_of("\n\n" + BALL.replace("<geom", "\n<geom").replace("size=", "\nsise=")), False)
+
+
 @pytest.mark.parametrize("what", ["damping", "armature"])
 @pytest.mark.parametrize("bad", [0, 1, 2])
 def test_of_several_bodies_the_one_is_named_whose_joint_is_no_free_flight(what, bad):

@@ -94,6 +94,10 @@ def test_a_robot_in_urdf_runs_as_well(tmp_path):
     assert "line 3: <joint> 'shoulder': a revolute joint" in arm.output and len(arm.output.splitlines()) == 1
 
 
+#: Endings of the models, and what must be installed to read them.
+LANGUAGES = {".xml": "mujoco", ".urdf": "mujoco", ".sdf": "pydrake", ".world": "pydrake"}
+
+
 def _said_of_models():
     """Rows of the two tables of `tests/models/README.md`, by model."""
     text = (MODELS / "README.md").read_text()
@@ -105,16 +109,16 @@ def _said_of_models():
 
 def test_the_table_of_models_speaks_of_each_and_of_twenty_that_run_on_three_engines_and_the_reference():
     said = _said_of_models()
-    assert set(said) == {path.name for path in MODELS.iterdir() if path.suffix in (".xml", ".urdf")} and len(said) >= 30
+    assert set(said) == {path.name for path in MODELS.iterdir() if path.suffix in LANGUAGES} and len(said) >= 30
     everywhere = [name for name, cells in said.items() if len(cells) == 4
                   and all(cell in ("2-D", "3-D", "2-D and 3-D") for cell in cells)]  # fmt: skip
     assert len(everywhere) >= 20
 
 
 @pytest.mark.skipif(not os.environ.get("CROSSCHECK_SOAK"), reason="half a minute a model; CROSSCHECK_SOAK=1")
-@pytest.mark.parametrize("name", sorted(path.name for path in MODELS.iterdir() if path.suffix in (".xml", ".urdf")))
+@pytest.mark.parametrize("name", sorted(path.name for path in MODELS.iterdir() if path.suffix in LANGUAGES))
 def test_a_model_runs_as_the_table_says(name, tmp_path):
-    for package in ("pymunk", "pybullet"):
+    for package in ("pymunk", "pybullet", LANGUAGES[Path(name).suffix]):
         pytest.importorskip(package)
     engines = ("reference", "bullet", "mujoco", "chipmunk")
     words = [word for engine in engines for word in ("--engine", engine)]
@@ -134,14 +138,6 @@ def test_a_model_runs_as_the_table_says(name, tmp_path):
             "" if cell == "not planar" or cell.startswith("-") else cell.partition(";")[0]
         )
         assert bool(bad) == ("certificate refuses it" in cell)
-
-
-def test_sdf_is_refused_in_one_line_that_says_what_is_read(tmp_path):
-    model = tmp_path / "table.sdf"
-    model.write_text("<sdf version='1.9'><model name='table'/></sdf>")
-    refused = call("run", model, "--out", tmp_path / "no", status=(2,))
-    assert "SDF is not read" in refused.output and "URDF (.urdf)" in refused.output
-    assert len(refused.output.splitlines()) == 1 and not (tmp_path / "no").exists()
 
 
 def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):

@@ -34,10 +34,6 @@ LONGEST = 60.0
 MOST = 2**24
 
 
-#: Languages that people have models in and no reader is for, and what to do.
-UNREAD = {".sdf": "SDF is not read, no parser of it on its own installs with pip; MJCF (.xml) and URDF (.urdf) are"}
-
-
 def is_model(path: Path) -> bool:
     """Whether an engine of ours reads files with this ending as models."""
     return path.suffix.lower() not in (".toml", ".json") and model.reader_of(path.suffix) is not None
@@ -48,7 +44,7 @@ def text_of(text: str, suffix: str, drop: bool) -> str:
     """The model in ``text`` as the JSON that stands for it; see `adapters.model.read`."""
     engine = model.reader_of(suffix)
     if engine is None:
-        raise SceneError(f"model: {UNREAD.get(suffix.lower(), f'no engine reads files ending in {suffix}')}")
+        raise SceneError(f"model: no engine reads files ending in {suffix}")
     found = model.read(engine, suffix, text, drop)
     return json.dumps({"engine": engine, **found.as_dict()})
 
