@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.scene import Box, Disc, Scene, Sphere
+from adapters.scene import Body, Box, Disc, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 
@@ -20,25 +21,41 @@ from adapters.trajectory import Trajectory
 ROUND_OFF = 1e-12
 
 
+def at_plate(scene: Scene) -> tuple[Body, Body, float] | None:
+    """Plate, ball and the distance of their centres at which they touch [m], of a ball straight at a fixed box.
+
+    None for any other scene, and where something else than the plate could act on the ball.
+    """
+    if len(scene.bodies) != 2 or any(scene.gravity):
+        return None
+    plate, ball = scene.bodies
+    if plate.motion != "fixed" or not isinstance(plate.shape, Box) or not isinstance(ball.shape, Disc | Sphere):
+        return None
+    if any(ball.twist[1:]):
+        return None
+    return plate, ball, plate.shape.half_extents[0] + ball.shape.radius
+
+
+def flown(scene: Scene, x: Array, dt: float) -> Trajectory:
+    """Trajectory of a ball (the second body) that keeps its velocity, at ``x`` (steps + 1,) along its way [m]."""
+    pose = np.array([[body.pose for body in scene.bodies]] * len(x))
+    pose[:, 1, 0] = x
+    twist = np.array([[body.twist for body in scene.bodies]] * len(x))
+    return Trajectory(np.arange(len(x), dtype=np.float64) * dt, pose, twist, None, dt, "completed")
+
+
 def passing_law(metric: str, round_off: float = ROUND_OFF) -> Law:
     """A ball that flies straight at a fixed box in free space, and is never in it where a step ends: it flies on."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        if len(scene.bodies) != 2 or any(scene.gravity):
+        posed = at_plate(scene)
+        if posed is None:
             return None
-        plate, ball = scene.bodies
-        if plate.motion != "fixed" or not isinstance(plate.shape, Box) or not isinstance(ball.shape, Disc | Sphere):
-            return None
-        if any(ball.twist[1:]):
-            return None
-        times = np.array([k * dt for k in range(step_count(scene.duration, dt) + 1)])
-        x, reach = ball.pose[0] + ball.twist[0] * times, plate.shape.half_extents[0] + ball.shape.radius
+        plate, ball, reach = posed
+        x = ball.pose[0] + ball.twist[0] * (dt * np.arange(step_count(scene.duration, dt) + 1, dtype=np.float64))
         if (np.abs(x - plate.pose[0]) <= reach).any() or not (x[0] - plate.pose[0]) * (x[-1] - plate.pose[0]) < 0.0:
             return None
-        pose = np.array([[body.pose for body in scene.bodies]] * len(times))
-        pose[:, 1, 0] = x
-        twist = np.array([[body.twist for body in scene.bodies]] * len(times))
-        value = measure(scene, Trajectory(times, pose, twist, None, dt, "completed"))[metric][0]
+        value = measure(scene, flown(scene, x, dt))[metric][0]
         return None if value is None else (value, round_off * (1.0 + abs(ball.twist[0]) * scene.duration))
 
     return law

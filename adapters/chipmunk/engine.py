@@ -20,6 +20,8 @@ from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
+from adapters.probes import SLIDE_TIME
+from adapters.receipts import IMPULSE_SHARE
 from adapters.scene import Scene
 
 
@@ -122,5 +124,14 @@ class ChipmunkEngine(Engine):
         return "\n".join(lines)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing: single contacts and constant forces are exact here, in both profiles."""
-        return {}
+        """Single contacts and constant forces are exact here; totals of impulses are not where old ones are kept.
+
+        A contact that parts and touches again within the persistence keeps its old impulse and does not apply it: what
+        it tells is that plus what acted, so that no step tells less than what acted in it, nor more than all that has
+        acted so far. Over the probe's N steps that is from 1 to N times the sum.
+        """
+        kept = {s.name: s.value for s in self.settings(profile, needs, dt)}["collision_persistence"] > 1
+        if not kept or needs.restitution == 0.0:
+            return {}
+        half, because = 0.5 * (SLIDE_TIME / dt - 1.0), "contacts that re-form tell their old impulses once more"
+        return {"impulse": Declared(1.0 + half, half + IMPULSE_SHARE, because)}

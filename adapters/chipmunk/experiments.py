@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.chipmunk.experiments_elsewhere import ELSEWHERE
 from adapters.chipmunk.experiments_on_loads import ON_LOADS
 from adapters.chipmunk.experiments_on_rods import ON_RODS
 from adapters.experiment import Cured, Experiment
@@ -170,3 +171,5 @@ EXPERIMENTS += tuple(
 EXPERIMENTS += ON_LOADS
 
 EXPERIMENTS += ON_RODS
+
+EXPERIMENTS += ELSEWHERE

@@ -12,13 +12,17 @@ import pytest
 pytest.importorskip("pymunk")
 
 from adapters.chipmunk import ChipmunkEngine
+from adapters.chipmunk.laws import shoved_law
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors
 from adapters.engine import EngineError
 from adapters.needs import needs
+from adapters.probes import PROBES, Case
+from adapters.receipts import receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
+from validation.catalogue import CATALOGUE
 
 ENGINE = ChipmunkEngine()
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
@@ -441,6 +445,42 @@ def test_default_persistence_over_reports_impulses_of_a_settling_ball_and_tuned_
         excess[profile] = trajectory.contacts.impulse_between(0, 1)[:, 1].sum() / gained - 1.0
     assert excess["default"] == pytest.approx(0.0118, abs=1e-4)  # fact sheet: 1.5 % for another drop
     assert abs(excess["tuned"]) < 1e-12
+
+
+def test_receipts_of_impulses_allow_what_kept_ones_add_and_nothing_else() -> None:
+    box = unit_box("box", 0.0, 0.5)
+    resting, bouncing = (needs(make(FLOOR, box, e=e, mu=0.1, gravity=(0.0, -9.81))) for e in (0.0, 1.0))
+    told = ENGINE.declares("default", bouncing, DT)["impulse"]
+    # From what acted to as many times as much as a slide of half a second has steps.
+    assert (told.value - told.band, told.value + told.band) == pytest.approx((1.0, 120.0), abs=2e-6)
+    assert ENGINE.declares("default", resting, DT) == {} == ENGINE.declares("tuned", bouncing, DT)
+    assert {r.quantity: r for r in receipts(ENGINE, "default", bouncing, DT)}["impulse"].holds
+    case, slide = Case(2, 1.0, 0.1, DT, ENGINE.scheme("default").position_offset, EPS), PROBES["slide"]
+    scene, ratios = slide.make(case), {}
+    for profile in PROFILES:
+        chosen = {s.name: s.value for s in ENGINE.settings(profile, bouncing, DT)}
+        ratios[profile] = slide.read(case, scene, run(ENGINE, scene, DT, chosen, slide.sampling(case, scene)))[
+            "impulse"
+        ]
+    assert 2.0 < ratios["default"][0] < 120.0 and ratios["tuned"][0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize(("params", "dt"), [({}, 1 / 120), ({"v": 200.0, "thickness": 0.2}, DT)])
+def test_what_is_found_beyond_the_middle_of_a_plate_is_predicted_to_pass(profile: str, params: dict, dt: float) -> None:
+    canonical = CATALOGUE["thin_wall"]
+    scene = canonical.scene(2, params)
+    chosen = {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)}
+    found = canonical.measure(scene, run(ENGINE, scene, dt, chosen, Sampling(1, None)))
+    for metric in ("rebound_ratio", "beyond"):
+        said = shoved_law(profile, metric)(scene, dt, canonical.measure)
+        assert said is not None and abs(found[metric][0] - said[0]) <= said[1] < 1e-9
+
+
+def test_the_law_of_what_passes_is_silent_about_what_is_found_before_the_middle() -> None:
+    canonical = CATALOGUE["thin_wall"]
+    for params in ({}, {"v": 1.0}, {"v": 200.0}):  # at 1/240 s: found in time twice, never in it the third time
+        assert shoved_law("default", "beyond")(canonical.scene(2, params), DT, canonical.measure) is None
 
 
 def test_the_stick_threshold_is_as_sharp_as_the_fact_sheet_says() -> None:

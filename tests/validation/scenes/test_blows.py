@@ -450,3 +450,40 @@ def test_the_balls_touch_each_other_or_the_wall_whenever_they_are_told_to_meet(r
         assert small_after + ratio * large_after == pytest.approx((-1) ** (k % 2) * small + ratio * large)
         assert small_after**2 + ratio * large_after**2 == pytest.approx(small**2 + ratio * large**2)
         small, large = small_after, large_after
+
+
+def stepped_balls(params, dt, phase):
+    """Speeds of the large ball over time where impacts are found at the end of a step: by another way than the sum."""
+    p, e = params, params["e"]
+    heights, v = [p["v"] * p["delay"] + phase * dt * p["v"], 0.0], [-p["v"], -p["v"]]
+    gap, mass, last, time = (1.0 + e) * p["v"] * p["apart"], p["ratio"], 0.0, 0.0
+    heights[1] = heights[0] + gap
+    while time < 60.0:
+        heights = [h + u * dt for h, u in zip(heights, v, strict=True)]
+        time += dt
+        if heights[0] <= 0.0 and v[0] < 0.0:
+            v[0], last = -e * v[0], time
+        if heights[1] <= heights[0] and v[1] < v[0]:
+            change = (1.0 + e) * (v[0] - v[1]) / (1.0 + mass)
+            v, last = [v[0] - change, v[1] + change * mass], time
+    return last
+
+
+@pytest.mark.parametrize(("ratio", "e"), [(3.0, 0.9), (1.0, 0.5), (3.0, 0.5)])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
+def test_a_method_of_steps_finds_the_last_blow_of_stacked_balls_no_later_than_told(ratio, e, dt):
+    params = CATALOGUE["stacked_balls"].complete({"ratio": ratio, "e": e})
+    last = stacked_balls.impacts(params)[-1][0]
+    late = [stepped_balls(params, dt, phase) - phase * dt - last for phase in np.linspace(0.0, 0.99, 7)]
+    most = stacked_balls.lateness(params, dt)
+    assert max(late) <= most * (1.0 + 1e-9)
+    assert max(abs(each) for each in late) > dt  # impacts before it have moved it by more than its own step
+
+
+def test_stacked_balls_go_on_until_a_step_of_the_suites_has_found_the_last_blow():
+    canonical = CATALOGUE["stacked_balls"]
+    slow, usual = (canonical.scene(2, {"ratio": r, "e": 0.9}) for r in (3.0, 10.0))
+    ends = [s.duration - stacked_balls.impacts(s.params)[-1][0] for s in (slow, usual)]
+    assert ends[1] == pytest.approx(stacked_balls.AFTERMATH) and ends[0] > 1.0
+    judged = {dt: [c.truth is not None for c in canonical.checks(slow, dt)] for dt in (1 / 240, 1 / 60)}
+    assert all(judged[1 / 240]) and not any(judged[1 / 60])
