@@ -97,7 +97,7 @@ class _Layout:
             return np.array([*(of(body) for body in free), last], kind)
 
         still, many = (0.0,) * 3, len(free) + 1
-        blank = [np.zeros(shape, kind) for shape in ((many, 3, 3), (many, 3, 3), *((many, 3),) * 4, (many,))]
+        blank = [np.zeros(shape, kind) for shape in ((many, 5), (many, 5), *((many, 3),) * 4, (many,))]
         self.bodies = Bodies(
             rows(lambda body: body.pose[:3], still),
             rows(lambda body: body.pose[3:], (1.0, 0.0, 0.0, 0.0)),
