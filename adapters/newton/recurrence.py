@@ -162,8 +162,8 @@ def _rotate(q: Numbers, k: int, dt: float, half: float, x: float, y: float, z: f
         y + (b * w + c * x - a * z),
         z + (c * w + a * y - b * x),
     )
-    size = math.sqrt(w * w + x * x + y * y + z * z)
-    q[k, 0], q[k, 1], q[k, 2], q[k, 3] = w / size, x / size, y / size, z / size
+    inverse = (half + half) / math.sqrt(w * w + x * x + y * y + z * z)
+    q[k, 0], q[k, 1], q[k, 2], q[k, 3] = w * inverse, x * inverse, y * inverse, z * inverse
 
 
 @inner_kernel
