@@ -111,16 +111,18 @@ class _Layout:
             *blank,
         )
         may = list(self._candidates())
-        #: The two bodies of each pair, in the scene's numbers; a plane stands for the first of them.
-        floor = self.planes[0] if self.planes else -1
-        pairs = sorted({(a, b) for a, b, *_ in may})
-        self.pairs = [(floor if a == many - 1 else self.free[a], self.free[b]) for a, b in pairs]
-        parts = list(zip(*may, strict=True)) if may else [()] * 8
-        shapes = ((0,), (0,), (0, 3), (0, 3), (0,), (0, 2), (0,), (0,))
-        given = [np.array(part) if may else np.zeros(shape) for part, shape in zip(parts, shapes, strict=True)]
-        which = np.array([pairs.index((a, b)) for a, b, *_ in may], np.int64)
+        #: The two bodies of each pair whose impulses are told, in the scene's numbers.
+        self.pairs = sorted({between for between, *_ in may})
+        bodies = sorted({(a, b) for _, a, b, *_ in may})
+        parts = list(zip(*may, strict=True)) if may else [()] * 9
+        shapes = ((0, 2), (0,), (0,), (0, 3), (0, 3), (0,), (0, 2), (0,), (0,))
+        _, first, second, *given = [
+            np.array(part) if may else np.zeros(shape) for part, shape in zip(parts, shapes, strict=True)
+        ]
+        which = np.array([bodies.index((a, b)) for _, a, b, *_ in may], np.int64)
+        told = np.array([self.pairs.index(between) for between, *_ in may], np.int64)
         self.may = Candidates(
-            given[0].astype(np.int64), given[1].astype(np.int64), which, *(part.astype(kind) for part in given[2:])
+            first.astype(np.int64), second.astype(np.int64), which, told, *(part.astype(kind) for part in given)
         )
         most = max(len(may), 1)
         self.touching = Touching(
@@ -145,8 +147,8 @@ class _Layout:
         )  # fmt: skip
 
     def _candidates(self) -> Any:
-        """Rows of `recurrence.Candidates` but for the number of the pair."""
-        world = len(self.free)
+        """Rows of `recurrence.Candidates`, with the two bodies in place of the numbers of pairs."""
+        world, still = len(self.free), ((0.0,) * 3, (0.0,) * 3, 0.0)
         for i, k in enumerate(self.free):
             body = self.scene.bodies[k]
             radius = body.shape.radius if isinstance(body.shape, Sphere) else 0.0
@@ -156,12 +158,12 @@ class _Layout:
                 pair = self.scene.material(body.name, plane.name)
                 normal, offset = held_plane(plane.shape)
                 for corner in _corners(body):
-                    yield world, i, corner, normal, offset, (0.0, radius), pair.friction, pair.restitution
+                    yield (j, k), world, i, corner, normal, offset, (0.0, radius), pair.friction, pair.restitution
             for i2 in range(i + 1, world):
                 other = self.scene.bodies[self.free[i2]]
                 if radius and isinstance(other.shape, Sphere):
                     pair, radii = self.scene.material(body.name, other.name), (radius, other.shape.radius)
-                    yield i, i2, (0.0,) * 3, (0.0,) * 3, 0.0, radii, pair.friction, pair.restitution
+                    yield (k, self.free[i2]), i, i2, *still, radii, pair.friction, pair.restitution
 
 
 def held_plane(plane: HalfSpace) -> tuple[tuple[float, float, float], float]:
@@ -225,11 +227,9 @@ def _moved(
     )  # fmt: skip
     run(layout.bodies, layout.may, layout.touching, layout.chosen, told, *layout.room)
     flat = scene.dimension == 2
-    record = None
-    if len(layout.planes) <= 1:  # whose impulse it is must be clear: planes are one body here
-        # Unknown where rebounds are solved as well.
-        impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
-        record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
+    # Unknown where rebounds are solved as well.
+    impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
+    record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
     return told_trajectory(spatial, layout.free, told.pose, told.twist, record, dt, flat)
 
 

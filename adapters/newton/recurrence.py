@@ -46,8 +46,10 @@ class Candidates(NamedTuple):
 
     a: Numbers
     b: Numbers
-    #: Number of the pair of bodies, in rising order of both.
+    #: Number of the pair of bodies, in rising order of both; planes are one body.
     pair: Numbers
+    #: Number of the pair of the scene's bodies, of which impulses are told: each plane is one of its own.
+    told: Numbers
     at: Numbers
     #: Normal and offset of the plane.
     normal: Numbers
@@ -362,9 +364,9 @@ def _sweep(
                 if body != world:
                     free, total = free + one, total + bodies.many[body]
             share = free / total if chosen.weighted else one
-            pressed[may.pair[c]] = 1
+            pressed[may.told[c]] = 1
             for d in range(3):
-                impulse[may.pair[c], d] += touching.share[k, d] * share
+                impulse[may.told[c], d] += touching.share[k, d] * share
     _take(bodies, chosen)
     return found
 
