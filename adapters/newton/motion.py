@@ -67,8 +67,10 @@ LONGER = 1.618e-4
 ROUNDINGS = 12.0
 #: Round-off of a single number, as a share of it.
 UNIT = 2.0**-24
-#: Share of a value beyond which a band says nothing about it.
-VAGUE = 0.02
+#: Share of a value beyond which a band says nothing about it: less than one digit is told.
+VAGUE = 0.1
+#: Most that roundings make of a number that would be nothing: ten of 2^-24 in each of a thousand steps, to one side.
+ROUNDED_OFF = 1e4 * UNIT
 #: Most bodies that are followed.
 MOST_BODIES = 12
 
@@ -148,7 +150,7 @@ class _Layout:
 
     def _candidates(self) -> Any:
         """Rows of `recurrence.Candidates`, with the two bodies in place of the numbers of pairs."""
-        world, still = len(self.free), ((0.0,) * 3, (0.0,) * 3, 0.0)
+        world, still = len(self.free), (0.0,) * 3
         for i, k in enumerate(self.free):
             body = self.scene.bodies[k]
             radius = body.shape.radius if isinstance(body.shape, Sphere) else 0.0
@@ -159,14 +161,20 @@ class _Layout:
                 normal, offset = held_plane(plane.shape)
                 for corner in _corners(body):
                     yield (j, k), world, i, corner, normal, offset, (0.0, radius), pair.friction, pair.restitution
-            for i2 in range(i + 1, world):
-                other = self.scene.bodies[self.free[i2]]
-                if radius and isinstance(other.shape, Sphere):
-                    pair, radii = self.scene.material(body.name, other.name), (radius, other.shape.radius)
-                    yield (k, self.free[i2]), i, i2, *still, radii, pair.friction, pair.restitution
+            for i2, k2 in enumerate(self.free):
+                other = self.scene.bodies[k2]
+                size, thick = still, 0.0
+                if isinstance(other.shape, Box):
+                    x, y, z = other.shape.half_extents
+                    size = (x, y, z)
+                elif isinstance(other.shape, Sphere) and i2 < i:
+                    thick = other.shape.radius
+                if radius and (thick or size != still):
+                    pair = self.scene.material(body.name, other.name)
+                    yield (k2, k), i2, i, size, still, 0.0, (thick, radius), pair.friction, pair.restitution
 
 
-def held_plane(plane: HalfSpace) -> tuple[tuple[float, float, float], float]:
+def held_plane(plane: HalfSpace) -> tuple[tuple[float, ...], float]:
     """Normal and offset [m] of a spatial half-space as Newton has them.
 
     It keeps a plane as a turn of the z axis, the quaternion (z x n, 1 + z . n) made to size one in singles, and turns
@@ -174,14 +182,12 @@ def held_plane(plane: HalfSpace) -> tuple[tuple[float, float, float], float]:
     [ModelBuilder.add_shape_plane; warp, quat_between_vectors and quat_rotate]
     """
     given = np.array(plane.normal, float) / np.linalg.norm(plane.normal)
-    x, y, z = np.float32(given)
+    x, y, z = given.astype(np.float32)
     size = np.sqrt(x * x + y * y + z * z)
-    x, y, z = x / size, y / size, z / size
-    a, b, w = -y, x, np.float32(1.0) + z
+    a, b, w = -y / size, x / size, np.float32(1.0) + z / size
     inverse = np.float32(1.0) / np.sqrt(a * a + b * b + w * w)
     a, b, w = a * inverse, b * inverse, w * inverse
-    double = w + w
-    normal = (float(b * double), float(-a * double), float(w * double - np.float32(1.0)))
+    normal = tuple(float(each) for each in (b * (w + w), -a * (w + w), w * (w + w) - np.float32(1.0)))
     return normal, float(np.float32(plane.offset * given) @ np.array(normal))
 
 
@@ -193,17 +199,17 @@ def _corners(body: Body) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def followed(scene: Scene) -> bool:
-    """Whether the recurrence speaks about a spatial scene: fixed half-spaces, and balls or one box that move freely."""
+    """Whether the recurrence speaks about a spatial scene: fixed half-spaces, free balls and at most one free box."""
     free = [body for body in scene.bodies if body.motion == "free"]
     rest = [body for body in scene.bodies if body.motion != "free"]
-    balls = all(isinstance(body.shape, Sphere) for body in free)
-    box = len(free) == 1 and isinstance(free[0].shape, Box)
+    boxes = [body for body in free if isinstance(body.shape, Box)]
+    known = len(boxes) <= 1 and all(isinstance(body.shape, Sphere | Box) for body in free)
     flat = all(
         body.motion == "fixed" and isinstance(body.shape, HalfSpace) and not any(body.surface_velocity)
         for body in rest
     )  # fmt: skip
     told = means(scene, "restitution") is not None and means(scene, "friction") is not None
-    return 0 < len(free) <= MOST_BODIES and (balls or box) and flat and told
+    return 0 < len(free) <= MOST_BODIES and known and flat and told
 
 
 def _moved(
@@ -322,26 +328,31 @@ def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generato
 
 
 def _predicted(
-    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None
+    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None, least: float
 ) -> Prediction | None:
     value, band = _readings(_Asked(scene, measure), dt, profile, iterations).get(metric, (0.0, math.inf))
     band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
-    return (value, band) if 0.0 < band <= VAGUE * abs(value) else None
+    return (value, band) if 0.0 < band <= max(VAGUE * abs(value), least) else None
 
 
-def motion_law(metric: str, profile: str) -> Law:
-    """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference."""
+def motion_law(metric: str, profile: str, balance: bool = False) -> Law:
+    """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference.
+
+    ``balance``: it is the difference of numbers of order 1 that would be the same, so that all of it may be round-off.
+    """
+    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, None)
+        return _predicted(scene, dt, measure, metric, profile, None, least)
 
     return law
 
 
-def swept_law(metric: str, profile: str) -> AskedLaw:
+def swept_law(metric: str, profile: str, balance: bool = False) -> AskedLaw:
     """As `motion_law`, at another number of sweeps."""
+    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, iterations)
+        return _predicted(scene, dt, measure, metric, profile, iterations, least)
 
     return law

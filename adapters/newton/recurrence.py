@@ -42,7 +42,10 @@ class Bodies(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """What may touch: a corner (or centre) ``at`` of body ``b`` and a plane, or two balls ``a`` and ``b``."""
+    """What may touch: a corner (or centre) ``at`` of body ``b`` and a plane, a ball ``b`` and a ball or box ``a``.
+
+    Of a box ``at`` is half its size.
+    """
 
     a: Numbers
     b: Numbers
@@ -54,7 +57,7 @@ class Candidates(NamedTuple):
     #: Normal and offset of the plane.
     normal: Numbers
     offset: Numbers
-    #: Radii of both, 0 of planes and corners.
+    #: Radii of both, 0 of planes, boxes and corners.
     radii: Numbers
     friction: Numbers
     restitution: Numbers
@@ -186,6 +189,34 @@ def _felt(bodies: Bodies, k: int, x: float, y: float, z: float) -> float:
 
 
 @inner_kernel
+def _clipped(value: float, most: float) -> float:
+    return max(-most, min(most, value))
+
+
+@inner_kernel
+def _on_box(
+    bodies: Bodies, may: Candidates, c: int, n: Numbers, points: Numbers, arms: Numbers, zero: float
+) -> float:  # fmt: skip
+    """Distance of a ball from the nearest point of a box, whose contact is laid out; a centre must lie outside."""
+    x, y, t, radius = bodies.x[may.b[c]], bodies.x[may.a[c]], bodies.turn[may.b[c]], may.radii[c, 1]
+    s, half = bodies.turn[may.a[c]], may.at[c]
+    at = arms[0]
+    at[0], at[1], at[2] = _into(s, x[0] - y[0], x[1] - y[1], x[2] - y[2])
+    far = zero
+    for d in range(3):
+        points[0, d] = _clipped(at[d], half[d])
+        at[d] -= points[0, d]
+        far += at[d] * at[d]
+    far = math.sqrt(far)
+    n[0], n[1], n[2] = _out(s, at[0] / far, at[1] / far, at[2] / far)
+    _copy(arms[0], points[0])
+    points[1, 0], points[1, 1], points[1, 2] = zero, zero, zero
+    ux, uy, uz = _into(t, n[0], n[1], n[2])
+    arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
+    return far - radius
+
+
+@inner_kernel
 def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) -> int:
     """Contacts where the step begins; how many."""
     count, zero = 0, chosen.plain[0]
@@ -213,6 +244,9 @@ def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) 
                 arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
             else:
                 _copy(arms[1], points[1])
+        elif not may.radii[c, 0] > zero:
+            if not _on_box(bodies, may, c, n, points, arms, zero) < chosen.reach[0]:
+                continue
         else:
             y = bodies.x[a]
             dx, dy, dz = x[0] - y[0], x[1] - y[1], x[2] - y[2]
@@ -241,11 +275,6 @@ def _asks(bodies: Bodies, body: int, sign: float, push: Numbers, x: float, y: fl
     bodies.twist[body, 0] += x
     bodies.twist[body, 1] += y
     bodies.twist[body, 2] += z
-
-
-@inner_kernel
-def _clipped(value: float, most: float) -> float:
-    return max(-most, min(most, value))
 
 
 @inner_kernel
