@@ -18,6 +18,7 @@ _WALLS = (
     "further from it; numbers are singles"
 )
 _ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
+_ROCKS = f"{_SWEPT}; as shipped what rubs resists rolling as well"
 _SPINS = _ROLLS + ", and a spin gains or loses what rounding leaves of its quaternion's size"
 _DIGITS = "numbers are singles: an overlap of 0.1 mm has three digits, and a load is made of it"
 _PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
@@ -52,6 +53,7 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "tilt_table": (_SWEPT, ("moved", "edge_moved", "passing_spin", "passing_time", "turned")),
     "painleve": (_SWEPT, ("edge_moved", "lifted", "passing_spin", "passing_time")),
     "ladder": (_SWEPT, ("let_go", "passing_time", "moved", "wall_load", "floor_load")),
+    "rocker": (_ROCKS, ("amplitude", "swing_time")),
     "rocking_block": (_SWEPT, tuple(f"{metric}[{n}]" for metric in ("amplitude", "landing") for n in range(1, 4))),
     "starved": (_SWEPT, ("displacement", "load_error", "penetration", "kinetic_energy")),
     "pivot": (_SWEPT, ("edge_moved", "passing_time")),

@@ -78,7 +78,7 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class _Layout:
-    """Arrays of free balls and boxes among fixed half-spaces, as `recurrence` takes them, in one kind of numbers."""
+    """Arrays of free balls and boxes among fixed ones and half-spaces, as `recurrence` takes them; numbers of one kind."""
 
     def __init__(
         self,
@@ -92,17 +92,21 @@ class _Layout:
 
         self.kind, self.scene = kind, scene
         self.free = [k for k, body in enumerate(scene.bodies) if body.motion == "free"]
-        self.planes = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
-        free = [scene.bodies[k] for k in self.free]
+        rest = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
+        self.planes = [k for k in rest if isinstance(scene.bodies[k].shape, HalfSpace)]
+        #: Numbers in the scene of all bodies but planes, those that are free first.
+        self.solid = self.free + [k for k in rest if k not in self.planes]
 
         def rows(of: Callable[[Body], Any], last: Any) -> Numbers:
-            return np.array([*(of(body) for body in free), last], kind)
+            """One row for each free body, ``last`` for what is fixed."""
+            free = [of(scene.bodies[k]) for k in self.free]
+            return np.array([*free, *(last for _ in self.solid[len(free) :]), last], kind)
 
-        still, many = (0.0,) * 3, len(free) + 1
+        still, many = (0.0,) * 3, len(self.solid) + 1
         blank = [np.zeros(shape, kind) for shape in ((many, 5), (many, 5), *((many, 3),) * 4, (many,))]
         self.bodies = Bodies(
-            rows(lambda body: body.pose[:3], still),
-            rows(lambda body: body.pose[3:], (1.0, 0.0, 0.0, 0.0)),
+            np.array([*(scene.bodies[k].pose[:3] for k in self.solid), still], kind),
+            np.array([*(scene.bodies[k].pose[3:] for k in self.solid), (1.0, 0.0, 0.0, 0.0)], kind),
             rows(lambda body: body.twist[:3], still),
             rows(lambda body: body.twist[3:], still),
             rows(lambda body: 1.0 / body.mass, 0.0),
@@ -115,13 +119,14 @@ class _Layout:
         may = list(self._candidates())
         #: The two bodies of each pair whose impulses are told, in the scene's numbers.
         self.pairs = sorted({between for between, *_ in may})
-        bodies = sorted({(a, b) for _, a, b, *_ in may})
+        first_fixed = len(self.free)
+        bodies = sorted({(min(a, first_fixed), min(b, first_fixed)) for _, a, b, *_ in may})
         parts = list(zip(*may, strict=True)) if may else [()] * 9
         shapes = ((0, 2), (0,), (0,), (0, 3), (0, 3), (0,), (0, 2), (0,), (0,))
         _, first, second, *given = [
             np.array(part) if may else np.zeros(shape) for part, shape in zip(parts, shapes, strict=True)
         ]
-        which = np.array([bodies.index((a, b)) for _, a, b, *_ in may], np.int64)
+        which = np.array([bodies.index((min(a, first_fixed), min(b, first_fixed))) for _, a, b, *_ in may], np.int64)
         told = np.array([self.pairs.index(between) for between, *_ in may], np.int64)
         self.may = Candidates(
             first.astype(np.int64), second.astype(np.int64), which, told, *(part.astype(kind) for part in given)
@@ -146,11 +151,12 @@ class _Layout:
             numbers(chosen["torsional"], chosen["rolling"]), numbers(2.0 * chosen["gap"]), numbers(STOPPED * STOPPED),
             numbers(float(kind(LEAST_APPROACH) * pull * kind(dt))), numbers(*blur), numbers(0.0, 0.5, 1.0, 2.0),
             chosen["iterations"], int(chosen["weighted"]), int(chosen["rebounds"]), chosen["rebound_iterations"], INNER,
+            len(self.free),
         )  # fmt: skip
 
     def _candidates(self) -> Any:
         """Rows of `recurrence.Candidates`, with the two bodies in place of the numbers of pairs."""
-        world, still = len(self.free), (0.0,) * 3
+        world, still = len(self.solid), (0.0,) * 3
         for i, k in enumerate(self.free):
             body = self.scene.bodies[k]
             radius = body.shape.radius if isinstance(body.shape, Sphere) else 0.0
@@ -161,17 +167,23 @@ class _Layout:
                 normal, offset = held_plane(plane.shape)
                 for corner in _corners(body):
                     yield (j, k), world, i, corner, normal, offset, (0.0, radius), pair.friction, pair.restitution
-            for i2, k2 in enumerate(self.free):
+        for i, k in enumerate(self.solid):
+            body = self.scene.bodies[k]
+            for i2, k2 in enumerate(self.solid):
                 other = self.scene.bodies[k2]
+                # Each pair once, and a ball second; what is fixed meets only what is free.
+                if not isinstance(body.shape, Sphere) or min(i, i2) >= len(self.free) or i == i2:
+                    continue
                 size, thick = still, 0.0
                 if isinstance(other.shape, Box):
                     x, y, z = other.shape.half_extents
                     size = (x, y, z)
                 elif isinstance(other.shape, Sphere) and i2 < i:
                     thick = other.shape.radius
-                if radius and (thick or size != still):
-                    pair = self.scene.material(body.name, other.name)
-                    yield (k2, k), i2, i, size, still, 0.0, (thick, radius), pair.friction, pair.restitution
+                else:
+                    continue
+                pair, radii = self.scene.material(body.name, other.name), (thick, body.shape.radius)
+                yield (k2, k), i2, i, size, still, 0.0, radii, pair.friction, pair.restitution
 
 
 def held_plane(plane: HalfSpace) -> tuple[tuple[float, ...], float]:
@@ -199,17 +211,21 @@ def _corners(body: Body) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def followed(scene: Scene) -> bool:
-    """Whether the recurrence speaks about a spatial scene: fixed half-spaces, free balls and at most one free box."""
+    """Whether the recurrence speaks about a spatial scene: free balls, at most one free box, and fixed half-spaces.
+
+    Balls may be fixed as well; so may boxes, if no box is free.
+    """
     free = [body for body in scene.bodies if body.motion == "free"]
     rest = [body for body in scene.bodies if body.motion != "free"]
-    boxes = [body for body in free if isinstance(body.shape, Box)]
-    known = len(boxes) <= 1 and all(isinstance(body.shape, Sphere | Box) for body in free)
-    flat = all(
-        body.motion == "fixed" and isinstance(body.shape, HalfSpace) and not any(body.surface_velocity)
+    boxes = sum(isinstance(body.shape, Box) for body in free)
+    known = boxes <= 1 and all(isinstance(body.shape, Sphere | Box) for body in free)
+    allowed = HalfSpace | Sphere if boxes else HalfSpace | Sphere | Box
+    still = all(
+        body.motion == "fixed" and isinstance(body.shape, allowed) and not any(body.surface_velocity)
         for body in rest
     )  # fmt: skip
     told = means(scene, "restitution") is not None and means(scene, "friction") is not None
-    return 0 < len(free) <= MOST_BODIES and known and flat and told
+    return 0 < len(free) <= MOST_BODIES and known and still and told
 
 
 def _moved(

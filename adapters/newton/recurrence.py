@@ -20,7 +20,10 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class Bodies(NamedTuple):
-    """State and inertia of free bodies, the world last; ``q`` is w, x, y, z, spins and inertias as in `motion`."""
+    """State and inertia of free bodies, then of fixed balls and boxes, the world last.
+
+    ``q`` is w, x, y, z, spins and inertias as in `motion`.
+    """
 
     x: Numbers
     q: Numbers
@@ -49,9 +52,9 @@ class Candidates(NamedTuple):
 
     a: Numbers
     b: Numbers
-    #: Number of the pair of bodies, in rising order of both; planes are one body.
+    #: Number of the pair of bodies, in rising order of both; what is fixed is one body.
     pair: Numbers
-    #: Number of the pair of the scene's bodies, of which impulses are told: each plane is one of its own.
+    #: Number of the pair of the scene's bodies, of which impulses are told: all that is fixed apart.
     told: Numbers
     at: Numbers
     #: Normal and offset of the plane.
@@ -98,6 +101,8 @@ class Chosen(NamedTuple):
     rebounds: int
     rebound_iterations: int
     inner: int
+    #: How many bodies move: the first ones.
+    moving: int
 
 
 class Told(NamedTuple):
@@ -347,7 +352,7 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
 def _take(bodies: Bodies, chosen: Chosen) -> None:
     """Change velocities and places by the mean of what contacts ask for, and stop what is slow."""
     one, dt = chosen.plain[2], chosen.dt[0]
-    for k in range(len(bodies.x) - 1):
+    for k in range(chosen.moving):
         many = bodies.many[k] if chosen.weighted and bodies.many[k] > one else one
         light = bodies.lightness[k] / many
         for d in range(3):
@@ -374,7 +379,7 @@ def _sweep(
     bodies: Bodies, may: Candidates, touching: Touching, count: int, chosen: Chosen, impulse: Numbers, pressed: Numbers
 ) -> int:
     """One sweep over all contacts; how many of them overlapped."""
-    zero, one, world = chosen.plain[0], chosen.plain[2], len(bodies.x) - 1
+    zero, one = chosen.plain[0], chosen.plain[2]
     _set_turns(bodies.turn, bodies.q, chosen.plain)
     bodies.push[:], bodies.twist[:], bodies.many[:] = zero, zero, zero
     found = 0
@@ -390,7 +395,7 @@ def _sweep(
             c = touching.of[k]
             free, total = zero, zero
             for body in (may.a[c], may.b[c]):
-                if body != world:
+                if body < chosen.moving:
                     free, total = free + one, total + bodies.many[body]
             share = free / total if chosen.weighted else one
             pressed[may.told[c]] = 1
@@ -488,7 +493,7 @@ def _rebound(
                         gained[body, 0, d] += both[0, side, d] - bodies.v[body, d]
                         gained[body, 1, d] += both[1, side, d] - bodies.w[body, d]
                     fired[body] += one
-        for body in range(len(bodies.x) - 1):
+        for body in range(chosen.moving):
             if fired[body] > zero:
                 for d in range(3):
                     bodies.v[body, d] += gained[body, 0, d] / fired[body]
@@ -505,7 +510,7 @@ def run(
     for step in range(len(told.pose)):
         _set_turns(bodies.turn, bodies.q, chosen.plain)
         count = _found(bodies, may, touching, chosen)
-        for k in range(len(bodies.x) - 1):
+        for k in range(chosen.moving):
             t, inertia, give = bodies.turn[k], bodies.inertia[k], bodies.softness[k]
             sx, sy, sz = _into(t, bodies.w[k, 0], bodies.w[k, 1], bodies.w[k, 2])
             for d in range(3):
@@ -532,7 +537,7 @@ def run(
         _stop(bodies, chosen.stopped[0], chosen.plain[0])
         if chosen.rebounds and any_deep:
             _rebound(bodies, may, touching, count, chosen, levers, soft, felt, both, gained, fired)
-        for k in range(len(bodies.x) - 1):
+        for k in range(chosen.moving):
             _copy(told.pose[step, k], bodies.x[k])
             _copy(told.twist[step, k], bodies.v[k])
             _copy(told.twist[step, k, 3:], bodies.w[k])
