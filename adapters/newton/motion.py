@@ -78,7 +78,7 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class _Layout:
-    """Arrays of free balls and boxes among fixed ones and half-spaces, as `recurrence` takes them; numbers of one kind."""
+    """Arrays of free balls and boxes among fixed ones and half-spaces, as `recurrence` takes them, in one kind."""
 
     def __init__(
         self,
