@@ -67,8 +67,10 @@ LONGER = 1.618e-4
 ROUNDINGS = 12.0
 #: Round-off of a single number, as a share of it.
 UNIT = 2.0**-24
-#: Share of a value beyond which a band says nothing about it.
-VAGUE = 0.02
+#: Share of a value beyond which a band says nothing about it: less than one digit is told.
+VAGUE = 0.1
+#: Most that roundings make of a number that would be nothing: ten of 2^-24 in each of a thousand steps, to one side.
+ROUNDED_OFF = 1e4 * UNIT
 #: Most bodies that are followed.
 MOST_BODIES = 12
 
@@ -76,7 +78,7 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class _Layout:
-    """Arrays of free balls and boxes among fixed half-spaces, as `recurrence` takes them, in one kind of numbers."""
+    """Arrays of free balls and boxes among fixed ones and half-spaces, as `recurrence` takes them, in one kind."""
 
     def __init__(
         self,
@@ -90,17 +92,21 @@ class _Layout:
 
         self.kind, self.scene = kind, scene
         self.free = [k for k, body in enumerate(scene.bodies) if body.motion == "free"]
-        self.planes = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
-        free = [scene.bodies[k] for k in self.free]
+        rest = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
+        self.planes = [k for k in rest if isinstance(scene.bodies[k].shape, HalfSpace)]
+        #: Numbers in the scene of all bodies but planes, those that are free first.
+        self.solid = self.free + [k for k in rest if k not in self.planes]
 
         def rows(of: Callable[[Body], Any], last: Any) -> Numbers:
-            return np.array([*(of(body) for body in free), last], kind)
+            """One row for each free body, ``last`` for what is fixed."""
+            free = [of(scene.bodies[k]) for k in self.free]
+            return np.array([*free, *(last for _ in self.solid[len(free) :]), last], kind)
 
-        still, many = (0.0,) * 3, len(free) + 1
-        blank = [np.zeros(shape, kind) for shape in ((many, 3, 3), (many, 3, 3), *((many, 3),) * 4, (many,))]
+        still, many = (0.0,) * 3, len(self.solid) + 1
+        blank = [np.zeros(shape, kind) for shape in ((many, 5), (many, 5), *((many, 3),) * 4, (many,))]
         self.bodies = Bodies(
-            rows(lambda body: body.pose[:3], still),
-            rows(lambda body: body.pose[3:], (1.0, 0.0, 0.0, 0.0)),
+            np.array([*(scene.bodies[k].pose[:3] for k in self.solid), still], kind),
+            np.array([*(scene.bodies[k].pose[3:] for k in self.solid), (1.0, 0.0, 0.0, 0.0)], kind),
             rows(lambda body: body.twist[:3], still),
             rows(lambda body: body.twist[3:], still),
             rows(lambda body: 1.0 / body.mass, 0.0),
@@ -111,16 +117,19 @@ class _Layout:
             *blank,
         )
         may = list(self._candidates())
-        #: The two bodies of each pair, in the scene's numbers; a plane stands for the first of them.
-        floor = self.planes[0] if self.planes else -1
-        pairs = sorted({(a, b) for a, b, *_ in may})
-        self.pairs = [(floor if a == many - 1 else self.free[a], self.free[b]) for a, b in pairs]
-        parts = list(zip(*may, strict=True)) if may else [()] * 8
-        shapes = ((0,), (0,), (0, 3), (0, 3), (0,), (0, 2), (0,), (0,))
-        given = [np.array(part) if may else np.zeros(shape) for part, shape in zip(parts, shapes, strict=True)]
-        which = np.array([pairs.index((a, b)) for a, b, *_ in may], np.int64)
+        #: The two bodies of each pair whose impulses are told, in the scene's numbers.
+        self.pairs = sorted({between for between, *_ in may})
+        first_fixed = len(self.free)
+        bodies = sorted({(min(a, first_fixed), min(b, first_fixed)) for _, a, b, *_ in may})
+        parts = list(zip(*may, strict=True)) if may else [()] * 9
+        shapes = ((0, 2), (0,), (0,), (0, 3), (0, 3), (0,), (0, 2), (0,), (0,))
+        _, first, second, *given = [
+            np.array(part) if may else np.zeros(shape) for part, shape in zip(parts, shapes, strict=True)
+        ]
+        which = np.array([bodies.index((min(a, first_fixed), min(b, first_fixed))) for _, a, b, *_ in may], np.int64)
+        told = np.array([self.pairs.index(between) for between, *_ in may], np.int64)
         self.may = Candidates(
-            given[0].astype(np.int64), given[1].astype(np.int64), which, *(part.astype(kind) for part in given[2:])
+            first.astype(np.int64), second.astype(np.int64), which, told, *(part.astype(kind) for part in given)
         )
         most = max(len(may), 1)
         self.touching = Touching(
@@ -142,11 +151,12 @@ class _Layout:
             numbers(chosen["torsional"], chosen["rolling"]), numbers(2.0 * chosen["gap"]), numbers(STOPPED * STOPPED),
             numbers(float(kind(LEAST_APPROACH) * pull * kind(dt))), numbers(*blur), numbers(0.0, 0.5, 1.0, 2.0),
             chosen["iterations"], int(chosen["weighted"]), int(chosen["rebounds"]), chosen["rebound_iterations"], INNER,
+            len(self.free),
         )  # fmt: skip
 
     def _candidates(self) -> Any:
-        """Rows of `recurrence.Candidates` but for the number of the pair."""
-        world = len(self.free)
+        """Rows of `recurrence.Candidates`, with the two bodies in place of the numbers of pairs."""
+        world, still = len(self.solid), (0.0,) * 3
         for i, k in enumerate(self.free):
             body = self.scene.bodies[k]
             radius = body.shape.radius if isinstance(body.shape, Sphere) else 0.0
@@ -154,16 +164,43 @@ class _Layout:
                 plane = self.scene.bodies[j]
                 assert isinstance(plane.shape, HalfSpace)
                 pair = self.scene.material(body.name, plane.name)
+                normal, offset = held_plane(plane.shape)
                 for corner in _corners(body):
-                    yield (
-                        world, i, corner, plane.shape.normal, plane.shape.offset, (0.0, radius), pair.friction,
-                        pair.restitution,
-                    )  # fmt: skip
-            for i2 in range(i + 1, world):
-                other = self.scene.bodies[self.free[i2]]
-                if radius and isinstance(other.shape, Sphere):
-                    pair, radii = self.scene.material(body.name, other.name), (radius, other.shape.radius)
-                    yield i, i2, (0.0,) * 3, (0.0,) * 3, 0.0, radii, pair.friction, pair.restitution
+                    yield (j, k), world, i, corner, normal, offset, (0.0, radius), pair.friction, pair.restitution
+        for i, k in enumerate(self.solid):
+            body = self.scene.bodies[k]
+            for i2, k2 in enumerate(self.solid):
+                other = self.scene.bodies[k2]
+                # Each pair once, and a ball second; what is fixed meets only what is free.
+                if not isinstance(body.shape, Sphere) or min(i, i2) >= len(self.free) or i == i2:
+                    continue
+                size, thick = still, 0.0
+                if isinstance(other.shape, Box):
+                    x, y, z = other.shape.half_extents
+                    size = (x, y, z)
+                elif isinstance(other.shape, Sphere) and i2 < i:
+                    thick = other.shape.radius
+                else:
+                    continue
+                pair, radii = self.scene.material(body.name, other.name), (thick, body.shape.radius)
+                yield (k2, k), i2, i, size, still, 0.0, radii, pair.friction, pair.restitution
+
+
+def held_plane(plane: HalfSpace) -> tuple[tuple[float, ...], float]:
+    """Normal and offset [m] of a spatial half-space as Newton has them.
+
+    It keeps a plane as a turn of the z axis, the quaternion (z x n, 1 + z . n) made to size one in singles, and turns
+    that axis by it again: a wall along x leans by one rounding, 2^-24 rad. Balls that meet in a line leave it by that.
+    [ModelBuilder.add_shape_plane; warp, quat_between_vectors and quat_rotate]
+    """
+    given = np.array(plane.normal, float) / np.linalg.norm(plane.normal)
+    x, y, z = given.astype(np.float32)
+    size = np.sqrt(x * x + y * y + z * z)
+    a, b, w = -y / size, x / size, np.float32(1.0) + z / size
+    inverse = np.float32(1.0) / np.sqrt(a * a + b * b + w * w)
+    a, b, w = a * inverse, b * inverse, w * inverse
+    normal = tuple(float(each) for each in (b * (w + w), -a * (w + w), w * (w + w) - np.float32(1.0)))
+    return normal, float(np.float32(plane.offset * given) @ np.array(normal))
 
 
 def _corners(body: Body) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -174,17 +211,21 @@ def _corners(body: Body) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def followed(scene: Scene) -> bool:
-    """Whether the recurrence speaks about a spatial scene: fixed half-spaces, and balls or one box that move freely."""
+    """Whether the recurrence speaks about a spatial scene: free balls, at most one free box, and fixed half-spaces.
+
+    Balls may be fixed as well; so may boxes, if no box is free.
+    """
     free = [body for body in scene.bodies if body.motion == "free"]
     rest = [body for body in scene.bodies if body.motion != "free"]
-    balls = all(isinstance(body.shape, Sphere) for body in free)
-    box = len(free) == 1 and isinstance(free[0].shape, Box)
-    flat = all(
-        body.motion == "fixed" and isinstance(body.shape, HalfSpace) and not any(body.surface_velocity)
+    boxes = sum(isinstance(body.shape, Box) for body in free)
+    known = boxes <= 1 and all(isinstance(body.shape, Sphere | Box) for body in free)
+    allowed = HalfSpace | Sphere if boxes else HalfSpace | Sphere | Box
+    still = all(
+        body.motion == "fixed" and isinstance(body.shape, allowed) and not any(body.surface_velocity)
         for body in rest
     )  # fmt: skip
     told = means(scene, "restitution") is not None and means(scene, "friction") is not None
-    return 0 < len(free) <= MOST_BODIES and (balls or box) and flat and told
+    return 0 < len(free) <= MOST_BODIES and known and still and told
 
 
 def _moved(
@@ -208,11 +249,9 @@ def _moved(
     )  # fmt: skip
     run(layout.bodies, layout.may, layout.touching, layout.chosen, told, *layout.room)
     flat = scene.dimension == 2
-    record = None
-    if len(layout.planes) <= 1:  # whose impulse it is must be clear: planes are one body here
-        # Unknown where rebounds are solved as well.
-        impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
-        record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
+    # Unknown where rebounds are solved as well.
+    impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
+    record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
     return told_trajectory(spatial, layout.free, told.pose, told.twist, record, dt, flat)
 
 
@@ -305,26 +344,31 @@ def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generato
 
 
 def _predicted(
-    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None
+    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None, least: float
 ) -> Prediction | None:
     value, band = _readings(_Asked(scene, measure), dt, profile, iterations).get(metric, (0.0, math.inf))
     band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
-    return (value, band) if 0.0 < band <= VAGUE * abs(value) else None
+    return (value, band) if 0.0 < band <= max(VAGUE * abs(value), least) else None
 
 
-def motion_law(metric: str, profile: str) -> Law:
-    """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference."""
+def motion_law(metric: str, profile: str, balance: bool = False) -> Law:
+    """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference.
+
+    ``balance``: it is the difference of numbers of order 1 that would be the same, so that all of it may be round-off.
+    """
+    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, None)
+        return _predicted(scene, dt, measure, metric, profile, None, least)
 
     return law
 
 
-def swept_law(metric: str, profile: str) -> AskedLaw:
+def swept_law(metric: str, profile: str, balance: bool = False) -> AskedLaw:
     """As `motion_law`, at another number of sweeps."""
+    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, iterations)
+        return _predicted(scene, dt, measure, metric, profile, iterations, least)
 
     return law

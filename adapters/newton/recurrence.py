@@ -20,7 +20,10 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class Bodies(NamedTuple):
-    """State and inertia of free bodies, the world last; ``q`` is w, x, y, z, spins and inertias as in `motion`."""
+    """State and inertia of free bodies, then of fixed balls and boxes, the world last.
+
+    ``q`` is w, x, y, z, spins and inertias as in `motion`.
+    """
 
     x: Numbers
     q: Numbers
@@ -42,17 +45,22 @@ class Bodies(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """What may touch: a corner (or centre) ``at`` of body ``b`` and a plane, or two balls ``a`` and ``b``."""
+    """What may touch: a corner (or centre) ``at`` of body ``b`` and a plane, a ball ``b`` and a ball or box ``a``.
+
+    Of a box ``at`` is half its size.
+    """
 
     a: Numbers
     b: Numbers
-    #: Number of the pair of bodies, in rising order of both.
+    #: Number of the pair of bodies, in rising order of both; what is fixed is one body.
     pair: Numbers
+    #: Number of the pair of the scene's bodies, of which impulses are told: all that is fixed apart.
+    told: Numbers
     at: Numbers
     #: Normal and offset of the plane.
     normal: Numbers
     offset: Numbers
-    #: Radii of both, 0 of planes and corners.
+    #: Radii of both, 0 of planes, boxes and corners.
     radii: Numbers
     friction: Numbers
     restitution: Numbers
@@ -93,6 +101,8 @@ class Chosen(NamedTuple):
     rebounds: int
     rebound_iterations: int
     inner: int
+    #: How many bodies move: the first ones.
+    moving: int
 
 
 class Told(NamedTuple):
@@ -106,13 +116,11 @@ class Told(NamedTuple):
 
 @inner_kernel
 def _set_turns(turn: Numbers, q: Numbers, plain: Numbers) -> None:
-    one, two = plain[2], plain[3]
+    """Quaternions as they are now, each with 2 w^2 - 1 behind it."""
     for k in range(len(q)):
-        w, x, y, z = q[k, 0], q[k, 1], q[k, 2], q[k, 3]
-        t = turn[k]
-        t[0, 0], t[0, 1], t[0, 2] = one - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)
-        t[1, 0], t[1, 1], t[1, 2] = two * (x * y + w * z), one - two * (x * x + z * z), two * (y * z - w * x)
-        t[2, 0], t[2, 1], t[2, 2] = two * (x * z - w * y), two * (y * z + w * x), one - two * (x * x + y * y)
+        for d in range(4):
+            turn[k, d] = q[k, d]
+        turn[k, 4] = plain[3] * q[k, 0] * q[k, 0] - plain[2]
 
 
 @inner_kernel
@@ -122,26 +130,35 @@ def _copy(to: Numbers, given: Numbers) -> None:
 
 
 @inner_kernel
+def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inner_kernel
+def _turned(
+    w: float, a: float, b: float, c: float, share: float, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """A vector turned by quaternion (w, u): x (2 w^2 - 1) + 2 u (u . x) + 2 w u x x.
+
+    In this form a quaternion that is not of size one, by the rounding that its last step left, makes a vector along its
+    axis longer or shorter by twice as much: what spins about one axis gains or loses a few last digits in every step,
+    all to one side. A matrix, in which that axis stands as 1, would not show it. [warp, quat_rotate]
+    """
+    along = a * x + b * y + c * z
+    along += along
+    ex, ey, ez = _cross(a, b, c, x, y, z)
+    ex, ey, ez = ex * w, ey * w, ez * w
+    return x * share + a * along + (ex + ex), y * share + b * along + (ey + ey), z * share + c * along + (ez + ez)
+
+
+@inner_kernel
 def _out(t: Numbers, x: float, y: float, z: float) -> tuple[float, float, float]:
-    return (
-        t[0, 0] * x + t[0, 1] * y + t[0, 2] * z,
-        t[1, 0] * x + t[1, 1] * y + t[1, 2] * z,
-        t[2, 0] * x + t[2, 1] * y + t[2, 2] * z,
-    )
+    return _turned(t[0], t[1], t[2], t[3], t[4], x, y, z)
 
 
 @inner_kernel
 def _into(t: Numbers, x: float, y: float, z: float) -> tuple[float, float, float]:
-    return (
-        t[0, 0] * x + t[1, 0] * y + t[2, 0] * z,
-        t[0, 1] * x + t[1, 1] * y + t[2, 1] * z,
-        t[0, 2] * x + t[1, 2] * y + t[2, 2] * z,
-    )
-
-
-@inner_kernel
-def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    return _turned(t[0], -t[1], -t[2], -t[3], t[4], x, y, z)
 
 
 @inner_kernel
@@ -155,8 +172,8 @@ def _rotate(q: Numbers, k: int, dt: float, half: float, x: float, y: float, z: f
         y + (b * w + c * x - a * z),
         z + (c * w + a * y - b * x),
     )
-    size = math.sqrt(w * w + x * x + y * y + z * z)
-    q[k, 0], q[k, 1], q[k, 2], q[k, 3] = w / size, x / size, y / size, z / size
+    inverse = (half + half) / math.sqrt(w * w + x * x + y * y + z * z)
+    q[k, 0], q[k, 1], q[k, 2], q[k, 3] = w * inverse, x * inverse, y * inverse, z * inverse
 
 
 @inner_kernel
@@ -174,6 +191,34 @@ def _felt(bodies: Bodies, k: int, x: float, y: float, z: float) -> float:
     a, b, c = _into(bodies.turn[k], x, y, z)
     soft = bodies.softness[k]
     return a * a * soft[0] + b * b * soft[1] + c * c * soft[2]
+
+
+@inner_kernel
+def _clipped(value: float, most: float) -> float:
+    return max(-most, min(most, value))
+
+
+@inner_kernel
+def _on_box(
+    bodies: Bodies, may: Candidates, c: int, n: Numbers, points: Numbers, arms: Numbers, zero: float
+) -> float:  # fmt: skip
+    """Distance of a ball from the nearest point of a box, whose contact is laid out; a centre must lie outside."""
+    x, y, t, radius = bodies.x[may.b[c]], bodies.x[may.a[c]], bodies.turn[may.b[c]], may.radii[c, 1]
+    s, half = bodies.turn[may.a[c]], may.at[c]
+    at = arms[0]
+    at[0], at[1], at[2] = _into(s, x[0] - y[0], x[1] - y[1], x[2] - y[2])
+    far = zero
+    for d in range(3):
+        points[0, d] = _clipped(at[d], half[d])
+        at[d] -= points[0, d]
+        far += at[d] * at[d]
+    far = math.sqrt(far)
+    n[0], n[1], n[2] = _out(s, at[0] / far, at[1] / far, at[2] / far)
+    _copy(arms[0], points[0])
+    points[1, 0], points[1, 1], points[1, 2] = zero, zero, zero
+    ux, uy, uz = _into(t, n[0], n[1], n[2])
+    arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
+    return far - radius
 
 
 @inner_kernel
@@ -204,6 +249,9 @@ def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) 
                 arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
             else:
                 _copy(arms[1], points[1])
+        elif not may.radii[c, 0] > zero:
+            if not _on_box(bodies, may, c, n, points, arms, zero) < chosen.reach[0]:
+                continue
         else:
             y = bodies.x[a]
             dx, dy, dz = x[0] - y[0], x[1] - y[1], x[2] - y[2]
@@ -232,11 +280,6 @@ def _asks(bodies: Bodies, body: int, sign: float, push: Numbers, x: float, y: fl
     bodies.twist[body, 0] += x
     bodies.twist[body, 1] += y
     bodies.twist[body, 2] += z
-
-
-@inner_kernel
-def _clipped(value: float, most: float) -> float:
-    return max(-most, min(most, value))
 
 
 @inner_kernel
@@ -309,7 +352,7 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
 def _take(bodies: Bodies, chosen: Chosen) -> None:
     """Change velocities and places by the mean of what contacts ask for, and stop what is slow."""
     one, dt = chosen.plain[2], chosen.dt[0]
-    for k in range(len(bodies.x) - 1):
+    for k in range(chosen.moving):
         many = bodies.many[k] if chosen.weighted and bodies.many[k] > one else one
         light = bodies.lightness[k] / many
         for d in range(3):
@@ -336,7 +379,7 @@ def _sweep(
     bodies: Bodies, may: Candidates, touching: Touching, count: int, chosen: Chosen, impulse: Numbers, pressed: Numbers
 ) -> int:
     """One sweep over all contacts; how many of them overlapped."""
-    zero, one, world = chosen.plain[0], chosen.plain[2], len(bodies.x) - 1
+    zero, one = chosen.plain[0], chosen.plain[2]
     _set_turns(bodies.turn, bodies.q, chosen.plain)
     bodies.push[:], bodies.twist[:], bodies.many[:] = zero, zero, zero
     found = 0
@@ -352,12 +395,12 @@ def _sweep(
             c = touching.of[k]
             free, total = zero, zero
             for body in (may.a[c], may.b[c]):
-                if body != world:
+                if body < chosen.moving:
                     free, total = free + one, total + bodies.many[body]
             share = free / total if chosen.weighted else one
-            pressed[may.pair[c]] = 1
+            pressed[may.told[c]] = 1
             for d in range(3):
-                impulse[may.pair[c], d] += touching.share[k, d] * share
+                impulse[may.told[c], d] += touching.share[k, d] * share
     _take(bodies, chosen)
     return found
 
@@ -450,7 +493,7 @@ def _rebound(
                         gained[body, 0, d] += both[0, side, d] - bodies.v[body, d]
                         gained[body, 1, d] += both[1, side, d] - bodies.w[body, d]
                     fired[body] += one
-        for body in range(len(bodies.x) - 1):
+        for body in range(chosen.moving):
             if fired[body] > zero:
                 for d in range(3):
                     bodies.v[body, d] += gained[body, 0, d] / fired[body]
@@ -467,7 +510,7 @@ def run(
     for step in range(len(told.pose)):
         _set_turns(bodies.turn, bodies.q, chosen.plain)
         count = _found(bodies, may, touching, chosen)
-        for k in range(len(bodies.x) - 1):
+        for k in range(chosen.moving):
             t, inertia, give = bodies.turn[k], bodies.inertia[k], bodies.softness[k]
             sx, sy, sz = _into(t, bodies.w[k, 0], bodies.w[k, 1], bodies.w[k, 2])
             for d in range(3):
@@ -494,7 +537,7 @@ def run(
         _stop(bodies, chosen.stopped[0], chosen.plain[0])
         if chosen.rebounds and any_deep:
             _rebound(bodies, may, touching, count, chosen, levers, soft, felt, both, gained, fired)
-        for k in range(len(bodies.x) - 1):
+        for k in range(chosen.moving):
             _copy(told.pose[step, k], bodies.x[k])
             _copy(told.twist[step, k], bodies.v[k])
             _copy(told.twist[step, k, 3:], bodies.w[k])
