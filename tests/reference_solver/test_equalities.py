@@ -8,9 +8,15 @@ from reference_solver.stepping import equalities
 from reference_solver.stepping.equalities import CONTRADICTORY, REDUNDANT
 from reference_solver.stepping.lasting import CONTACTS, OPEN, SLIP, STICK, allocate_lasting
 
-assemble, eliminate, list_rows, solve_rows = (
+assemble, eliminate, force_contacts, list_rows, solve_rows = (
     from_python(kernel)
-    for kernel in (equalities.assemble, equalities.eliminate, equalities.list_rows, equalities.solve_rows)
+    for kernel in (
+        equalities.assemble,
+        equalities.eliminate,
+        equalities.force_contacts,
+        equalities.list_rows,
+        equalities.solve_rows,
+    )
 )
 
 #: Bodies, the first of which is fixed, and contacts between random pairs of them: most share no body.
@@ -120,3 +126,30 @@ def test_rows_that_say_otherwise_of_the_same_contradict_each_other(dimension):
     assert solve_rows(lasting, count, 1.0) == REDUNDANT
     lasting.right[3 * dimension] = 2.0
     assert solve_rows(lasting, count, 1.0) == CONTRADICTORY
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_forces_that_hold_what_is_held_stay_what_they_are(dimension, seed):
+    """Two contacts say what others do: how they share a load is told by how they did, however unevenly."""
+    lasting, rng = drawn(dimension, seed)
+    lasting.mode[:] = STICK
+    for twin, of in ((3, 0), (7, 2)):
+        lasting.body[twin] = lasting.body[of]
+        lasting.jacobian[twin], lasting.response[twin] = lasting.jacobian[of], lasting.response[of]
+    lasting.gamma[:] = rng.normal(size=lasting.gamma.shape)
+    lasting.gamma[[3, 7]] = lasting.gamma[[0, 2]]
+    count = list_rows(lasting)
+    assemble(lasting, count, False)
+    matrix, held = lasting.matrix[:count, :count].copy(), [tuple(unknown) for unknown in lasting.unknown[:count]]
+    needed = np.linalg.pinv(matrix, rcond=1e-9) @ -np.array([lasting.gamma[row] for row in held])
+    for size, row in zip(needed, held, strict=True):
+        lasting.usual[row] = size
+    uneven = rng.uniform(1.0, 2.0, dimension)
+    lasting.usual[[0, 2]] += uneven
+    lasting.usual[[3, 7]] -= uneven
+    assert force_contacts(lasting) == REDUNDANT
+    # round-off of what is missed, magnified by the condition of what is not redundant
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    limit = 1e-14 * count * sizes[0] / sizes[sizes > 1e-9 * sizes[0]][-1] * np.abs(lasting.usual).max()
+    assert np.abs(lasting.force - lasting.usual).max() <= limit < 1e-3
