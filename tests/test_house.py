@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from difflib import SequenceMatcher
 from pathlib import Path
 
 import pytest
@@ -214,3 +215,115 @@ def test_importing_the_vocabulary_imports_no_engine_and_no_compiler(module):
 def test_no_utils_and_no_packages_among_the_tests():
     assert not list(ROOT.glob("[!.]*/**/*utils*.py"))
     assert not list((ROOT / "tests").rglob("__init__.py"))
+
+
+def solver_functions():
+    """Every function of the solver with the file it stands in."""
+    for path in sorted((ROOT / "reference_solver").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                yield path.relative_to(ROOT / "reference_solver"), node
+
+
+#: Functions of the solver that may take more than nine arguments, each with its reason.
+LONG_CALLS: dict[tuple[str, str], str] = {}
+
+
+def test_no_argument_list_of_the_solver_is_longer_than_nine_without_a_reason():
+    counts = [
+        ((str(path), node.name), len(node.args.posonlyargs + node.args.args + node.args.kwonlyargs))
+        for path, node in solver_functions()
+    ]
+    assert {call for call, count in counts if count > 9} == set(LONG_CALLS)
+    assert (("planar/points.py", "write_point"), 9) in counts  # they are counted
+
+
+def clamps(node):
+    """Whether a call takes a number between a bound and minus that bound: min(max(x, -b), b) or the other way round."""
+    names = {"min", "max"}
+    if not (isinstance(node, ast.Call) and getattr(node.func, "id", "") in names and len(node.args) == 2):
+        return False
+    inner = next((a for a in node.args if isinstance(a, ast.Call) and getattr(a.func, "id", "") in names), None)
+    if inner is None or inner.func.id == node.func.id:
+        return False
+    outer_bounds = {ast.unparse(a).lstrip("-") for a in node.args if a is not inner}
+    return bool(outer_bounds & {ast.unparse(a).lstrip("-") for a in inner.args})
+
+
+#: Where a number is clamped that is no friction.
+OTHER_CLAMPS = {
+    "planar/narrowphase.py": "a point into a box",
+    "spatial/narrowphase.py": "a point into a box",
+    "spatial/segment_box.py": "a point into a box",
+    "spatial/box_box.py": "a point onto an edge",
+    "spatial/capsule.py": "a point onto a segment",
+    "planar/midpoint.py": "what of a gap is closed at a time",
+    "spatial/midpoint.py": "what of a gap is closed at a time",
+    "spatial/slip_direction.py": "a step of Newton's method",
+}
+
+
+def test_friction_is_clamped_in_one_place():
+    """`coulomb.py` has what the law allows; elsewhere nothing is clamped but lengths and steps."""
+    found = {str(path) for path, node in solver_functions() for part in ast.walk(node) if clamps(part)}
+    ours = {path for path in found if path.partition("/")[0] not in ("certification", "hard_cases", "event_driven")}
+    assert ours - {"coulomb.py"} == set(OTHER_CLAMPS)
+    assert "coulomb.py" in ours
+
+
+def words_of(node):
+    """Tokens of a function without its documentation."""
+    body = node.body[1:] if ast.get_docstring(node) else node.body
+    return re.findall(r"\w+|[^\w\s]", "\n".join(ast.unparse(statement) for statement in body))
+
+
+#: Functions of one name that are told in both dimensions although they are alike, each with its reason.
+TWINS = {"gained_speed": "loads stand in records of bodies in space, in columns in the plane"}
+
+
+def test_what_both_dimensions_do_alike_is_told_once():
+    """Functions of one name, of a hundred words and more, share at most six of seven in both dimensions."""
+    told = {
+        room: {node.name: words_of(node) for path, node in solver_functions() if path.parts[0] == room}
+        for room in ("planar", "spatial")
+    }
+    both = set(told["planar"]) & set(told["spatial"])
+    assert len(both) > 50  # as each dimension answers the same questions
+    alike = {
+        name
+        for name in both
+        if min(len(told[room][name]) for room in told) >= 100
+        and SequenceMatcher(None, told["planar"][name], told["spatial"][name], autojunk=False).ratio() > 6 / 7
+    }
+    assert alike == set(TWINS), "tell it in `stepping/`, for both"
+
+
+#: By how much a room of the solver may have fewer lines than its limit: a smaller one gets a smaller limit.
+SLACK = 0.05
+
+
+def rooms_of_the_solver():
+    """Limit and lines of every room in the table of reference_solver/README.md; "." are the files beside the rooms."""
+    solver = ROOT / "reference_solver"
+    table = re.findall(r"^\| `([\w/.]+)` \| (\d+) \| (\d+) \| .+ \|$", (solver / "README.md").read_text(), re.MULTILINE)
+    rooms = {room.rstrip("/"): (int(most), int(before)) for room, most, before in table}
+    lines = dict.fromkeys(rooms, 0)
+    for path in solver.rglob("*.py"):
+        folder = path.parent.relative_to(solver).as_posix()
+        own = max((room for room in rooms if folder == room or folder.startswith(f"{room}/")), key=len)
+        lines[own] += len(path.read_text().splitlines())
+    return rooms, lines
+
+
+def test_the_rooms_of_the_solver_grow_only_where_somebody_says_so():
+    """Prints the table with today's counts (pytest -s)."""
+    rooms, lines = rooms_of_the_solver()
+    for room, (most, before) in rooms.items():
+        print(f"{room:22} {lines[room]:6} of at most {most:6}, {before:6} at 16 082")
+    print(f"{'all':22} {sum(lines.values()):6}")
+    assert set(lines) >= {"planar", "spatial", "stepping", "certification"}
+    assert sum(before for _, before in rooms.values()) == 16_082
+    grown = {room: lines[room] for room, (most, _) in rooms.items() if lines[room] > most}
+    assert not grown, "see 'Add lines to the solver' in CONTRIBUTING.md"
+    loose = {room: lines[room] for room, (most, _) in rooms.items() if lines[room] < most * (1.0 - SLACK) - 10}
+    assert not loose, "a room that shrank gets a smaller limit"

@@ -52,18 +52,19 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Ro
         _, reference, edge, _ = lasting_axis(bodies, a, b, (dx, dy), reference, edge, 0, 0.0, ahead)
         axis, side = 1 - edge % 2, 1.0 if edge == 0 or edge == 3 else -1.0
     if reference == a:
-        return clip_edge(bodies, a, b, dx, dy, axis, side, reach, rows, c)
-    return clip_edge(bodies, b, a, -dx, -dy, axis, side, reach, rows, c)
+        return clip_edge(bodies, a, b, (dx, dy), axis, side, reach, rows, c)
+    return clip_edge(bodies, b, a, (-dx, -dy), axis, side, reach, rows, c)
 
 
 @inner_kernel
 def clip_edge(
-    bodies: Bodies, r: int, i: int, dx: float, dy: float, axis: int, side: float, reach: float, rows: Rows, c: int
+    bodies: Bodies, r: int, i: int, way: tuple[float, float], axis: int, side: float, reach: float, rows: Rows, c: int
 ) -> int:
     """Clip the edge of incident box i that faces r's reference face (``axis``, ``side``) to that face's width.
 
-    (dx, dy) leads from r's centre to i's. Coordinates (p, q) below: along the reference normal and its tangent.
+    ``way`` leads from r's centre to i's. Coordinates (p, q) below: along the reference normal and its tangent.
     """
+    dx, dy = way
     cr, sr = bodies.real[r, COS], bodies.real[r, SIN]
     nx, ny = side * cr, side * sr
     if axis == 1:

@@ -59,13 +59,6 @@ def place(bodies: Bodies, sub: SubStep, i: int, t: float) -> None:
 
 
 @inner_kernel
-def rate(sub: SubStep, i: int, k: int, t: float) -> float:
-    """Speed of body i along coordinate k at time t of the sub-step."""
-    c = sub.path[i, k]
-    return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5]))))
-
-
-@inner_kernel
 def bending(sub: SubStep, i: int, k: int, t: float) -> float:
     """Bound of what the higher terms of a path add to a speed until t; 0 where accelerations are constant."""
     c = sub.path[i, k]

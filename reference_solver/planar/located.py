@@ -278,17 +278,6 @@ def find_loaded(island: Island) -> int:
 
 
 @inner_kernel
-def keep_places(island: Island) -> None:
-    """In what phases keep of their start."""
-    bodies, lasting = island.bodies, island.sub.lasting
-    for i in range(len(bodies.kind)):
-        for d in range(3):
-            lasting.base[i, d] = bodies.pose[i, d]
-        for d in range(3):
-            lasting.displacement[i, d] = 0.0
-
-
-@inner_kernel
 def put_back(island: Island) -> None:
     """Poses, and what goes with them."""
     bodies, lasting = island.bodies, island.sub.lasting

@@ -57,7 +57,6 @@ from reference_solver.stepping.operations import (
     follow_path,
     gained_speed,
     is_free,
-    keep_places,
     leaves_bounds,
     levers_of_start,
     misses_end,
@@ -73,6 +72,7 @@ from reference_solver.stepping.operations import (
     weigh_clusters,
 )
 from reference_solver.stepping.phase import NO_PHASE, SHORTENED
+from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
 
 
@@ -197,6 +197,16 @@ def come_to_rest(island: Island, length: float, struck: bool) -> float:
     clock[HELD] = clock[ROCKS]  # if rows turn the impulse-level scheme does it
     clock[ROCKS], clock[ROCKING] = 0.0, 1.0
     return press_for(island, min(max(longest, SHORT * island.options.dt), left), struck)
+
+
+@inner_kernel
+def keep_places(island: Island) -> None:
+    """Keep all poses for `put_back`; what a phase began with is lost."""
+    pose, lasting = island.bodies.pose, island.sub.lasting
+    copy_vectors(pose, lasting.base)
+    for i in range(len(pose)):
+        for d in range(lasting.displacement.shape[1]):
+            lasting.displacement[i, d] = 0.0
 
 
 @inner_kernel

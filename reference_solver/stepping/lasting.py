@@ -15,7 +15,6 @@ Indices = NDArray[np.int64]
 
 #: Entries of `Lasting.size`: contacts, bodies, velocities per body, tangents per contact.
 CONTACTS, BODIES, VELOCITIES, TANGENTS = 0, 1, 2, 3
-SIZES = 4
 #: Modes of a contact. OPEN: it parts. STICK: its tangents are held. SLIP: friction mu times the load against the slip.
 OPEN, STICK, SLIP = 0, 1, 2
 #: Rows of the dense matrix of a phase, such as five boxes turned against each other that stick in eight points each;
@@ -44,7 +43,7 @@ KINDS, PLACES = 8, 24
 class Lasting(NamedTuple):
     """Contacts k of an island and its n bodies; V velocities, T tangents, P numbers of a pose, D axes."""
 
-    size: Indices  # (SIZES,)
+    size: Indices  # (4,)
     body: Indices  # (k, 2): A, B
     row: Indices  # (k,): row of the dimension's table
     mode: Indices  # (k,): OPEN, STICK, SLIP

@@ -264,14 +264,8 @@ def find_loaded(island: Any) -> int:
 
 
 @operation
-def keep_places(island: Any) -> None:
-    """Keep all poses for `put_back`; what a phase began with is lost."""
-    raise NotImplementedError
-
-
-@operation
 def put_back(island: Any) -> None:
-    """Put all bodies where `keep_places` found them."""
+    """Put all bodies where `driver.keep_places` found them."""
     raise NotImplementedError
 
 
@@ -388,7 +382,6 @@ OF_ISLANDS = (
     gained_speed,
     price_of_creeping,
     find_loaded,
-    keep_places,
     put_back,
     close_gaps,
     deepest_overlap,
