@@ -16,8 +16,9 @@ from reports.cures import decided_by, told_cures
 from reports.findings import REFUSED, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
+from validation.catalogue import CATALOGUE
 from validation.metrics import SILENT, WORDS
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 
 Plain = Mapping[str, Any]
 #: (scene, dimension, engine, profile) -> cost [s of CPU per simulated s] of the cheapest step that passes.
@@ -163,7 +164,9 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
         by = {name: decided_by(*which, name) for name in good} if not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
         return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
-    unlisted = [] if listed else [f"crosscheck cure {row['engine']} {row['scene']} searches for settings"]
+    # A search asks scenes of the catalogue: of a file nothing is promised.
+    searched = row["scene"] in CATALOGUE and not listed
+    unlisted = [f"crosscheck cure {row['engine']} {row['scene']} searches for settings"] if searched else []
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):
@@ -208,7 +211,9 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     if any(row["metric"] == known_as for row in kinds[kind]):
         seen = [_as_seen(row, known_as) for row in members if row["metric"] == known_as]
         members = [row for row in seen if row is not None] or members
-    return _constant(kind, members) or _worst(kind, [row for row in members if mark_of(row) != "pass"])
+    # A scene file has no parameters that a truth could follow.
+    constant = "" if is_file(rows[0]["scene"]) else _constant(kind, members)
+    return constant or _worst(kind, [row for row in members if mark_of(row) != "pass"])
 
 
 def _constant(kind: str, rows: Sequence[Plain]) -> str:
@@ -255,7 +260,10 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
     row = max(rows, key=severity)
     nothing = bool(row["truth"]) and abs(row["value"]) < NOTHING * abs(row["truth"])
     value = "0" if nothing else measured(row, _digits(row))
-    text = "never settles" if value == NEVER else spoken(row["scene"], kind, value)
+    # Of a file's own quantities the name of the body and what was read of it is all that is known.
+    own = is_file(row["scene"]) and kind != row["metric"]
+    words = f"{row['metric']} is {value}" if own else spoken(row["scene"], kind, value)
+    text = "never settles" if value == NEVER else words
     if row["truth"] == 0.0 and kind in RATES and row["value"]:
         text += " instead of 0"
     if row["truth"] and text != SILENT:

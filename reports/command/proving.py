@@ -15,7 +15,7 @@ from adapters import registry
 from adapters.engine_folder import experiments_of
 from adapters.experiment import Experiment
 from reports.terminal import terminal
-from reports.wording import number, params_text, reproduce
+from reports.wording import number, params_text, quantity, reproduce
 from validation.findings import FindingsError
 from validation.findings.files import findings_of
 from validation.settings.proofs import Proof, prove
@@ -90,9 +90,8 @@ def _value(found: Reading) -> str:
         return f"no {found.check.metric}: {found.reason}"
     mark = "PASS" if found.badness <= 1.0 else "FAIL"
     check = found.check
-    return (
-        f"{mark} {check.metric} {number(found.value, 6)} {check.unit} of {number(check.truth)} +- {number(check.bound)}"
-    )
+    told = f"{quantity(found.value, check.unit, 6)} of {number(check.truth)} +- {number(check.bound)}"
+    return f"{mark} {check.metric} {told}"
 
 
 def _plain(proof: Proof) -> dict[str, Any]:

@@ -299,7 +299,7 @@ def _why(change: Change) -> str:
 
 def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[Change], console: Console) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
-    asked = f"{row['scene']} {row['dimension']}-D, {params_text(row['params'])}"
+    asked = ", ".join(filter(None, (f"{row['scene']} {row['dimension']}-D", params_text(row["params"]))))
     table = _grid("", "")
     table.show_header = False
     table.columns[0].no_wrap = True

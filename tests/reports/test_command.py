@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from reports import exports
 from reports.command import main
+from reports.wording import row_id
 
 ONE = ["run", "impact", "--param", "v=6", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--jobs", "1"]
 
@@ -87,6 +88,9 @@ pairs = [{ restitution = 0.5 }]
     good = call("run", path, "--engine", "chipmunk", "--profile", "tuned", "--out", tmp_path / "out", "--json")
     assert good.exit_code == 0, good.stderr
     assert {row["metric"] for row in json.loads(good.stdout)} >= {"energy_growth", "penetration", "final[ball.y]"}
+    ball = next(row for row in json.loads(good.stdout) if row["metric"] == "final[ball.y]")
+    asked = call("explain", row_id(ball), "--out", tmp_path / "out")
+    assert " 2-D; step 0.004167 s" in " ".join(asked.stdout.split())  # a file has no parameters to name
     path.write_text(text.replace("restitution = 0.5", "restitution = 1.2"))
     bad = subprocess.run([sys.executable, "-m", "reports.command", "run", path], capture_output=True, text=True)
     assert bad.returncode == 2

@@ -34,6 +34,12 @@ def test_a_reason_is_proven_on_its_engine():
     assert all(proof["holds"] and proof["why_not"] == "" for proof in proofs)
 
 
+def test_a_ratio_is_told_without_its_unit_of_one():
+    pytest.importorskip("pybullet", reason="pybullet is an optional engine")
+    said = run("--prove", "bounce-interval-blurred").output
+    assert "FAIL apex_interval_ratio 0 of 0.8" in said and " 1 of 0.8" not in said
+
+
 @pytest.mark.parametrize(("option", "name"), [("--engine", "mujoco"), ("--scene", "slide"), ("--profile", "soft")])
 def test_who_is_not_in_the_run_is_said_and_not_that_nothing_fails(page_folder, option, name):
     result = run("--out", str(page_folder), option, name)

@@ -11,6 +11,7 @@ from click.shell_completion import ShellComplete
 from click.testing import CliRunner
 
 from reports.command import main
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.records.store import Store
 from validation.running.execution import execute
@@ -26,6 +27,24 @@ def test_a_command_of_the_readme_exists_with_its_options(line):
     known = {option for parameter in command.params for option in [*parameter.opts, *parameter.secondary_opts]}
     assert [word for word in words if word.startswith("--") and word not in known] == []
     assert CliRunner().invoke(main, [name, "--help"]).exit_code == 0
+
+
+def test_the_readme_counts_the_scenes_that_there_are():
+    said = re.findall(r"(?:of|all) (\d+)(?: scenes|;| \()", README)
+    assert len(said) >= 3 and set(map(int, said)) == {len(CATALOGUE)}
+
+
+def test_the_answer_that_the_readme_shows_is_what_a_run_says(tmp_path):
+    """How wrong MuJoCo's rebound is and what cures it, in the words of the terminal."""
+    pytest.importorskip("mujoco")
+    flat = " ".join(README.split())
+    shown = re.search(r"27 of \d+ (mujoco/default \w+: .*?; tuned cures it)", flat)
+    assert shown, "the README shows no answer below its matrix"
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(
+        main, ["run", "impact", "--engine", "mujoco", "--jobs", "1", "--out", str(tmp_path)]
+    )
+    assert result.exit_code == 0, result.stderr
+    assert shown[1] in " ".join(result.stdout.split())
 
 
 def test_there_are_commands_in_the_readme_and_every_command_has_help():

@@ -114,6 +114,16 @@ def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
     assert answer.cure == "no other profile does better; crosscheck cure bullet bounce searches for settings"
 
 
+def test_a_number_of_a_scene_file_is_told_by_its_name_and_no_search_is_promised():
+    """`cure` asks scenes of the catalogue; a file has no parameters that a truth could follow."""
+    names = {"final[ball.y]": (3.78, 4.5), "final[ball.x]": (3.78, 9.0)}
+    rows = [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": "s/a.toml", "metric": metric}
+            for metric, (value, truth) in names.items()]  # fmt: skip
+    (answer,) = answers([each | {"params": {}, "slot": each["slot"] | {"params": {}}} for each in rows])
+    assert answer.wrong == "final[ball.x] is 3.78 instead of 9"
+    assert answer.cure == "no other profile does better"
+
+
 def test_what_is_nearer_is_no_cure():
     rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
     rows += [
