@@ -9,6 +9,8 @@ of a step and on the other side at the end of the next. Whether that happens fol
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from adapters.engine import Array
@@ -19,6 +21,8 @@ from adapters.trajectory import Trajectory
 
 #: Round-off of a place after a thousand steps, relative to the way.
 ROUND_OFF = 1e-12
+#: ``push(scene, dt, overlap)``: speed besides the velocity with which an engine pushes out [m/s].
+Push = Callable[[Scene, float, float], float]
 
 
 def at_plate(scene: Scene) -> tuple[Body, Body, float] | None:
@@ -57,5 +61,39 @@ def passing_law(metric: str, round_off: float = ROUND_OFF) -> Law:
             return None
         value = measure(scene, flown(scene, x, dt))[metric][0]
         return None if value is None else (value, round_off * (1.0 + abs(ball.twist[0]) * scene.duration))
+
+    return law
+
+
+def shoved_law(metric: str, push: Push | None = None, round_off: float = ROUND_OFF) -> Law:
+    """A ball that is first found in a plate beyond its middle is pushed out on the far side, and keeps its velocity.
+
+    The nearest way out points forward there, and the ball already moves that way, so that no impulse acts.
+
+    Parameters
+    ----------
+    push
+        Of an engine that pushes out besides the velocity: speed [m/s] of the step after one that ended ``overlap``
+        deep [m]; none by default.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        posed = at_plate(scene)
+        if posed is None:
+            return None
+        plate, ball, reach = posed
+        v = ball.twist[0]
+        way = 1.0 if v > 0.0 else -1.0
+        x, out, found = [ball.pose[0]], 0.0, False
+        for _ in range(step_count(scene.duration, dt)):
+            x.append(x[-1] + (v + way * out) * dt)
+            beyond = way * (x[-1] - plate.pose[0])
+            overlap = reach - abs(beyond)
+            if overlap > 0.0 and beyond <= round_off * reach:  # at the very middle round-off decides on the side
+                return None
+            found = found or overlap > 0.0
+            out = push(scene, dt, overlap) if push and overlap > 0.0 else 0.0
+        value = measure(scene, flown(scene, np.array(x), dt))[metric][0] if found else None
+        return None if value is None else (value, round_off * (1.0 + abs(v) * scene.duration))
 
     return law

@@ -26,8 +26,7 @@ from adapters.needs import needs
 from adapters.scene import Disc, Scene
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
-from adapters.unswept import ROUND_OFF as STRAIGHT
-from adapters.unswept import at_plate, flown, passing_law
+from adapters.unswept import Push, passing_law, shoved_law
 
 #: Rounding of the recurrence against the engine: two thousand steps of a few roundings of numbers up to 10
 #: (2000 x 4 x 10 x 1.1e-16 = 1e-11), times what a bounce can magnify a height error to, 1/e <= 2, per bounce.
@@ -113,36 +112,15 @@ def touching_start_law(scene: Scene, dt: float, measure: Measure) -> Prediction 
     return fall, 2.0 * 2.0 * (4.7e-4 + 0.5 * 4.5e-4) * fall
 
 
-def shoved_law(profile: str, metric: str) -> Law:
-    """A ball that is first found in a plate beyond its middle is pushed out on the far side, and keeps its velocity.
+def _pushed(profile: str) -> Push:
+    """Push-out of overlaps beyond the slop, in the step after: as in `flight`."""
 
-    The nearest way out points forward there, and the ball already moves that way, so that no impulse acts. Push-out
-    moves it besides its velocity, in the step after: the recurrence of `flight` without gravity.
-    """
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        posed = at_plate(scene)
-        if posed is None:
-            return None
-        plate, ball, reach = posed
-        v, middle = ball.twist[0], plate.pose[0]
+    def push(scene: Scene, dt: float, overlap: float) -> float:
         chosen = {s.name: s.value for s in PROFILES[profile](needs(scene), dt)}
-        share, slop = 1.0 - chosen["collision_bias"] ** dt, chosen["collision_slop"]
-        way = math.copysign(1.0, v)
-        x, push, found = [ball.pose[0]], 0.0, False
-        for _ in range(step_count(scene.duration, dt)):
-            x.append(x[-1] + (v + way * push) * dt)
-            beyond = way * (x[-1] - middle)
-            overlap = reach - abs(beyond)
-            # At the very middle round-off decides on the side.
-            if overlap > 0.0 and beyond <= STRAIGHT * reach:
-                return None
-            found = found or overlap > 0.0
-            push = share * max(0.0, overlap - slop) / dt
-        value = measure(scene, flown(scene, np.array(x), dt))[metric][0] if found else None
-        return None if value is None else (value, STRAIGHT * (1.0 + abs(v) * scene.duration))
+        share: float = 1.0 - chosen["collision_bias"] ** dt
+        return share * max(0.0, overlap - chosen["collision_slop"]) / dt
 
-    return law
+    return push
 
 
 def _bounce_laws() -> tuple[Deviation, ...]:
@@ -198,7 +176,7 @@ DEVIATIONS += tuple(
         (profile,),
         "thin_wall",
         metric,
-        shoved_law(profile, metric),
+        shoved_law(metric, _pushed(profile)),
         "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is on",
         "cpSpaceStep.c:400 (positions, then overlaps), cpCollision.c (normal of the least overlap)",
     )

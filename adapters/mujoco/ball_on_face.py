@@ -12,6 +12,7 @@ Source: MuJoCo documentation, "Computation: constraint model", friction cones an
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -39,6 +40,8 @@ from adapters.stepping import step_count
 
 #: Metrics that are ways, and those that are accelerations over half a run; all others are speeds, times and ratios.
 WAYS, ACCELERATIONS = ("rolling_place", "hop"), ("acceleration", "turning")
+#: Of these and of speeds, what is read from the spin, at the surface.
+SPINS = ("turning", "spin_speed")
 
 
 @dataclass(frozen=True)
@@ -101,23 +104,28 @@ def rolling_law(profile: str, metric: str) -> Law:
         # Rolling along the heading turns clockwise in the plane that contains it.
         spin = body.twist[2] if d == 2 else -float(np.array([-heading[1], heading[0]]) @ body.twist[3:5])
         steps, off = step_count(scene.duration, dt), solver_error(profile, scene, dt)
-        starts = [(0.0, 0.0), (0.0, off), (0.0, -off)]
+        # The same shortfall of the cost turns the ball by as much more as its moment is smaller.
+        turn = off / math.sqrt(ball.inertia)
+        starts = [(0.0, 0.0, 0.0), (0.0, off, 0.0), (0.0, -off, 0.0), (0.0, 0.0, turn), (0.0, 0.0, -turn)]
         if body.pose[d - 1] > ball.half_height:  # a start that touches exactly has no round-off
-            starts += [(k * GAP_ROUND_OFF, 0.0) for k in PERTURBATIONS]
+            starts += [(k * GAP_ROUND_OFF, 0.0, 0.0) for k in PERTURBATIONS]
         paths = (
-            _path(ball, steps, body.pose[d - 1] + up, (speed + more, body.twist[d - 1], spin)) for up, more in starts
+            _path(ball, steps, body.pose[d - 1] + up, (speed + more, body.twist[d - 1], spin + faster))
+            for up, more, faster in starts
         )
         value, *others = (measure(scene, along_a_heading(scene, dt, heading, path))[metric][0] for path in paths)
         if value is None or None in others:
             return None
         spread = max(abs(other - value) for other in others if other is not None)
-        # One step of the solver is off by `off` in speed: that over the whole run in place, and at both ends of a mean
-        # over half of it.
-        unit = scene.duration if metric in WAYS else 4.0 / scene.duration if metric in ACCELERATIONS else 1.0
-        floor = (off + EPS / (1.0 - ball.law.impedance.deep)) * unit
+        # One step of the solver is off by `off` in speed: that over the whole run in place. In each step anew it is an
+        # acceleration, at most that of all in the same direction; of speeds and times it is as likely of either sign.
+        unit = scene.duration if metric in WAYS else 1.0 / dt if metric in ACCELERATIONS else 1.0
+        share = turn * ball.half_height if metric in SPINS else off
+        floor = (share + EPS / (1.0 - ball.law.impedance.deep)) * unit
+        factor = max(SPREAD_FACTOR, math.sqrt(steps))
         # On the edge between two paths (one hop more or less) the engine takes either.
         if spread > BLURRED * abs(value):
             return (value, 2.0 * spread + floor) if spread <= EITHER * abs(value) else None
-        return value, SPREAD_FACTOR * spread + floor
+        return value, factor * spread + floor
 
     return law

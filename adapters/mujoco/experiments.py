@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.experiment import Cured, Experiment
+from adapters.mujoco.experiments_elsewhere import elsewhere
 from adapters.mujoco.experiments_on_blows import on_blows
 from adapters.mujoco.experiments_on_loads import on_loads
 from adapters.mujoco.experiments_on_rods import on_rods
@@ -329,3 +330,5 @@ EXPERIMENTS += on_loads(_HOLD)
 EXPERIMENTS += on_blows(_REFLECT)
 
 EXPERIMENTS += on_rods(_REFLECT, _HOLD)
+
+EXPERIMENTS += elsewhere(_REFLECT, _HOLD, _SLIDE)

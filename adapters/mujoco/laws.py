@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from adapters.law import Deviation, Law, exactly
+from adapters.law import AskedLaw, Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.convex_blows import convex_blow_law
 from adapters.mujoco.plates import on_a_plate
-from adapters.mujoco.predictions import ball_law, blow_law, column_law, incline_law, stopping_law
+from adapters.mujoco.predictions import ball_law, blow_law, column_asked, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
-from adapters.unswept import passing_law
+from adapters.unswept import passing_law, shoved_law
 
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
@@ -59,8 +59,12 @@ _BLOWS = (
 _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver parameters, slow slippage"
 
 
-def _deviation(profile: str, scene: str, metric: str, law: Law, because: str) -> Deviation:
-    return Deviation("mujoco", (profile,), scene, exactly(metric), law, _BECAUSE[profile, because], _SOURCE, CHECKED_ON)
+def _deviation(
+    profile: str, scene: str, metric: str, law: Law, because: str, asked: AskedLaw | None = None
+) -> Deviation:
+    return Deviation(
+        "mujoco", (profile,), scene, exactly(metric), law, _BECAUSE[profile, because], _SOURCE, CHECKED_ON, asked
+    )
 
 
 DEVIATIONS: tuple[Deviation, ...] = (
@@ -75,7 +79,9 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for metric in ("penetration", "settle_time")
     ),
     *(
-        _deviation(profile, "heavy_on_light", metric, column_law(profile, metric), "stack")
+        _deviation(
+            profile, "heavy_on_light", metric, column_law(profile, metric), "stack", column_asked(profile, metric)
+        )
         for profile, metric in (("default", "penetration"), ("default", "settle_time"), ("tuned", "penetration"))
     ),
     *(
@@ -137,5 +143,19 @@ DEVIATIONS += tuple(
         CHECKED_ON,
     )
     for profile in PROFILES
+    for metric in ("rebound_ratio", "beyond")
+)
+
+DEVIATIONS += tuple(
+    Deviation(
+        "mujoco",
+        ("tuned",),
+        "thin_wall",
+        metric,
+        shoved_law(metric),
+        "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is on",
+        "MuJoCo documentation, computation: collision detection at the start of a step",
+        CHECKED_ON,
+    )
     for metric in ("rebound_ratio", "beyond")
 )

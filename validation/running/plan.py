@@ -115,7 +115,7 @@ def _one_profile(name: str) -> str:
 
 
 def is_standard(slot: Slot) -> bool:
-    """Whether the standard suite runs this slot: its FAILs are listed row by row."""
+    """Whether the standard suite runs this slot, or reads a study from its cells: its FAILs are listed row by row."""
     if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
         return False
     canonical, own = CATALOGUE[slot.scene], dict(slot.params).items()
@@ -126,7 +126,7 @@ def is_standard(slot: Slot) -> bool:
         and variation.runs_in(slot.dimension)
         and slot.params == canonical.minimal(variation.params)
         for variation in canonical.variations("standard")
-    ) or (slot.iterations is None and not slot.params)
+    ) or (bool(canonical.studies) and slot.iterations is None and not slot.params)
 
 
 def _moves(
