@@ -10,7 +10,8 @@
 
 Rebounds come last, for contacts that were found deep: those that approached at more than 2 g dt are given e times their
 approach, 8 sweeps over the contacts of a pair, twice, of which a body gets the mean over its pairs. Contacts are found
-where the step begins, of corners and planes or of two balls that are nearer than twice the gap, and keep their normals.
+where the step begins, of corners and planes, of two balls, or of a ball and a box, if they are nearer than twice the
+gap, and keep their normals.
 [xpbd/kernels.py and restitution_kernels.py of newton 1.8.0]
 
 Nothing here is Newton's own code: it is what its formulas make of a scene, in doubles and in singles. The steps are
