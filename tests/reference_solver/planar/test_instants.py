@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Polygon, Settings, Simulation
+from reference_solver.certification.relations import Change
 from reference_solver.certification.truth import certify
+from reference_solver.compilation import from_python
+from reference_solver.needs import needs
 from reference_solver.pieces import IMPACT
+from reference_solver.planar import manifolds
+from reference_solver.planar.columns import GAP, NX, NY
+from reference_solver.planar.world import World
+
+detect = from_python(manifolds.detect)
 
 DOWN = (0.0, -9.81)
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
@@ -112,6 +120,34 @@ def test_corners_that_meet_touch_along_the_edges_that_approach_least(sign, swapp
     onto_b = np.array([0.06, -0.06 * sign]) * (-1.0 if swapped else 1.0)
     assert pieces.impulse[blow] == pytest.approx(onto_b, abs=1e-9)
     assert simulation.certificate["holds"]
+
+
+def rows_of(model):
+    """Normals and gaps of the contacts that are near."""
+    world = World(model, Settings.reference(1.0 / 60.0), needs(model))
+    assert detect(world._bodies, world._pairs, world._rows, world._options)
+    return world._rows.real[: int(world._rows.counts[0])][:, [NX, NY, GAP]].copy()
+
+
+def test_faces_that_are_all_but_parallel_know_no_heading():
+    """Which of two faces a contact goes by is told by their order, not by when each stops to separate the boxes.
+
+    Both have all but the same normal, whatever way it points: a quarter turn of the world turns all contacts, and one
+    that went by the other face would have its normal off by the tilt, 1e-3 rad.
+    """
+    random, turn = np.random.default_rng(4), Change(2, axes=(1, 0), signs=(-1.0, 1.0))
+    for _ in range(150):
+        tilt, half, apart = random.uniform(-9e-4, 9e-4), (0.5, 0.3), random.choice([0.0, 1e-5, 1e-3])
+        height = half[0] * abs(math.sin(tilt)) + half[1] * math.cos(tilt) + apart
+        twist = (random.uniform(-1.0, 1.0), -0.3, random.uniform(-0.5, 0.5))
+        bodies = [
+            Body(Box((0.5, 0.5)), 2.0, 0.3, (0.0, -0.5, 0.0)),
+            Body(Box(half), 1.0, 0.1, (random.uniform(-0.6, 0.6), height, tilt), twist),
+        ]
+        model = Model(2, bodies if random.uniform() < 0.5 else bodies[::-1], DOWN, 0.5, 0.0)
+        rows, turned = rows_of(model), rows_of(turn.model(model))
+        assert len(rows) > 0
+        assert np.stack([-rows[:, 1], rows[:, 0], rows[:, 2]], axis=1) == pytest.approx(turned, abs=1e-14)
 
 
 def test_where_nothing_rubs_no_contact_is_said_to():
