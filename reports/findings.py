@@ -19,6 +19,8 @@ Plain = Mapping[str, Any]
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
 #: Outcomes of cells that were not run, and what they are called.
 REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
+#: Marks of cells that gave no answer at all: their rows have one reason, and no metric is worse than another.
+WHOLE = ("crashed", "timed_out", "missing")
 #: Marks in the order in which findings are shown.
 ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
@@ -55,7 +57,10 @@ def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
 
 @dataclass(frozen=True)
 class Family:
-    """Rows of one engine, profile, scene, kind of metric and standing, the worst first."""
+    """Rows of one engine, profile, scene, kind of metric and standing, the worst first.
+
+    Cells that gave no answer make one family for each reason, of all metrics (``"*"``).
+    """
 
     mark: str
     engine: str
@@ -79,7 +84,8 @@ class Family:
     @property
     def line(self) -> str:
         """One line: standing, who, what and how wrong its worst row is."""
-        more = f", the worst of {len(self.rows)} rows" if len(self.rows) > 1 else ""
+        count = f"{len(self.rows)} rows"
+        more = "" if len(self.rows) == 1 else f" ({count})" if self.mark in WHOLE else f", the worst of {count}"
         return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {said(self.worst)}{more}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -96,9 +102,11 @@ def families(rows: Iterable[Plain]) -> list[Family]:
     for mark, group in grouped(rows):
         members: dict[tuple[str, str, str, str], list[Plain]] = defaultdict(list)
         for row in group:
-            members[row["engine"], row["profile"], row["scene"], row["metric"].partition("[")[0]].append(row)
-        for key, own in members.items():
-            found.append(Family(mark, *key, tuple(sorted(own, key=severity, reverse=True))))
+            kind = row["reason"] if mark in WHOLE else row["metric"].partition("[")[0]
+            members[row["engine"], row["profile"], row["scene"], kind].append(row)
+        for (engine, profile, scene, kind), own in members.items():
+            metric = "*" if mark in WHOLE else kind
+            found.append(Family(mark, engine, profile, scene, metric, tuple(sorted(own, key=severity, reverse=True))))
     return found
 
 

@@ -188,14 +188,14 @@ def test_a_step_in_which_nothing_can_be_measured_is_refused_by_name(tmp_path, dt
 
 
 def test_a_value_that_is_not_finite_is_missing_with_its_reason(tmp_path):
-    """Two bodies at 1e160 m/s: their energy is more than a number can hold."""
+    """A body that spins at 1e160 rad/s: its energy is more than a number can hold."""
     fast = copy.deepcopy(BASE)
-    fast["gravity"], fast["bodies"][1]["twist"] = [0.0, 0.0], [1e160, 0.0, 0.0]
+    fast["gravity"], fast["bodies"][1]["twist"] = [0.0, 0.0], [0.0, 0.0, 1e160]
     path = tmp_path / "fast.json"
     path.write_text(json.dumps(fast))
     (observation,) = judged(slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0])))
     missing = [reason for value, reason in observation.metrics.values() if value is None]
-    assert any("not a finite number" in reason for reason in missing) or observation.reason, observation
+    assert any("not a finite number" in reason for reason in missing), observation
     assert all(value is None or math.isfinite(value) for value, _ in observation.metrics.values())
 
 

@@ -83,6 +83,17 @@ def test_a_family_is_one_engine_profile_scene_kind_of_metric_and_standing_its_wo
     assert found[1].worst["value"] == -0.9
 
 
+@pytest.mark.parametrize("outcome", ["crashed", "timed_out", "missing"])
+def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_checks(outcome):
+    lost = {"outcome": outcome, "value": None, "error": None, "physics": None, "standing": None}
+    names = ("impulse[1]", "impulse[2]", "drift")
+    first = [row(metric, **lost | {"reason": "SIGSEGV"}) for metric in names]
+    found = families([*first, row("drift", **lost | {"reason": "SIGABRT"})])
+    assert [(f.mark, f.metric, len(f.rows)) for f in found] == [(outcome, "*", 3), (outcome, "*", 1)]
+    assert found[0].line.endswith("mujoco/default incline 3-D ratio=0.99: SIGSEGV (3 rows)")
+    assert found[1].line.endswith(": SIGABRT")
+
+
 def test_a_family_is_told_in_one_line_and_as_plain_data():
     worst, mild = row("impulse[2]", 0.9, iterations=4), row("impulse[1]", 0.2, iterations=4)
     (family,) = families([mild, worst])

@@ -88,6 +88,19 @@ def test_a_whole_column_that_is_found_one_step_late_passes(dt):
     assert 0.999 * bound < depth <= bound
 
 
+@pytest.mark.parametrize("dt", DTS)
+@pytest.mark.parametrize("n", [1, 5, 20])
+def test_a_column_drifts_by_one_step_of_fall_at_each_of_its_interfaces(n, dt):
+    """A contact that is missing for a step lets what it holds go for g dt^2; the slips below a body add up in it."""
+    for share, passes in ((0.99, True), (1.01, False)):
+        scene, pose = sunk(n, 0.0, 1)
+        pose[1:, n, 0] += share * n * 9.81 * dt * dt
+        drift, bound = judged(
+            scene, Trajectory(np.arange(10) * dt, pose, np.zeros_like(pose), None, dt, "completed"), "drift"
+        )
+        assert (drift <= bound) is passes, share
+
+
 #: Checks that no step makes sharper: whole numbers, a load's scatter, which is a share of what moves unseen, and a
 #: speed to the round-off of a place over one step.
 AT_ANY_STEP = {"blows", "stands", "impulse_scatter", "thrown"}

@@ -41,6 +41,22 @@ def test_one_broken_receipt_makes_the_cell_invalid_and_every_row_an_alarm(monkey
     assert rows and all(row.alarming and row.physics is None for row in rows)
 
 
+def test_a_measure_that_is_not_finite_is_a_missing_value_with_its_reason(monkeypatch):
+    """It could be neither judged nor stored: one of them made a whole run unreadable."""
+    prepared = execution.prepare(SLOT)
+    found = {"momentum_defect": (math.inf, ""), "impulse": (math.nan, "late"), "rebound_ratio": (0.8, "")}
+    canonical = replace(prepared.canonical, measure=lambda scene, trajectory: found)
+    monkeypatch.setattr(execution, "prepare", lambda slot: replace(prepared, canonical=canonical))
+    observation = observed(monkeypatch, HOLDS)
+    assert observation.outcome is Outcome.OK
+    assert observation.metrics == {
+        "momentum_defect": (None, "the value is inf, not a finite number"),
+        "impulse": (None, "late; the value is nan, not a finite number"),
+        "rebound_ratio": (0.8, ""),
+    }
+    assert {row.metric for row in rows_of("run", [observation]) if row.standing == "new"} >= {"momentum_defect"}
+
+
 def test_a_receipt_that_could_not_be_measured_and_does_not_hold_is_broken_too(monkeypatch):
     silent = replace(BROKEN, measured=math.nan, because="probe slide diverged")
     assert observed(monkeypatch, silent).outcome is Outcome.INVALID

@@ -389,6 +389,17 @@ def test_growth_is_against_the_start_less_half_a_step_of_power_then_and_now():
     assert invariants.energy_growth(scene, moved(scene, (pose, 0.0 * twist), dt=STEP)) == (0.0, "")
 
 
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid value:RuntimeWarning")
+def test_energy_beyond_all_numbers_is_no_absence_of_growth():
+    """A body that explodes to 1e160 m/s: its energy and what round-off makes of it are both infinite."""
+    scene = over_floor(ball(), gravity=(0.0, 0.0))
+    speed = np.array([0.0, 1.0, 1e160, 1e160])
+    pose = np.column_stack([np.full(4, 7.0), np.full(4, 1.0), np.zeros(4)])
+    twist = np.column_stack([speed, np.zeros(4), np.zeros(4)])
+    growth, _ = invariants.energy_growth(scene, moved(scene, (pose, twist), dt=STEP))
+    assert not np.isfinite(growth)
+
+
 def test_ripples_of_all_bodies_and_round_off_of_the_work_at_play_are_taken_off():
     """Two balls that fall at 4 m/s each under 8 m/s^2; and one that has come far under a load that moves little."""
     scene = over_floor(ball("a"), ball("b"), gravity=(0.0, -8.0))

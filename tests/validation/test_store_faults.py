@@ -192,6 +192,25 @@ def test_six_simultaneous_starts_are_six_runs(tmp_path):
     assert len(Store(tmp_path, create=False).runs()) == 6
 
 
+def test_whoever_reads_what_it_will_write_by_has_the_lock_to_write_already(tmp_path, monkeypatch):
+    """Else two that start at once read that there is no such run, and one of them cannot write any more."""
+    made, asked = Store(tmp_path), []
+
+    class Now(datetime):
+        @classmethod
+        def now(cls, tz=None):  # called between what is read and what is written
+            other = sqlite3.connect(made.path, timeout=0.0, isolation_level=None)
+            with pytest.raises(sqlite3.OperationalError, match="locked"):
+                other.execute("BEGIN IMMEDIATE")
+            other.close()
+            asked.append(tz)
+            return datetime.now(tz)
+
+    monkeypatch.setattr(store, "datetime", Now)
+    made.start("test", SLOTS)
+    assert asked == [UTC]
+
+
 def test_the_latest_run_is_the_one_started_last_whatever_the_clock_said(tmp_path, monkeypatch):
     made = Store(tmp_path)
 

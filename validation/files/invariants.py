@@ -116,7 +116,8 @@ def energy_growth(scene: Scene, trajectory: Trajectory) -> Measured:
         path = np.linalg.norm(trajectory.pose[:, i, :d] - trajectory.pose[0, i, :d], axis=1)
         ripple += 0.5 * trajectory.dt * (power + power[0])
         ripple += ROUND_OFF * math.hypot(*_load(scene, body)) * path
-    return max(0.0, float((energy - energy[0] - ripple).max())), ""
+    # Not Python's max: what is no number must stay none, or energies beyond all numbers would read as no growth.
+    return float(np.maximum(0.0, energy - energy[0] - ripple).max()), ""
 
 
 def energy_bound(scene: Scene, dt: float) -> float:
