@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.bullet.experiments_elsewhere import ELSEWHERE
 from adapters.bullet.experiments_on_blows import on_blows
 from adapters.bullet.experiments_on_loads import ON_LOADS
 from adapters.bullet.experiments_on_rods import ON_RODS
@@ -415,3 +416,5 @@ EXPERIMENTS += ON_LOADS
 EXPERIMENTS += on_blows(_BARE)
 
 EXPERIMENTS += ON_RODS
+
+EXPERIMENTS += ELSEWHERE
