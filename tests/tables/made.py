@@ -9,6 +9,7 @@ import of_engines
 import of_kit
 import of_laws
 import of_motions
+import of_print
 import of_scenes
 from telling import Sections
 
@@ -34,6 +35,8 @@ KIT: Makers = {
     "kit/probes": of_kit.table_of_probes,
 }
 
+PRINTED: Makers = of_print.makers()
+
 
 def of_installed() -> Makers:
     """Tables that ask an engine, of those that are installed."""
@@ -48,4 +51,4 @@ def of_installed() -> Makers:
 
 def tables() -> Makers:
     """All of them that can be made here."""
-    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | of_installed()
+    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | PRINTED | of_installed()
