@@ -10,6 +10,7 @@ import of_kit
 import of_laws
 import of_motions
 import of_print
+import of_questions
 import of_scenes
 from telling import Sections
 
@@ -22,7 +23,7 @@ SCENES: Makers = {f"scenes/{name}": partial(of_scenes.table, name) for name in C
 MOTIONS: Makers = {f"motions/{name}": partial(of_motions.table, name) for name in CATALOGUE}
 LAWS: Makers = {
     f"laws/{engine}-{scene}": partial(of_laws.table, engine, scene)
-    for engine in of_laws.ENGINES
+    for engine in of_laws.ENGINES + of_laws.APART
     for scene in of_laws.scenes(engine)
 }
 EXPERIMENTS: Makers = {
@@ -35,6 +36,14 @@ KIT: Makers = {
     "kit/probes": of_kit.table_of_probes,
 }
 
+QUESTIONS: Makers = {
+    **{f"questions/posed-{name}": partial(of_questions.table_of_poses, name) for name in of_questions.POSED},
+    "questions/plans": of_questions.table_of_plans,
+    "questions/replays": of_questions.table_of_replays,
+    "questions/frontiers": of_questions.table_of_frontiers,
+    "questions/planted": of_questions.table_of_planted,
+    "questions/bench": of_questions.table_of_units,
+}
 PRINTED: Makers = of_print.makers()
 
 
@@ -51,4 +60,4 @@ def of_installed() -> Makers:
 
 def tables() -> Makers:
     """All of them that can be made here."""
-    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | PRINTED | of_installed()
+    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | QUESTIONS | PRINTED | of_installed()

@@ -1,0 +1,13 @@
+"""Scenes posed otherwise, cells of plans, replays, frontiers, planted faults and timed units are kept."""
+
+import pytest
+from made import QUESTIONS
+from telling import check
+
+for engine in ("pymunk", "mujoco"):
+    pytest.importorskip(engine)
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_what_questions_ask_is_as_it_was_kept(name):
+    check(name, QUESTIONS[name], share=1e-7, nothing=1e-9)
