@@ -4,7 +4,8 @@ import pytest
 from made import PRINTED
 from telling import check
 
-pytest.importorskip("altair")
+for package in ("altair", "pymunk", "pybullet", "mujoco"):
+    pytest.importorskip(package)
 
 
 @pytest.mark.parametrize("name", PRINTED)
