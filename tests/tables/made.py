@@ -45,6 +45,8 @@ QUESTIONS: Makers = {
     "questions/bench": of_questions.table_of_units,
 }
 PRINTED: Makers = of_print.makers()
+#: How the names of those end that are files, pages, or parts of them.
+PAGES = ("files", "bench", "frame", "page", "charts", "dashboard")
 
 
 def of_installed() -> Makers:

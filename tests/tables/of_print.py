@@ -12,7 +12,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from html import unescape
 from pathlib import Path
 from tempfile import mkdtemp
@@ -29,6 +29,7 @@ from reports import exports, speed
 from reports.command import main
 from reports.page import charts, load_source, render
 from reports.page.source import Source
+from reports.wording import row_id
 from validation.records.store import Store
 
 #: Every call of a command, without ``--out``, and its width in columns.
@@ -110,18 +111,12 @@ def numbered(text: str, name: str) -> dict[str, str]:
     return {f"{name} {k:04d}": f"|{line}|" for k, line in enumerate(plain.splitlines(), 1)}
 
 
-def explained() -> Sections:
-    """What ``explain`` says of one row of each kind, and as data."""
-    found = Sections()
-    for kind in KINDS:
-        row = next(row for row in source().rows if (row["outcome"], row["physics"], row["standing"]) == kind)
-        slot = row["slot"]
-        words = f"{row['engine']}/{row['profile']}/{row['scene']}"
-        from reports.wording import row_id
-
-        for name, more in (("text", ()), *((("json", ("--json",)),) if kind[2] == "known" else ())):
-            told = said(("explain", row_id(row), *more), 110)["said"]
-            found[f"{' '.join(map(str, kind))}: {words} {row['metric']} {slot['dimension']}-D, {name}"] = told
+def explained(kind: tuple[str, str | None, str | None]) -> Sections:
+    """What ``explain`` says of the first row of a kind, and of one of them as data."""
+    row = next(row for row in source().rows if (row["outcome"], row["physics"], row["standing"]) == kind)
+    found = {row["metric"]: said(("explain", row_id(row)), 110)["said"]}
+    if kind[2] == "known":
+        found["as data"] = said(("explain", row_id(row), "--json"), 110)["said"]
     return found
 
 
@@ -269,9 +264,10 @@ def data_frame() -> Sections:
 def makers() -> dict[str, Callable[[], Sections]]:
     """Tables of all that is shown."""
     found: dict[str, Callable[[], Sections]] = {
-        f"print/{name}": (lambda call=call, width=width: said(call, width)) for name, (call, width) in CALLS.items()
+        f"print/{name}": partial(said, call, width) for name, (call, width) in CALLS.items()
     }
     return found | {
-        "print/explain": explained, "print/files": exported, "print/bench": benched, "print/frame": data_frame,
+        **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
+        "print/files": exported, "print/bench": benched, "print/frame": data_frame,
         "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
     }  # fmt: skip
