@@ -8,13 +8,16 @@ from typing import Any
 from telling import Sections, section, word
 
 from adapters.scene import Scene
-from validation.canonical import CanonicalScene
+from validation.canonical import SUITES, CanonicalScene
 from validation.catalogue import CATALOGUE
 
 #: Steps at which bounds are told [s]: two, since a bound is made of its powers.
 STEPS = {"1/240": 1 / 240, "1/1000": 1 / 1000}
 #: Shares of a scene's duration at which the ghost of its replay is told.
 INSTANTS = (0.0, 0.3, 0.7, 1.0)
+
+#: What a scene says in a word or a line.
+SAID = ("title", "family", "law", "dimensions", "representative", "planted", "size", "smooth")
 
 
 def cells(canonical: CanonicalScene) -> Iterator[tuple[str, int, dict[str, float]]]:
@@ -34,7 +37,7 @@ def table(name: str) -> Sections:
     """Table of one scene."""
     canonical = CATALOGUE[name]
     return {title: cell(canonical, dimension, params) for title, dimension, params in cells(canonical)} | {
-        "beside its cells": timed(canonical)
+        "beside its cells": timed(canonical) | facts(canonical)
     }
 
 
@@ -83,3 +86,22 @@ def timed(canonical: CanonicalScene) -> dict[str, str]:
         for metric, rule in canonical.seen_as.items()
     }
     return section(timed=found, seen_as=seen)
+
+
+def facts(canonical: CanonicalScene) -> dict[str, str]:
+    """What a scene says of itself, a line for each parameter and cell: some of it is made by what scenes share."""
+    found = {name: str(getattr(canonical, name)) for name in SAID}
+    for each in canonical.parameters:
+        limits = f"{'(' if each.positive else '['}{each.low:g}, {each.high:g}]{' whole' * each.integer}"
+        found[f"parameter {each.name}"] = f"{word(each.default)} {each.unit} in {limits}: {each.because}"
+    for suite in SUITES:
+        found[f"cells of {suite}"] = "; ".join(
+            " ".join([*(f"{name}={value:g}" for name, value in each.params.items()), str(each.iterations),
+                      *map(str, each.dimensions)])
+            for each in canonical.variations(suite)
+        )  # fmt: skip
+    steps = canonical.steps
+    found["steps"] = "; ".join(f"{[f'{dt:.6g}' for dt in steps.dts(s)]} {steps.counts(s)}" for s in SUITES[::2])
+    found["studies"] = ", ".join(study.name for study in canonical.studies)
+    told = {"words": canonical.words, "searched": canonical.searched, "restitution": canonical.restitution}
+    return found | section(**told, primary=canonical.primary, frontiers=canonical.frontiers)
