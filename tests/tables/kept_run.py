@@ -200,7 +200,7 @@ def main() -> None:
         line_of("20260103-000000", "2026-01-03T00:00:00+00:00", "quick", [*found, *ended_badly()], texts,
                 lost=["0123456789abcdef"], recordings=replays),
         *(line_of(f"2026010{4 + k}-000000", f"2026-01-0{4 + k}T00:00:00+00:00", f"release mujoco=={version}: impact",
-                  [replace(each, engine_version=version) for each in found
+                  [_moved(replace(each, engine_version=version), m if k else 1) for m, each in enumerate(found)
                    if each.slot.engine == "mujoco" and each.slot.scene in ("impact", "slide")], texts)
           for k, version in enumerate(("3.2.7", "3.12.0"))),
     ]  # fmt: skip

@@ -11,6 +11,7 @@ import of_laws
 import of_motions
 import of_print
 import of_questions
+import of_results
 import of_scenes
 from telling import Sections
 
@@ -62,4 +63,4 @@ def of_installed() -> Makers:
 
 def tables() -> Makers:
     """All of them that can be made here."""
-    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | QUESTIONS | PRINTED | of_installed()
+    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | QUESTIONS | PRINTED | of_results.MAKERS | of_installed()
