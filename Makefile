@@ -8,7 +8,7 @@ OUT ?= crosscheck-out
 SUITE ?= quick
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-long recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection clean
+.PHONY: run test test-long recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection tables clean
 
 setup: $(STAMP)
 
@@ -119,3 +119,7 @@ mutants-sample: $(STAMP)
 # What every check and receipt can see, from faults planted in our solver, which passes them all; three minutes of CPU.
 detection: $(STAMP)
 	COLUMNS=120 $(BIN)/crosscheck list checks --sensitivity > validation/questions/detection.txt
+
+# What scenes are, what is true and allowed in them, what laws predict and profiles set, as kept texts: read their diff.
+tables: $(STAMP)
+	$(BIN)/python tests/tables/make.py

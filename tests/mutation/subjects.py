@@ -52,6 +52,7 @@ SUBJECTS = {
     "validation/metrics.py": ("validation/test_metrics.py",),
     "validation/files/quantities.py": ("validation/test_quantities.py", "validation/test_scene_files.py"),
     "adapters/law.py": (
+        "adapters/test_law.py",
         "validation/test_verdicts.py",
         "validation/test_deviations_chipmunk.py",
         "validation/test_worked_bounds.py",

@@ -209,3 +209,12 @@ def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_a
         (speaks, 0.25, 0.5)
     ]
     assert asked == [("the scene", 0.25, "its measure")]
+
+
+def test_at_iterations_that_are_asked_for_a_law_says_what_those_make():
+    def asked(scene, dt, measure, iterations):
+        return float(iterations), 0.1
+
+    law = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: (1.0, 0.1), "because", "source", (), asked)
+    assert predicted([law], "the scene", SimpleNamespace(dt=0.25, iterations=7), "its measure") == [(law, 7.0, 0.1)]
+    assert predicted([law], "the scene", SimpleNamespace(dt=0.25, iterations=None), "its measure") == [(law, 1.0, 0.1)]

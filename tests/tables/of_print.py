@@ -1,0 +1,273 @@
+"""Tables of what is shown: commands, files and pages about the run that is kept (`kept_run`), word by word.
+
+No engine runs and no picture is drawn: charts are told by their specifications.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache, partial
+from html import unescape
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+from unittest.mock import patch
+
+import kept_run
+import pandas as pd
+from click.testing import CliRunner
+from rich.console import Console
+from telling import Sections
+
+from reports import exports, speed
+from reports.command import main
+from reports.page import charts, load_source, render
+from reports.page.source import Source
+from reports.wording import row_id
+from validation.records.store import Store
+
+#: Every call of a command, without ``--out``, and its width in columns.
+CALLS: dict[str, tuple[tuple[str, ...], int]] = {
+    "show": (("show",), 100),
+    "show-narrow": (("show",), 60),
+    "show-all": (("show", "--all"), 140),
+    "show-earlier": (("show", "20260101-000000"), 100),
+    "show-json": (("show", "--json"), 100),
+    "findings": (("findings",), 120),
+    "findings-narrow": (("findings",), 70),
+    "findings-all": (("findings", "--all"), 120),
+    "findings-new": (("findings", "--new"), 120),
+    "findings-of": (("findings", "--engine", "mujoco", "--profile", "default", "--scene", "impact"), 120),
+    "findings-json": (("findings", "--json", "--new"), 120),
+    "compare": (("compare", "20260101-000000", "20260103-000000"), 120),
+    "compare-regressed": (("compare", "20260101-000000", "20260103-000000", "--only-regressed"), 120),
+    "compare-markdown": (("compare", "20260101-000000", "20260103-000000", "--markdown", "--only-changed"), 120),
+    "compare-json": (("compare", "mujoco==3.2.7", "mujoco==3.12.0", "--json"), 120),
+    "list-scenes": (("list", "scenes"), 140),
+    "list-suites": (("list", "suites"), 140),
+    "list-runs": (("list", "runs"), 100),
+    "prune": (("prune", "--keep", "1", "--dry-run"), 100),
+    "prune-json": (("prune", "--older-than", "3", "--unfinished", "--dry-run", "--json"), 100),
+    "nulls-impact": (("nulls", "impact"), 120),
+    "nulls-json": (("nulls", "slide", "--json"), 120),
+    "describe-bounce": (("describe", "bounce"), 100),
+    "describe-stack": (("describe", "stack"), 120),
+    "describe-pinch": (("describe", "pinch", "--json"), 120),
+    "describe-chipmunk": (("describe", "chipmunk"), 120),
+    "describe-mujoco": (("describe", "mujoco"), 120),
+}
+#: Rows of every kind that ``explain`` is asked for: outcome, mark of physics, standing.
+KINDS = (
+    ("ok", "fail", "explained"), ("ok", "fail", "known"), ("ok", "fail", "new"), ("ok", "pass", None),
+    ("ok", "pass", "drifted"), ("unsupported", None, "known"), ("crashed", None, None),
+)  # fmt: skip
+#: Lines of a part of a page that are told; more of the same follow.
+LONGEST = 900
+#: Long texts in a page that are none: packed data, and what is hashed of style and script.
+_PACKED = re.compile(r"[A-Za-z0-9+/=]{120,}")
+_HASHED = re.compile(r"'sha256-[^']+'")
+_CODE = re.compile(r"<(style|script)>.*?</\1>", re.DOTALL)
+
+
+@cache
+def folder() -> Path:
+    """Results folder with the run that is kept, made once for all."""
+    found = Path(mkdtemp(prefix="crosscheck-kept-"))
+    kept_run.fill(found)
+    return found
+
+
+@cache
+def source() -> Source:
+    """What a page is made from."""
+    return load_source(folder())
+
+
+def said(arguments: Sequence[str], width: int) -> Sections:
+    """What a command prints, and its status."""
+    call = [*arguments, "--out", str(folder())] if takes_out(arguments[0]) else list(arguments)
+    with patch.dict("os.environ", {"COLUMNS": str(width), "NO_COLOR": "1", "TERM": "dumb"}):
+        result = CliRunner().invoke(main, call)
+    told = {"status": str(result.exit_code)}
+    for name, text in (("out", result.stdout), ("err", result.stderr)):
+        told |= numbered(text, name)
+    return {"said": told}
+
+
+def takes_out(command: str) -> bool:
+    """Whether a command has ``--out``."""
+    return any("--out" in option.opts for option in main.commands[command].params)
+
+
+def numbered(text: str, name: str) -> dict[str, str]:
+    """Lines of a text by their number; paths of this machine are none."""
+    plain = text.replace(str(folder()), "OUT")
+    return {f"{name} {k:04d}": f"|{line}|" for k, line in enumerate(plain.splitlines(), 1)}
+
+
+def explained(kind: tuple[str, str | None, str | None]) -> Sections:
+    """What ``explain`` says of the first row of a kind, and of one of them as data."""
+    row = next(row for row in source().rows if (row["outcome"], row["physics"], row["standing"]) == kind)
+    found = {row["metric"]: said(("explain", row_id(row)), 110)["said"]}
+    if kind[2] == "known":
+        found["as data"] = said(("explain", row_id(row), "--json"), 110)["said"]
+    return found
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def exported() -> Sections:
+    """What a run writes beside the store, of rows of all kinds, a few of each."""
+    kinds: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for row in source().rows:
+        kinds.setdefault((row["outcome"], row["physics"], row["standing"]), []).append(row)
+    rows = [row for own in kinds.values() for row in own[:3]]
+    texts = {
+        "rows.csv": exports.as_csv(rows),
+        "rows.jsonl": exports.as_jsonl(rows[:6]),
+        "summary.md": exports.as_markdown(rows),
+        "junit.xml": exports.as_junit(rows).replace("><", ">\n<"),
+    }
+    return {name: numbered(text, "line") for name, text in texts.items()}
+
+
+def benched() -> Sections:
+    """Tables about speed: on the terminal, and as data."""
+    bench = source().bench
+    assert bench is not None
+    out, tables = io.StringIO(), bench.tables
+    console = Console(file=out, width=140, markup=False, emoji=False, no_color=True)
+    for table in (
+        *speed.level_tables(tables["work_points"]), *speed.level_tables(tables["work_points"], ranked=False),
+        speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"]),
+    ):  # fmt: skip
+        console.print(table)
+    console.print(speed.quality_line(tables["timings"]), speed.busy(tables["timings"]), speed.key(True))
+    found = {"terminal": numbered(out.getvalue(), "line")}
+    for name, table in tables.items():
+        found[name] = {
+            f"{k:03d}": json.dumps(row, sort_keys=True, default=str) for k, row in enumerate(speed.plain(table)[:12])
+        }
+        found[name]["rows"] = str(len(table))
+    store = Store(folder(), create=False)
+    try:
+        costs = speed.cheapest_passing(store, bench.run)
+    finally:
+        store.close()
+    found["cheapest"] = {" ".join(map(str, key)): f"{cost:.9g}" for key, cost in costs.items()}
+    return found
+
+
+# ---- pages -----------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def undrawn() -> Iterator[list[dict[str, Any]]]:
+    """Charts are not drawn but told: their specifications in the order in which they were asked for."""
+    asked: list[dict[str, Any]] = []
+
+    def tell(spec: dict[str, Any]) -> str:
+        asked.append(spec)
+        return f'<svg class="marks"><text>chart {len(asked)}</text></svg>'
+
+    with patch.object(charts.vl_convert, "vegalite_to_svg", tell):
+        yield asked
+
+
+@cache
+def pages() -> tuple[str, tuple[dict[str, Any], ...]]:
+    """The report, and the specifications of its charts."""
+    with undrawn() as asked:
+        return render(source()), tuple(asked)
+
+
+def page_parts() -> Sections:
+    """The report, tag by tag, in parts that begin with a heading; packed data is told unpacked where it is text."""
+    text = _CODE.sub(lambda found: f"<{found[1]}>", pages()[0])
+    parts, title = Sections({"top": {}}), "top"
+    for piece in re.split(r"(?=<)", _HASHED.sub("'sha256'", text)):
+        line = " ".join(unescape(_PACKED.sub(unpacked, piece)).split())
+        if re.match(r"<h[12]\b", line):
+            title = f"{len(parts)} {line.partition('>')[2]}"[:60]
+            parts[title] = {}
+        if line and line not in ("</td>", "</tr>", "</li>", "</span>"):
+            parts[title][f"{len(parts[title]):04d}"] = line
+    return {title: dict(list(own.items())[:LONGEST]) | {"lines": str(len(own))} for title, own in parts.items()}
+
+
+def unpacked(found: re.Match[str]) -> str:
+    """Packed text is told by its head, and how long it is; what is no text by its name alone."""
+    try:
+        text = gzip.decompress(base64.b64decode(found[0])).decode()
+    except (OSError, ValueError, EOFError):
+        return "(packed)"
+    return f"(packed: {text[:200]} ... of {len(text)})"
+
+
+def page_charts() -> Sections:
+    """Specifications of the charts: scales, axes, marks, and the first points of each."""
+    found = Sections()
+    for k, spec in enumerate(pages()[1], 1):
+        plain = {key: value for key, value in spec.items() if key not in ("config", "$schema")}
+        data = plain.pop("datasets", {})
+        lines = dict(_flat(json.loads(json.dumps(plain, default=str, sort_keys=True)), ""))
+        own = {path: told for path, told in lines.items() if not path.endswith(("data.name", ".name", ".views[0]"))}
+        for m, rows in enumerate(data.values()):
+            own[f"points {m}"] = f"{len(rows)}"
+            own |= {f"points {m} {n:02d}": json.dumps(row, sort_keys=True) for n, row in enumerate(rows[:8])}
+        found[f"chart {k}"] = own
+    return found
+
+
+def _flat(value: Any, path: str) -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from _flat(part, f"{path}.{key}")
+    elif isinstance(value, list):
+        for k, part in enumerate(value):
+            yield from _flat(part, f"{path}[{k}]")
+    else:
+        yield path, str(value)
+
+
+def dashboard() -> Sections:
+    """The page over all runs and releases, tag by tag."""
+    from reports.dashboard import render as drawn
+    from reports.dashboard.series import panels
+
+    store = Store(folder(), create=False)
+    try:
+        text = drawn(panels(store, folder()), "Kept")
+    finally:
+        store.close()
+    text = _HASHED.sub("'sha256'", _CODE.sub(lambda found: f"<{found[1]}>", text))
+    lines = [" ".join(unescape(piece).split()) for piece in re.split(r"(?=<)", text)]
+    return {"dashboard": {f"{k:04d}": line for k, line in enumerate(filter(None, lines))}}
+
+
+def data_frame() -> Sections:
+    """What a notebook gets of a run: columns and their kinds, and some rows."""
+    found = exports.load(folder(), nulls=True)
+    kinds = {f"column {name}": str(kind) for name, kind in found.dtypes.items()}
+    told = pd.concat([found.head(3), found.tail(3)]).to_dict("records")
+    rows = {f"row {k} {name}": str(value) for k, row in enumerate(told) for name, value in row.items()}
+    return {"frame": kinds | rows | {"rows": str(len(found))}}
+
+
+def makers() -> dict[str, Callable[[], Sections]]:
+    """Tables of all that is shown."""
+    found: dict[str, Callable[[], Sections]] = {
+        f"print/{name}": partial(said, call, width) for name, (call, width) in CALLS.items()
+    }
+    return found | {
+        **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
+        "print/files": exported, "print/bench": benched, "print/frame": data_frame,
+        "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
+    }  # fmt: skip

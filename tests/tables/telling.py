@@ -1,0 +1,149 @@
+"""Things as lines of text that can be kept and compared: ``path = value``, one number or sentence each.
+
+A table is a list of sections. Of cells the first one has all of its lines, a later one those in which it differs from
+the first (one in space from the same in the plane), so that a table says what a parameter changes and a diff of it what
+a change of the code does. Numbers are told to 12
+digits and compared to nine: libraries of mathematics differ in the last place, and sums of a thousand terms in more.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: Title of a section and its lines.
+Sections = dict[str, dict[str, str]]
+#: Share of a number by which machines may differ, and below which it is nothing.
+SHARE, NOTHING = 1e-9, 1e-14
+KEPT = Path(__file__).parent / "kept"
+#: Stands for a line of the first section that a later one does not have.
+ABSENT = "(absent)"
+_NUMBER = re.compile(r"(?<![\w.])-?\d+\.?\d*(?:e[+-]?\d+)?(?![\w.])")
+
+
+def lines(thing: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """Every number, word and truth of a thing, with the way to it."""
+    if isinstance(thing, Enum):
+        yield path, str(thing.value)
+    elif is_dataclass(thing):
+        if path.endswith("shape"):
+            yield path, type(thing).__name__
+        for field in (field for field in fields(thing) if not field.name.startswith("_")):
+            yield from lines(getattr(thing, field.name), f"{path}.{field.name}".lstrip("."))
+    elif isinstance(thing, Mapping):
+        yield from ((path, "{}") for _ in range(not thing))
+        for key, value in thing.items():
+            yield from lines(value, f"{path}.{key}".lstrip("."))
+    elif isinstance(thing, np.ndarray) and thing.ndim:
+        yield from lines(thing.tolist(), path)
+    elif isinstance(thing, list | tuple):
+        if all(isinstance(each, bool | int | float | np.number) for each in thing):
+            yield path, f"({', '.join(map(word, thing))})"
+        else:
+            for k, each in enumerate(thing):
+                yield from lines(each, f"{path}[{k}]")
+    elif isinstance(thing, set | frozenset):
+        yield path, f"{{{', '.join(sorted(map(word, thing)))}}}"
+    elif not callable(thing) or isinstance(thing, type):
+        yield path, word(thing)
+
+
+def word(thing: Any) -> str:
+    """A number to 12 digits, a text in one line."""
+    if isinstance(thing, bool | np.bool_ | int | None):
+        return str(thing)
+    if isinstance(thing, float | np.floating):
+        return f"{float(thing) + 0.0:.12g}"
+    return (
+        repr(str(thing)) if str(thing) != str(thing).strip() or not str(thing) else "\\n".join(str(thing).split("\n"))
+    )
+
+
+def section(**things: Any) -> dict[str, str]:
+    """Lines of things by their names.
+
+    Raises
+    ------
+    ValueError
+        If two lines have one name.
+    """
+    found: dict[str, str] = {}
+    for name, thing in things.items():
+        for path, told in lines(thing, name):
+            if path in found:
+                raise ValueError(f"two lines are called {path}")
+            found[path] = told
+    return found
+
+
+def told_from(title: str, sections: Sections) -> dict[str, str]:
+    """Lines of the section that one of this title is told as a difference from."""
+    if not title.startswith(("2-D", "3-D")):
+        return {}
+    return sections.get(title.replace("3-D", "2-D", 1)) or next(iter(sections.values()), {})
+
+
+def as_text(sections: Sections) -> str:
+    """The table as it is kept."""
+    out, told_before = list[str](), Sections()
+    for title, own in sections.items():
+        base = told_from(title, told_before)
+        out.append(f"[{title}]")
+        missing = {path: ABSENT for path in base if path not in own}
+        out += [f"{path} = {told}" for path, told in (own | missing).items() if base.get(path) != told]
+        told_before[title] = own
+    return "\n".join(out) + "\n"
+
+
+def from_text(text: str) -> Sections:
+    """Inverse of `as_text`."""
+    found: Sections = {}
+    own: dict[str, str] = {}
+    for line in text.splitlines():
+        if line.startswith("[") and line.endswith("]") and " = " not in line:
+            own = found[line[1:-1]] = dict(told_from(line[1:-1], found))
+        else:
+            path, _, told = line.partition(" = ")
+            if told == ABSENT:
+                del own[path]
+            else:
+                own[path] = told
+    return found
+
+
+def agree(told: str, kept: str, share: float = SHARE, nothing: float = NOTHING) -> bool:
+    """Whether two values are one: texts letter by letter, numbers in them to what machines may differ by."""
+    if told == kept:
+        return True
+    if _NUMBER.sub("#", told) != _NUMBER.sub("#", kept):
+        return False
+    pairs = zip(_NUMBER.findall(told), _NUMBER.findall(kept), strict=True)
+    return all(math.isclose(float(a), float(b), rel_tol=share, abs_tol=nothing) for a, b in pairs)
+
+
+def differences(made: Sections, kept: Sections, share: float = SHARE, nothing: float = NOTHING) -> list[str]:
+    """What is no longer as it was kept, a line each."""
+    out = [f"[{title}] is {'new' if title in made else 'gone'}" for title in made.keys() ^ kept.keys()]
+    for title in made.keys() & kept.keys():
+        now, before = made[title], kept[title]
+        out += [
+            f"[{title}] {path}: {before.get(path, ABSENT)} -> {now.get(path, ABSENT)}"
+            for path in dict.fromkeys([*before, *now])
+            if not agree(now.get(path, ABSENT), before.get(path, ABSENT), share, nothing)
+        ]
+    return sorted(out)
+
+
+def check(name: str, make: Callable[[], Sections], share: float = SHARE, nothing: float = NOTHING) -> None:
+    """Fail with what differs between a table and what is made today, by more than a share or an amount that is some."""
+    kept = from_text((KEPT / f"{name}.txt").read_text(encoding="utf-8"))
+    found = differences(make(), kept, share, nothing)
+    told = "\n".join(found[:20])
+    assert not found, f"{len(found)} lines of {name} are others. If that is meant: make tables, and say why\n{told}"

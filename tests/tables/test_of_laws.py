@@ -1,0 +1,13 @@
+"""What laws predict is kept, with bands and reasons."""
+
+import pytest
+from made import LAWS
+from of_laws import APART
+from telling import check
+
+OWN = [name for name in LAWS if not name.startswith(tuple(f"laws/{engine}-" for engine in APART))]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_what_a_law_predicts_is_as_it_was_kept(name):
+    check(name, LAWS[name], share=1e-7, nothing=1e-10)

@@ -1,0 +1,61 @@
+"""Tables themselves: what is written is read back, what differs is told, what machines may differ by is not."""
+
+import pytest
+from made import tables
+from telling import ABSENT, KEPT, agree, as_text, check, differences, from_text, section
+
+CELLS = {
+    "2-D": {"mass": "1", "place": "(0, 0.5)", "says": "rests at r"},
+    "2-D e=1": {"mass": "1", "place": "(0, 1)", "bounces": "3"},
+    "3-D e=1": {"mass": "1", "place": "(0, 0, 1)", "bounces": "3"},
+    "beside": {"cells": "2"},
+}
+
+
+def test_a_table_is_read_as_it_was_written_and_later_cells_say_what_differs():
+    text = as_text(CELLS)
+    assert from_text(text) == CELLS
+    assert text.count("mass = 1") == 1 and f"says = {ABSENT}" in text
+    assert text.split("[3-D e=1]\n")[1].split("\n[")[0] == "place = (0, 0, 1)"
+
+
+@pytest.mark.parametrize(
+    ("told", "kept", "same"),
+    [
+        ("1.00000000001", "1", True), ("1.0001", "1", False), ("1e-16", "0", True), ("1e-8", "0", False),
+        ("3 balls", "3 bolls", False), ("at 0.1 +- 0.01", "at 0.1 +- 0.02", False), ("None", "0", False),
+        ("(0, 1)", "(0, 1, 2)", False), ("x2", "x3", False),
+    ],
+)  # fmt: skip
+def test_numbers_agree_to_nine_digits_and_words_to_the_letter(told, kept, same):
+    assert agree(told, kept) is same
+
+
+def test_what_differs_is_told_with_both_values():
+    made = {**CELLS, "2-D": {**CELLS["2-D"], "mass": "2"}}
+    del made["beside"]
+    assert differences(made, CELLS) == ["[2-D] mass: 1 -> 2", "[beside] is gone"]
+    assert differences(CELLS, CELLS) == []
+
+
+def test_a_table_that_is_not_as_it_was_kept_fails_and_names_the_command():
+    name = "scenes/hilltop"
+    kept = from_text((KEPT / f"{name}.txt").read_text(encoding="utf-8"))
+    check(name, lambda: kept)
+    wrong = {title: dict(own) for title, own in kept.items()}
+    wrong["2-D"]["truth.level_speed"] = "1"
+    with pytest.raises(AssertionError, match=r"1 lines of scenes/hilltop are others. If that is meant: make tables"):
+        check(name, lambda: wrong)
+
+
+def test_two_lines_of_one_name_are_an_error():
+    with pytest.raises(ValueError, match=r"two lines are called a\.b"):
+        section(**{"a": {"b": 1}, "a.b": 2})
+
+
+def test_every_table_that_is_kept_is_made_by_something():
+    kept = {str(path.relative_to(KEPT).with_suffix("")) for path in KEPT.rglob("*.txt")}
+    made = set(tables())
+    assert made <= kept
+    # Tables of engines that are not installed here are kept as well.
+    assert {name.partition("/")[0] for name in kept - made} <= {"settings", "held"}
