@@ -37,6 +37,7 @@ _STOPPED: tuple[_Row, ...] = (
     ("ladder-residual", "default", "ladder", "wall_load", {"lean": 75.0}, 2, None),
     ("pressed-box-residual", "default", "pressed_box", "creep", {"load": 0.0, "shear": 0.49}, 2, None),
     ("pressed-box-residual", "default", "pressed_box", "creep", {"load": 9.0, "shear": 4.9}, 2, _FINE),
+    ("long-rest-residual", "default", "long_rest", "drift_per_hour", _PLAIN, 2, 1.0 / 480.0),
     ("seam-residual", "default", "seam", "astray", _PLAIN, 3, _FINE),
     ("position-correction-residual", "default", "position_correction", "drift", _PLAIN, 2, _FINE),
     ("tilt-table-residual", "default", "tilt_table", "turned", {"ratio": 1.1, "aspect": 1.0}, 3, _FINE),
