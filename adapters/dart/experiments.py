@@ -144,5 +144,26 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         iterations=4,
         idle=(_FINE,),
     ),
+    *(
+        Experiment(
+            "starved-few-sweeps",
+            "with enough sweeps it carries; a finer tolerance does not help",
+            profile,
+            "starved",
+            metric,
+            {"iterations": 10000},
+            iterations=sweeps,
+            idle=(_FINE,),
+        )
+        for profile, metric, sweeps in (("nsgs", "displacement", 4), ("fbf", "load_error", 1))
+    ),
+    *_each(
+        "rack-sweeps-end-early",
+        "with a finer tolerance both sides get the same to the last digits; other points of contact do not help",
+        _FINE,
+        (_OTHERS,),
+        ("nsgs", "rack", 2, "asymmetry", {}),
+        ("fbf", "rack", 2, "asymmetry", {}),
+    ),
     *_swept("stack-few-sweeps", 2000, ("pgs", "stack", 2, "kinetic_energy", {"n": 5.0})),
 )
