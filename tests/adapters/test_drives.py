@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.drives import Harmonic, as_moving, asked_abilities, top_speed, velocity_over
+from adapters.drives import Harmonic, as_moving, asked_abilities, place_after, top_speed, velocity_over
 from adapters.engine import EngineError
 from adapters.lift import lift, lowered
 from adapters.needs import needs
@@ -197,6 +197,18 @@ def test_velocity_of_a_course_adds_up_to_its_path():
     t = 100 * DT
     assert path == pytest.approx([0.1 * t, 2.0 * (math.sin(6.0 * math.pi * t + 1.0) - math.sin(1.0)), 0.0], abs=1e-12)
     assert top_speed(body) == pytest.approx(0.1 + 12.0 * math.pi)
+
+
+@pytest.mark.parametrize("course", [None, Harmonic((0.0, 2.0, 0.5), 3.0, 1.0)])
+def test_a_prescribed_body_is_where_its_velocities_have_taken_it(course):
+    body = Body(
+        "b", Sphere(1.0), motion="prescribed", pose=(1.0, 2.0, 3.0, 1.0, 0, 0, 0), twist=(0.1, 0, -1.0, 0, 0, 0)
+    )
+    body = Scene("s", 1, 3, (replace(body, course=course),), (), (0, 0, 0), 1.0).bodies[0]
+    gone = np.zeros(3)
+    for k in range(50):
+        assert place_after(body, k * DT) == pytest.approx(np.array([1.0, 2.0, 3.0]) + gone, abs=1e-12)
+        gone += DT * np.array(velocity_over(body, DT, k))
 
 
 def test_lift_takes_drives_along_and_a_course_is_not_lowered():

@@ -139,3 +139,12 @@ def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monke
     monkeypatch.setattr(told_cures, "decisive", lambda *asked: SimpleNamespace(parts=()))
     found = {change.name: change for change in told_cures.changes(kept, "impact", 2, "bullet", "default", "tuned")}
     assert "belongs to the solver of bullet" in vars(found["useMaximalCoordinates"]).values()
+
+
+@pytest.mark.parametrize(("standing", "covered"), [("known", True), ("known", False), ("new", True), (None, False)])
+def test_a_row_is_counted_for_an_entry_that_covers_it_and_by_which_it_is_known(standing, covered):
+    slot = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
+    entry = SimpleNamespace(covers=lambda asked: covered and asked == slot)
+    assert fairness._is_about({"standing": standing, "slot": slot.as_dict()}, entry) is (
+        standing == "known" and covered
+    )

@@ -26,9 +26,12 @@ from rich.console import Console
 from telling import Sections
 
 from reports import exports, speed
+from reports.answers import answers
 from reports.command import main
-from reports.page import charts, load_source, render
+from reports.page import charts, choosing, conclusions, load_source, render
+from reports.page.families import families
 from reports.page.source import Source
+from reports.summary import show as show_summary
 from reports.wording import row_id
 from validation.records.store import Store
 
@@ -165,6 +168,41 @@ def benched() -> Sections:
     return found
 
 
+#: Rows of which the page's sentences are told: what is said where nothing, or nothing else, is there.
+PARTS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+    "none": lambda row: False,
+    "passes": lambda row: row["physics"] == "pass" and row["standing"] is None,
+    "explained": lambda row: row["standing"] in (None, "explained") and row["outcome"] == "ok",
+    "known": lambda row: row["standing"] == "known",
+    "new": lambda row: row["standing"] in ("new", "drifted"),
+    "crashed": lambda row: row["outcome"] in ("crashed", "timed_out"),
+    "refused": lambda row: row["outcome"] == "unsupported",
+    "unlisted": lambda row: row["standing"] is None and row["outcome"] == "ok",
+    "shipped": lambda row: row["profile"] == "default",
+    "ours": lambda row: row["engine"] == "reference",
+    "one scene": lambda row: row["scene"] == "slide",
+    "two": lambda row: row["engine"] in ("chipmunk", "bullet") and row["scene"] in ("impact", "bounce"),
+}
+
+
+def sentences() -> Sections:
+    """What the page and the terminal conclude from parts of the rows."""
+    found = Sections()
+    for name, belongs in PARTS.items():
+        rows = [row for row in source().rows if belongs(row)]
+        keys = {json.dumps(row["slot"], sort_keys=True) for row in rows}
+        seen = [o for o in source().observations if json.dumps(o.slot.as_dict(), sort_keys=True) in keys]
+        part = Source(source().run, rows, seen, nulls=source().nulls)
+        said = {f"sentence {k}": f"{head}: {text}" for k, (head, text) in enumerate(conclusions.sentences(part))}
+        said |= {f"family {k}": str(each) for k, each in enumerate(families(part))}
+        said |= {f"choice {k}": str(each) for k, each in enumerate(choosing.choices(part))}
+        said |= {f"answer {k}": each.line for k, each in enumerate(answers(rows))}
+        out = io.StringIO()
+        show_summary(rows, Console(file=out, width=100, markup=False, emoji=False, no_color=True))
+        found[name] = said | numbered(out.getvalue(), "terminal")
+    return found
+
+
 # ---- pages -----------------------------------------------------------------------------------------------------------
 
 
@@ -268,6 +306,6 @@ def makers() -> dict[str, Callable[[], Sections]]:
     }
     return found | {
         **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
-        "print/files": exported, "print/bench": benched, "print/frame": data_frame,
+        "print/sentences": sentences, "print/files": exported, "print/bench": benched, "print/frame": data_frame,
         "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
     }  # fmt: skip

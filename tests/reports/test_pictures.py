@@ -1,0 +1,61 @@
+"""Pictures of a report: what is asked of the browser, in which order, and what is written into each picture."""
+
+import struct
+import sys
+import zlib
+from types import ModuleType, SimpleNamespace
+from unittest.mock import MagicMock
+
+import pytest
+
+from reports import pictures
+
+#: A picture of one point: signature, header, no data.
+PNG = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + b"IHDR" + bytes(17) + b"the rest"
+
+
+@pytest.fixture
+def browser(monkeypatch):
+    """A browser that writes the same picture wherever it is asked for one."""
+    page = MagicMock()
+    page.locator.return_value.inner_text.return_value = "run 1, commit c0ffee"
+
+    def screenshot(path):
+        path.write_bytes(PNG)
+
+    page.locator.return_value.first.screenshot.side_effect = screenshot
+    page.locator.return_value.screenshot.side_effect = screenshot
+    found = MagicMock()
+    found.new_context.return_value.new_page.return_value = page
+    opened = MagicMock()
+    opened.return_value.__enter__.return_value.chromium.launch.return_value = found
+    module = ModuleType("playwright.sync_api")
+    module.sync_playwright = opened
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", module)
+    return SimpleNamespace(page=page, found=found, opened=opened)
+
+
+def test_every_part_is_taken_in_light_and_dark_without_a_network_and_says_its_run(browser, tmp_path):
+    report = tmp_path / "report.html"
+    pictures.main(str(report), str(tmp_path / "new" / "folder"))
+    taken = sorted(path.name for path in (tmp_path / "new" / "folder").iterdir())
+    assert taken == sorted(
+        f"{name}-{scheme}.png" for name in (*pictures.SHOTS, "replay") for scheme in pictures.SCHEMES
+    )
+    asked = [call.kwargs for call in browser.found.new_context.call_args_list]
+    size = {"width": 1280, "height": 860}
+    assert asked == [{"viewport": size, "color_scheme": scheme, "offline": True, "bypass_csp": True}
+                     for scheme in ("light", "dark")]  # fmt: skip
+    assert [call.args for call in browser.page.goto.call_args_list] == [(report.as_uri(),)] * 2
+    assert [call.kwargs for call in browser.page.add_style_tag.call_args_list] == [{"content": pictures.STYLE}] * 2
+    wanted = [*pictures.SHOTS.values(), "#replay-time", "#replay-canvas", "footer"]
+    assert [call.args[0] for call in browser.page.locator.call_args_list] == wanted * 2
+    assert [call.args for call in browser.page.select_option.call_args_list[:2]] == [
+        ("#replay-scene", "replay-bounce-2"), ("#replay-layout", "beside")]  # fmt: skip
+    browser.page.locator.return_value.fill.assert_called_with("34")
+    assert browser.found.new_context.return_value.close.call_count == 2
+    browser.found.close.assert_called_once_with()
+    body = b"tEXtSource\0run 1, commit c0ffee"
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    for name in taken:
+        assert (tmp_path / "new" / "folder" / name).read_bytes() == PNG[:33] + chunk + PNG[33:]
