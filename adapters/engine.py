@@ -294,6 +294,14 @@ class Engine(ABC):
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Why this engine cannot honour ``scene``, or None; the scene has a dimension the engine knows."""
 
+    def too_coarse(self, scene: Scene, dt: float) -> str | None:
+        """Why steps of ``dt`` [s] are too long for ``scene`` here, or None; of a scene that is not refused."""
+        return None
+
+    def refusal(self, scene: Scene, profile: str, dt: float) -> str | None:
+        """Why this engine cannot run ``scene`` in steps of ``dt`` [s], or None: such a cell is UNSUPPORTED."""
+        return self.refuses(scene, profile) or self.too_coarse(scene, dt)
+
     @abstractmethod
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; ``settings`` holds every setting of the profile by name, ``iterations`` included."""

@@ -57,6 +57,10 @@ class Planted(Engine):
         """What the engine refuses."""
         return self.inner.refuses(scene, profile)
 
+    def too_coarse(self, scene: Scene, dt: float) -> str | None:
+        """What the engine's steps are too long for."""
+        return self.inner.too_coarse(scene, dt)
+
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """What the healthy engine declares: a fault is not declared."""
         return self.inner.declares(profile, needs, dt)

@@ -96,21 +96,24 @@ class ChipmunkEngine(Engine):
                 return f"pairs: {quantity} of a pair is a product of two factors here, this table has none"
         return None
 
+    def too_coarse(self, scene: Scene, dt: float) -> str | None:
+        """Steps in which a body could pass the ground's polygon."""
+        return leaves_ground(scene, dt)
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.
 
         Raises
         ------
         EngineError
-            For a spatial scene, a scene that `refuses` names, a bad step or setting, or a scene that could leave
-            the ground's polygon.
+            For a spatial scene, a scene that `refusal` names, or a bad step or setting.
         """
         if scene.dimension != 2:
             raise EngineError("dimension: chipmunk is planar and cannot run a spatial scene")
         if not (math.isfinite(dt) and dt > 0.0):
             raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
         chosen = checked(settings)
-        reason = self.refuses(scene, "") or leaves_ground(scene, dt)
+        reason = self.refusal(scene, "", dt)
         if reason:
             raise EngineError(reason)
         return ChipmunkSimulation(scene, dt, chosen)

@@ -6,8 +6,10 @@ from dataclasses import replace
 import pytest
 
 from adapters.receipts import Receipt
+from adapters.registry import find
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
+from validation.posed import resolve
 from validation.running import execution
 from validation.running.execution import execute
 
@@ -24,6 +26,17 @@ def observed(monkeypatch, *slips, certificate=None):
         monkeypatch.setattr(execution, "run", lambda *a: replace(run(*a), certificate=certificate))
     found = execute(SLOT)
     return found[0] if isinstance(found, tuple) else found
+
+
+def test_steps_that_are_too_long_for_a_scene_are_a_refusal_and_no_crash(monkeypatch):
+    """Chipmunk's ground has a depth: what is faster than half of it a step is refused, at shorter steps it is asked."""
+    monkeypatch.setattr("adapters.chipmunk.translation.GROUND_DEPTH", 0.2)
+    slot = Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 20)  # 4.43 m/s: .22 m a step
+    observation = execute(slot)
+    assert observation.outcome is Outcome.UNSUPPORTED
+    assert observation.reason == "dt: at 4.43 m/s a body passes 0.1 m of ground in one step unseen"
+    engine, scene = find("chipmunk").engine, resolve("bounce").scene(2, {})
+    assert engine.refusal(scene, "tuned", 1 / 60) is None
 
 
 def test_receipts_that_hold_leave_the_cell_its_verdicts(monkeypatch):

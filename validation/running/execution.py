@@ -61,7 +61,7 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         if found.engine is None:
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
-            refusal = found.engine.refuses(posed_for(found.engine, prepared.scene), slot.profile)
+            refusal = found.engine.refusal(posed_for(found.engine, prepared.scene), slot.profile, slot.dt)
         except EngineError as error:
             refusal = str(error)
         refusal = checked_refusal(refusal)
