@@ -454,6 +454,10 @@ def test_receipts_of_impulses_allow_what_kept_ones_add_and_nothing_else() -> Non
     # From what acted to as many times as much as a slide of half a second has steps.
     assert (told.value - told.band, told.value + told.band) == pytest.approx((1.0, 120.0), abs=2e-6)
     assert ENGINE.declares("default", resting, DT) == {} == ENGINE.declares("tuned", bouncing, DT)
+    losing = needs(make(FLOOR, box, e=0.99, mu=0.1, gravity=(0.0, -9.81)))
+    assert ENGINE.declares("default", losing, DT) == {}
+    exact = {r.quantity: r for r in receipts(ENGINE, "default", losing, DT)}["impulse"]
+    assert exact.holds and abs(exact.measured - 1.0) <= 1e-6
     assert {r.quantity: r for r in receipts(ENGINE, "default", bouncing, DT)}["impulse"].holds
     case, slide = Case(2, 1.0, 0.1, DT, ENGINE.scheme("default").position_offset, EPS), PROBES["slide"]
     scene, ratios = slide.make(case), {}

@@ -30,11 +30,11 @@ def observed(monkeypatch, *slips, certificate=None):
 
 def test_steps_that_are_too_long_for_a_scene_are_a_refusal_and_no_crash(monkeypatch):
     """Chipmunk's ground has a depth: what is faster than half of it a step is refused, at shorter steps it is asked."""
-    monkeypatch.setattr("adapters.chipmunk.translation.GROUND_DEPTH", 0.2)
-    slot = Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 20)  # 4.43 m/s: .22 m a step
+    monkeypatch.setattr("adapters.chipmunk.translation.GROUND_DEPTH", 4.0)
+    slot = Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 20)  # 2.3 m a step
     observation = execute(slot)
     assert observation.outcome is Outcome.UNSUPPORTED
-    assert observation.reason == "dt: at 4.43 m/s a body passes 0.1 m of ground in one step unseen"
+    assert observation.reason == "dt: at 46.3 m/s a body passes 2 m of ground in one step unseen"
     engine, scene = find("chipmunk").engine, resolve("bounce").scene(2, {})
     assert engine.refusal(scene, "tuned", 1 / 60) is None
 
