@@ -66,7 +66,7 @@ SIZES = {
     "scenes.slide": {"m": "HEIGHT"},
     "scenes.stack": {"m": "SIDE"},
     "scenes.starved": {"m": "RADIUS", "s": "WINDOW"},
-    "scenes.stacked_balls": {"m": "LARGE SMALL", "s": "AFTERMATH"},
+    "scenes.stacked_balls": {"m": "LARGE SMALL", "s": "AFTERMATH SOFT COARSEST"},
     "scenes.thin_wall": {"m": "WIDTH", "s": "AFTERMATH"},
     "scenes.tilt_table": {"s": "AFTERMATH DURATION"},
     "scenes.tumble": {"m": "SIDES"},
