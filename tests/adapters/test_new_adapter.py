@@ -43,7 +43,9 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     asked = ["run", "bounce", "--engine", "my_discs", "--dim", "2", "--quick", "--jobs", "1"]
     command = [sys.executable, "-m", "reports.command", *asked]
     ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert ran.returncode == 0 and "my_discs/plain" in ran.stdout and "Every row that is judged passes" in ran.stdout, ran.stderr
+    assert ran.returncode == 0 and "my_discs/plain" in ran.stdout and "Every row that is judged passes" in ran.stdout, (
+        ran.stderr
+    )
 
 
 def test_json_names_the_files_that_were_written(tmp_path):

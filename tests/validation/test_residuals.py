@@ -236,7 +236,9 @@ def test_without_any_speed_there_is_no_work_and_what_parts_already_owes_nothing(
 def test_an_engine_that_refuses_a_profile_is_asked_for_that_one_and_believed(monkeypatch):
     slot = Slot("impact", (), 2, "toy", "tuned", 1 / 240)
     refuses = {"tuned": "it has no such solver"}.get
-    monkeypatch.setattr(asked, "load", lambda name: SimpleNamespace(refusal=lambda scene, profile, dt: refuses(profile)))
+    monkeypatch.setattr(
+        asked, "load", lambda name: SimpleNamespace(refusal=lambda scene, profile, dt: refuses(profile))
+    )
     monkeypatch.setattr(asked, "posed_for", lambda engine, scene: scene)
     said = "it has no such solver"
     assert measured(slot) == Residuals(slot, nothing(said), 0, said)
