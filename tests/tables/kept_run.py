@@ -208,7 +208,7 @@ def main() -> None:
     ]  # fmt: skip
     kept = [{"text": key, "body": body} for key, body in texts.items()] + lines
     FILE.parent.mkdir(exist_ok=True)
-    said = "\n".join(json.dumps(line, sort_keys=True) for line in kept).replace(name, "/tmp/there")
+    said = "\n".join(json.dumps(line, sort_keys=True) for line in kept).replace(name, "/there")
     FILE.write_text(said + "\n", encoding="utf-8")
 
 
