@@ -38,8 +38,13 @@ def event(after: Callable[[float], bool], length: float) -> float:
     return high
 
 
+def never(state: Any) -> float:
+    """Above zero whatever the state: nothing happens."""
+    return 1.0
+
+
 def integrated(
-    step: Callable[[S, float], S], state: S, time: float, h: float, until: Callable[[S], float] | None = None
+    step: Callable[[S, float], S], state: S, time: float, h: float, until: Callable[[S], float] = never
 ) -> tuple[S, float]:
     """Return the state after ``time`` in steps of ``h``, or where ``until`` falls below zero before, and the time left.
 
@@ -47,10 +52,12 @@ def integrated(
     """
     left = time
     while left > 0.0:
-        begun, length = state, min(h, left)
-        state = step(begun, length)
-        if until is not None and until(state) < 0.0:
-            length = event(lambda part, begun=begun: until(step(begun, part)) < 0.0, length)  # type: ignore[misc]
-            return step(begun, length), left - length
-        left -= length
-    return state, 0.0
+        length = min(h, left)
+        ahead = step(state, length)
+        if until(ahead) < 0.0:
+            break
+        state, left = ahead, left - length
+    else:
+        return state, 0.0
+    length = event(lambda part: until(step(state, part)) < 0.0, length)
+    return step(state, length), left - length

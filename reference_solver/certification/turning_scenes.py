@@ -96,7 +96,7 @@ class Case:
 
 def integrated(rate: Rate, state: State, time: float, until: Rate | None = None) -> tuple[State, float]:
     """Return (q, q') after ``time``, or where ``until(q, q')`` falls below zero before, and the time left."""
-    ends = None if until is None else lambda there: until(*there)
+    ends = runge_kutta.never if until is None else lambda there: until(*there)
     return runge_kutta.integrated(partial(runge_kutta.move, rate), state, time, TRUE_STEP, ends)
 
 

@@ -67,7 +67,7 @@ def miss(motion: Motion, steps: int) -> Miss:
 
 
 def integrated(
-    rate: Rate, state: Array, time: float, until: Callable[[Array], float] | None = None
+    rate: Rate, state: Array, time: float, until: Callable[[Array], float] = runge_kutta.never
 ) -> tuple[Array, float]:
     """Return the state after ``time`` [s], or where ``until`` falls below zero before, and what is left of the time."""
     return runge_kutta.integrated(partial(runge_kutta.advance, rate), state, time, STEP, until)
