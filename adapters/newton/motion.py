@@ -68,8 +68,8 @@ LONGER = 1.618e-4
 ROUNDINGS = 12.0
 #: Round-off of a single number, as a share of it.
 UNIT = 2.0**-24
-#: Share of a value beyond which a band says nothing about it: less than one digit is told.
-VAGUE = 0.1
+#: Share of a value beyond which a band says nothing about it.
+VAGUE = 0.02
 #: Most that roundings make of a number that would be nothing: ten of 2^-24 in each of a thousand steps, to one side.
 ROUNDED_OFF = 1e4 * UNIT
 #: Most bodies that are followed.
