@@ -162,7 +162,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(length * abs(value - truth[name]))
-    return max(off) / scene.params["v"], ""
+    return metrics.largest(off) / scene.params["v"], ""
 
 
 SCENE = CanonicalScene(

@@ -279,7 +279,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(arm * abs(value - truth[name]))
-    return max(off) / (p["v"] + p["rise"]), ""
+    return metrics.largest(off) / (p["v"] + p["rise"]), ""
 
 
 SCENE = CanonicalScene(

@@ -97,7 +97,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     along = np.array([math.cos(angle), -math.sin(angle)])
     corner = metrics.point(trajectory, 2, (0.5 * UPPER[0], 0.5 * UPPER[1]))[:, 0]
     face = trajectory.pose[:, 3, 0] - 0.5 * LOWER[0]
-    swung = max(metrics.turned(trajectory.pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (2, 3))
+    swung = metrics.largest(
+        metrics.turned(trajectory.pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (2, 3)
+    )
     late = metrics.late_impulses(trajectory, 2, 3, 0.5 * DURATION)
     weight = p["mass"] * p["g"] * trajectory.dt
     return {
