@@ -233,9 +233,13 @@ def _constant(kind: str, rows: Sequence[Plain]) -> str:
 
 def spoken(scene: str, kind: str, value: str) -> str:
     """What a value of a kind of metric means, in words: the scene's own, else those of `validation.metrics`."""
-    words = {**WORDS, **resolve(scene).words}
-    said = words.get(f"{kind}=0") if value == "0" else None
-    return said or words.get(kind, kind + " {value}").format(value=value)
+    own = resolve(scene).words
+    words, signed = {**WORDS, **own}, own if kind in own else WORDS
+    if value == "0" and f"{kind}=0" in words:
+        return words[f"{kind}=0"]
+    if value.startswith("-") and " to " not in value and f"{kind}<0" in signed:
+        return signed[f"{kind}<0"].format(value=value[1:])
+    return words.get(kind, kind + " {value}").format(value=value)
 
 
 def _digits(row: Plain) -> int:

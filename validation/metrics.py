@@ -18,13 +18,17 @@ from validation.geometry import deepest, overlap
 UNAVAILABLE = "the engine does not report contact impulses"
 #: Said of a rebound that is none.
 SILENT = "does not rebound"
-#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing. A
+#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing,
+#: ``name<0`` with the size of one that is negative: what creeps down at -0.003 m/s creeps up. A
 #: scene has words of its own for metrics that are not here (`CanonicalScene.words`).
 WORDS = {
     "rebound_ratio": "rebounds at {value}",
     "rebound_ratio=0": SILENT,
+    "rebound_ratio<0": "goes on at {value} of its speed",
     "creep": "creeps at {value} where it should stick",
+    "creep<0": "creeps uphill at {value} where it should stick",
     "acceleration": "slides with {value}",
+    "acceleration<0": "slides uphill with {value}",
     "settle_time": "settles after {value}",
     "drift": "drifts sideways by {value}",
     "penetration": "overlaps by {value}",

@@ -163,5 +163,9 @@ SCENE = CanonicalScene(
         error,
         "the whole scene: to and fro, three times",
     ),
-    words={"speed": "is thrown back with {value}", "time": "is thrown back after {value}"},
+    words={
+        "speed": "is thrown back with {value}",
+        "speed<0": "goes on with {value}",
+        "time": "is thrown back after {value}",
+    },
 )

@@ -149,6 +149,7 @@ SCENE = CanonicalScene(
     ),
     words={
         "rise": "rises with {value}",
+        "rise<0": "falls with {value}",
         "spin": "spins with {value}",
         "sideways": "leaves sideways with {value}",
         "twisted": "twists with {value}",

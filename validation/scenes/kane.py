@@ -210,8 +210,11 @@ SCENE = CanonicalScene(
     ),
     words={
         "rise": "rises with {value}",
+        "rise<0": "falls with {value}",
         "ahead": "moves along the floor with {value}",
+        "ahead<0": "moves back along the floor with {value}",
         "spin": "spins with {value}",
         "gain": "gains {value} of the energy of its approach",
+        "gain<0": "loses {value} of the energy of its approach",
     },
 )

@@ -136,6 +136,7 @@ SCENE = CanonicalScene(
     smooth=("acceleration", "turning"),
     words={
         "acceleration": "moves off with {value}",
+        "acceleration<0": "moves uphill with {value}",
         "turning": "its surface turns faster by {value}",
     },
 )

@@ -177,7 +177,9 @@ SCENE = CanonicalScene(
     smooth=("down", "ahead"),
     words={
         "down": "goes down the slope with {value}",
+        "down<0": "goes up the slope with {value}",
         "ahead": "shoves the other box with {value}",
+        "ahead<0": "has the other box come back with {value}",
         "force": "presses on it with {value}",
         "parted": "parts from it, or overlaps, by {value}",
         "turned": "turns: corners move by {value}",

@@ -203,7 +203,9 @@ SCENE = CanonicalScene(
     ),
     words={
         "small_speed": "throws the small ball up with {value}",
+        "small_speed<0": "sends the small ball down with {value}",
         "large_speed": "leaves the large ball with {value}",
         "energy_lost": "takes {value} of the energy",
+        "energy_lost<0": "adds {value} of the energy",
     },
 )

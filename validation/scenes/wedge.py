@@ -211,7 +211,9 @@ SCENE = CanonicalScene(
     words={
         "moved": "moves by {value} where it should stay",
         "given_way": "the wedge gives way with {value}",
+        "given_way<0": "the wedge comes back with {value}",
         "acceleration": "the block slides along the face with {value}",
+        "acceleration<0": "the block slides up the face with {value}",
         "momentum": "gains {value} along a floor without friction",
         "off_the_face": "parts from the face or sinks by {value}",
         "turned": "turns: its corners move by {value}",
