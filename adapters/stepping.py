@@ -27,6 +27,8 @@ from adapters.trajectory import ContactRecord, Sampling, Trajectory
 #: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
 #: still be a wrong answer worth measuring; a thousand times is none.
 EXPLOSION_FACTOR = 1e3
+#: A quaternion shorter than this is no turn: what is read from it (an angle of atan2(0, 0)) would be an angle of 0.
+SHORTEST_TURN = 0.5
 
 
 #: States that are read as the scene's own at once: enough that a read costs little, and little memory beside a run.
@@ -55,7 +57,7 @@ class _Seen:
         self.poses: list[Array] = []
         self.twists: list[Array] = []
         self.read: list[tuple[Array, Array]] = []
-        self.outside = 0.0
+        self.outside, self.unturned = 0.0, False
 
     def look(self, simulation: Simulation) -> None:
         """Keep the state of this instant: copies, for what a simulation gives may be its own."""
@@ -85,8 +87,11 @@ class _Seen:
         pose, twist = self.poses[-1], self.twists[-1]
         if np.vdot(twist, twist) < 0.5 * self.limit * self.limit and math.isfinite(np.vdot(pose, pose)):
             return ""
+        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):  # across the plane of a lifted scene as well
+            return "the state is not finite"
         (pose,), (twist,), _ = self._lowered(pose[None], twist[None])
-        return _divergence(pose, twist, self.dimension, self.limit)
+        fastest = float(np.abs(twist[:, : self.dimension]).max())
+        return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it" if fastest > self.limit else ""
 
     def states(self) -> tuple[Array, Array, float]:
         """Poses and twists of all instants, and the largest departure from the plane of a lifted scene."""
@@ -100,6 +105,8 @@ class _Seen:
         self.poses, self.twists = [], []
 
     def _read(self, pose: Array, twist: Array) -> None:
+        if pose.shape[2] == 7 and (np.linalg.norm(pose[..., 3:], axis=2) < SHORTEST_TURN).any():
+            self.unturned = True
         pose, twist, outside = self._lowered(pose, twist)
         self.read.append((pose, twist))
         self.outside = max(self.outside, outside)
@@ -170,7 +177,7 @@ def run(
     Raises
     ------
     EngineError
-        If the engine refuses the scene, or for a step that is not positive and finite.
+        If the engine refuses the scene, for a step that is not positive and finite, or for a pose that is none.
     """
     if not (math.isfinite(dt) and dt > 0.0):
         raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
@@ -235,6 +242,8 @@ def _record(
             finish, reason = "diverged", f"{reason} at t = {done * dt:.6g} s"
             break
     pose, twist, outside = seen.states()
+    if seen.unturned and finish == "completed":
+        raise EngineError("pose: a quaternion has no length, it is no orientation")
     return Trajectory(
         t=np.array(steps_at) * dt,
         pose=pose,
@@ -276,13 +285,6 @@ def _pull(body: Body) -> float:
     """Acceleration that a body's external force and torque give to its outermost point [m/s^2]."""
     moment = min(body.inertia) if isinstance(body.inertia, tuple) else body.inertia
     return math.hypot(*body.force) / body.mass + reach(body.shape) * math.hypot(*body.torque) / moment
-
-
-def _divergence(pose: np.ndarray, twist: np.ndarray, dimension: int, limit: float) -> str:
-    if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
-        return "the state is not finite"
-    fastest = float(np.abs(twist[:, :dimension]).max())
-    return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it" if fastest > limit else ""
 
 
 def _kept(contacts: Contacts) -> Contacts:

@@ -216,6 +216,16 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     return constant or _worst(kind, [row for row in members if mark_of(row) != "pass"])
 
 
+def _instead(row: Plain, kind: str, told_as_size: bool) -> str:
+    """The truth beside a value; of a direction that is told in words, its size, or its own words if it is the other."""
+    truth = quantity(row["truth"], row["unit"], _digits(row))
+    if not told_as_size:
+        return f" instead of {truth}"
+    if row["truth"] < 0.0:
+        return f" instead of {truth.removeprefix('-')}"
+    return f"; true: {spoken(row['scene'], kind, truth)}"
+
+
 def _constant(kind: str, rows: Sequence[Plain]) -> str:
     """``rebounds at 0.105 whatever e is asked``: one value where the truth follows a parameter; empty if it is not."""
     values, truths = [row["value"] for row in rows], [row["truth"] for row in rows]
@@ -233,9 +243,13 @@ def _constant(kind: str, rows: Sequence[Plain]) -> str:
 
 def spoken(scene: str, kind: str, value: str) -> str:
     """What a value of a kind of metric means, in words: the scene's own, else those of `validation.metrics`."""
-    words = {**WORDS, **resolve(scene).words}
-    said = words.get(f"{kind}=0") if value == "0" else None
-    return said or words.get(kind, kind + " {value}").format(value=value)
+    own = resolve(scene).words
+    words, signed = {**WORDS, **own}, own if kind in own else WORDS
+    if value == "0" and f"{kind}=0" in words:
+        return words[f"{kind}=0"]
+    if value.startswith("-") and " to " not in value and f"{kind}<0" in signed:
+        return signed[f"{kind}<0"].format(value=value[1:])
+    return words.get(kind, kind + " {value}").format(value=value)
 
 
 def _digits(row: Plain) -> int:
@@ -264,9 +278,9 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
     own = is_file(row["scene"]) and kind != row["metric"]
     words = f"{row['metric']} is {value}" if own else spoken(row["scene"], kind, value)
     text = "never settles" if value == NEVER else words
-    if row["truth"] == 0.0 and kind in RATES and row["value"]:
+    if row["truth"] == 0.0 and kind in RATES and row["value"] and "should" not in text:
         text += " instead of 0"
     if row["truth"] and text != SILENT:
-        text += f" instead of {quantity(row['truth'], row['unit'], _digits(row))}"
+        text += _instead(row, kind, told_as_size=value.startswith("-") and value not in text)
     where = params_text(row["slot"]["params"])
     return text + (f" ({where})" if where else "")

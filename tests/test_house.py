@@ -327,3 +327,15 @@ def test_the_rooms_of_the_solver_grow_only_where_somebody_says_so():
     assert not grown, "see 'Add lines to the solver' in CONTRIBUTING.md"
     loose = {room: lines[room] for room, (most, _) in rooms.items() if lines[room] < most * (1.0 - SLACK) - 10}
     assert not loose, "a room that shrank gets a smaller limit"
+
+
+def test_what_is_measured_is_not_compared_by_a_max_that_passes_over_no_numbers():
+    """Python's max(0.0, nan) is 0.0, which passes: `validation.metrics.largest` is NaN, which has no value."""
+    found = []
+    for path in sorted((ROOT / "validation").rglob("*.py")):
+        for function in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)):
+            given = [ast.unparse(each.annotation) for each in function.args.args if each.annotation]
+            if any("Trajectory" in each or "Measured" in each for each in given):
+                named = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
+                found += [f"{path}:{name.lineno}" for name in named if isinstance(name, ast.Name) and name.id == "max"]
+    assert not found

@@ -8,6 +8,8 @@ can overlap at all: along any axis the bodies' shadows are no farther apart than
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from adapters.engine import Array
@@ -35,9 +37,9 @@ def separation(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 
 
 def overlap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
-    """Depth of the overlap, (s,) [m]; 0 where the bodies are apart."""
+    """Depth of the overlap, (s,) [m]; 0 where the bodies are apart, NaN where their poses give no distance."""
     depth = np.zeros(len(pose_a))
-    near = np.flatnonzero(least_gap(a, pose_a, b, pose_b) < 0.0)
+    near = np.flatnonzero(~(least_gap(a, pose_a, b, pose_b) >= 0.0))  # a bound that is no number excludes nothing
     if len(near):
         depth[near] = np.maximum(0.0, -separation(a, pose_a[near], b, pose_b[near]))
     return depth
@@ -46,15 +48,20 @@ def overlap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 def deepest(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> float:
     """Deepest overlap over all samples, >= 0 [m].
 
-    Samples are asked in the order of their lower bounds, until no bound is below what was found.
+    Samples are asked in the order of their lower bounds, until no bound is below what was found. NaN if the poses of
+    one sample give no distance: it may be the deepest.
     """
     bound, depth = least_gap(a, pose_a, b, pose_b), 0.0
+    if np.isnan(bound).any():
+        return math.nan
     order = np.argsort(bound)
     for k in range(0, len(order), BATCH):
         chosen = order[k : k + BATCH]
         if bound[chosen[0]] >= -depth:
             break
-        depth = max(depth, -float(separation(a, pose_a[chosen], b, pose_b[chosen]).min()))
+        depth = float(np.maximum(depth, -separation(a, pose_a[chosen], b, pose_b[chosen]).min()))
+        if math.isnan(depth):
+            break
     return depth
 
 

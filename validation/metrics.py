@@ -18,13 +18,17 @@ from validation.geometry import deepest, overlap
 UNAVAILABLE = "the engine does not report contact impulses"
 #: Said of a rebound that is none.
 SILENT = "does not rebound"
-#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing. A
+#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing,
+#: ``name<0`` with the size of one that is negative: what creeps down at -0.003 m/s creeps up. A
 #: scene has words of its own for metrics that are not here (`CanonicalScene.words`).
 WORDS = {
     "rebound_ratio": "rebounds at {value}",
     "rebound_ratio=0": SILENT,
+    "rebound_ratio<0": "goes on at {value} of its speed",
     "creep": "creeps at {value} where it should stick",
+    "creep<0": "creeps uphill at {value} where it should stick",
     "acceleration": "slides with {value}",
+    "acceleration<0": "slides uphill with {value}",
     "settle_time": "settles after {value}",
     "drift": "drifts sideways by {value}",
     "penetration": "overlaps by {value}",
@@ -59,12 +63,33 @@ def late_impulses(trajectory: Trajectory, a: int, b: int, window: float) -> Arra
     return None if len(found) == 0 or np.isnan(found).any() else found
 
 
+def largest(values: Iterable[float]) -> float:
+    """Largest of measured values; NaN if one of them is.
+
+    Not Python's max, which passes over a NaN that is not the first: a check would pass on what could not be measured.
+    """
+    return float(np.max(np.fromiter(values, float)))
+
+
+def numbers(*series: Array) -> None:
+    """Refuse samples that are no numbers: what looks for a first or last event would look past them.
+
+    Raises
+    ------
+    ArithmeticError
+        If one is none.
+    """
+    if not all(np.isfinite(values).all() for values in series):
+        raise ArithmeticError("a sample is not a finite number")
+
+
 def apexes(t: Array, height: Array, velocity: Array, least: float = 0.0) -> tuple[Array, Array]:
     """Times and heights of the tops of all arcs that start faster than ``least`` [m/s].
 
     An arc ends where the velocity turns from upwards to not upwards; its top is that of the parabola through the
     highest sample and its neighbours (exact for constant gravity, whatever the phase of the samples).
     """
+    numbers(height, velocity)
     turns = np.flatnonzero((velocity[:-1] > 0.0) & (velocity[1:] <= 0.0))
     times, tops = [], []
     for turn in turns:
@@ -93,6 +118,8 @@ def interval_ratio(times: Array) -> Measured:
 
 def last_motion(t: Array, speed: Array, threshold: float) -> Measured:
     """Time after which the speed stays at or below ``threshold`` to the end [s]; the end if it never does."""
+    if np.isnan(speed).any():
+        return None, "a speed is not a number"
     moving = np.flatnonzero(np.abs(speed) > threshold)
     if len(moving) == 0:
         return 0.0, ""
@@ -191,6 +218,7 @@ def point(trajectory: Trajectory, body: int, place: tuple[float, ...]) -> Array:
 
 def crossing(t: Array, value: Array, rate: Array, level: float) -> tuple[Measured, Measured]:
     """Time at which ``value`` first rises through ``level``, and its rate then, on the cubic between two samples."""
+    numbers(value, rate)
     over = np.flatnonzero((value[:-1] < level) & (value[1:] >= level))
     if len(over) == 0:
         return (None, NOT_PASSED), (None, NOT_PASSED)
@@ -214,14 +242,15 @@ def relative_error(found: Mapping[str, Measured], truth: Mapping[str, float], na
         if value is None:
             return None, reason
         off.append(abs(value / truth[name] - 1.0))
-    return max(off), ""
+    return largest(off), ""
 
 
 def deepest_overlap(scene: Scene, trajectory: Trajectory, pairs: Sequence[tuple[int, int]] | None = None) -> float:
     """Deepest overlap of ``pairs`` of bodies (by default of neighbours in the scene's list) at any sample, >= 0 [m]."""
     bodies, pose = scene.bodies, trajectory.pose
     pairs = list(pairwise(range(len(bodies)))) if pairs is None else pairs
-    return max((deepest(bodies[i].shape, pose[:, i], bodies[j].shape, pose[:, j]) for i, j in pairs), default=0.0)
+    depths = [deepest(bodies[i].shape, pose[:, i], bodies[j].shape, pose[:, j]) for i, j in pairs]
+    return largest([0.0, *depths])
 
 
 def interface_load(

@@ -154,14 +154,16 @@ class MujocoEngine(Engine):
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """MJCF: ``<option>``, and the contact parameters on every geom (on a pair where only a pair has them)."""
-        material = next(material for _, _, material in scene.contact_pairs())
+        material = next((material for _, _, material in scene.contact_pairs()), None)
         option = {name: settings[name] for name in _OPTIONS if name in names}
         contact: dict[str, Any] = {}
-        if {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
+        if material is None:  # nothing meets: what is set of contacts does nothing
+            names = set(names) & set(_OPTIONS)
+        elif {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
             contact["solref"] = pair_solref(settings, material.restitution, dt)
         if "solimp" in names:
             contact["solimp"] = settings["solimp"]
-        if "smooth_condim" in names and material.friction == 0.0:
+        if material is not None and "smooth_condim" in names and material.friction == 0.0:
             contact["condim"] = settings["smooth_condim"]
         paired = "solreffriction" in names
         if "margin" in names:

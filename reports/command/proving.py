@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import sys
 from collections.abc import Sequence
@@ -20,6 +21,9 @@ from validation.findings import FindingsError
 from validation.findings.files import findings_of
 from validation.settings.proofs import Proof, prove
 from validation.settings.switching import Reading
+
+#: Names that are told to whoever mistypes one: a list of hundreds says nothing.
+NEAREST = 3
 
 
 def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
@@ -43,7 +47,9 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
             f"prove: nobody has written an experiment for the reason {reason!r} (its engine's experiments.py)"
         )
     if not found:
-        raise FindingsError(f"prove: there is no reason called {reason!r}; known: {', '.join(families)}")
+        close = ", ".join(map(repr, difflib.get_close_matches(reason, dict.fromkeys(families), n=NEAREST, cutoff=0.5)))
+        hint = f"did you mean {close}?" if close else "`crosscheck findings` has the reasons"
+        raise FindingsError(f"prove: there is no reason called {reason!r} of {len(families)}; {hint}")
     return found
 
 

@@ -1,11 +1,16 @@
 """The checker of adapters: healthy ones pass, and what is wrong with another one is a finding, never an exception."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from adapters import registry
 from adapters.conformance import CHECKS, check_adapter, items
+from adapters.conformance.mechanics import contacts
 from adapters.conformance.spoilt import Spoilt
-from adapters.engine import Expected
+from adapters.engine import Contacts, Expected
 from adapters.receipts import QUANTITIES
 from adapters.scene import Box
 
@@ -113,3 +118,20 @@ def test_our_adapters_conform(name):
     assert [str(finding) for finding in findings if not finding.holds] == []
     if found.facts.profile("solution"):
         assert {finding.status for finding in findings} == {"ok"} and not found.engine.expected
+
+
+@pytest.mark.parametrize(("part", "wrong"), [("normal", "of length 1"), ("point", "not where bodies touch"),
+                                             ("impulse", ""), ("gap", "")])  # fmt: skip
+def test_normals_and_places_of_contacts_are_numbers_and_what_need_not_be_told_may_be_none(
+    toy, monkeypatch, part, wrong
+):
+    """All comparisons with NaN are false: asked whether it is too large, it was not."""
+    told = Contacts.from_rows
+
+    def rows(*asked):
+        found = told(*asked)
+        return replace(found, **{part: np.full_like(getattr(found, part), math.nan)})
+
+    monkeypatch.setattr(Contacts, "from_rows", rows)
+    said = contacts(toy())
+    assert wrong in said and bool(said) == bool(wrong)

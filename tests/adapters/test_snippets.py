@@ -49,6 +49,15 @@ def test_mjcf_rebounds_as_asked_where_the_same_model_without_it_does_not(e):
     assert abs(ratios[1] - e) > 0.05
 
 
+def test_mjcf_of_a_scene_in_which_nothing_meets_has_its_option_alone():
+    pytest.importorskip("mujoco")
+    scene = drop(3, 0.5)
+    alone = Scene("alone", 1, 3, scene.bodies[1:], (), (0.0, 0.0, 0.0), 1.0, {})
+    settings, names = changed(registry.load("mujoco"), scene)
+    text = registry.load("mujoco").snippet(settings, [*names, "integrator"], alone, DT)
+    assert text.startswith("<option timestep=") and "integrator=" in text and len(text.splitlines()) == 1
+
+
 def test_python_of_chipmunk_runs_and_sets_what_the_profile_has():
     pymunk = pytest.importorskip("pymunk")
     scene = drop(2, 0.8, -9.81)

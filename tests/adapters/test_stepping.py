@@ -282,6 +282,31 @@ def test_what_has_left_the_plane_is_kept_where_a_run_ends_in_what_is_no_number()
     assert trajectory.finish == "diverged" and trajectory.out_of_plane == 0.125
 
 
+@pytest.mark.parametrize(("name", "entry"), [("_pose", 1), ("_pose", 4), ("_twist", 1), ("_twist", 5)])
+def test_what_is_no_number_across_the_plane_of_a_lifted_scene_ends_the_run(name: str, entry: int) -> None:
+    """A planar scene reads nothing from there: such a run passed all of its checks."""
+    trajectory = run(Toy({3}, spoiled(name, (0, entry), math.nan)), scene(), 0.1, {})
+    assert trajectory.finish == "diverged" and "not finite at t = 0.4 s" in trajectory.reason
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_quaternion_without_length_is_no_orientation(planar: bool) -> None:
+    """A planar scene would read the angle 0 from it, and a box that stands still passes with that."""
+
+    def unturned(flight: Flight) -> None:
+        if flight.steps == 4:
+            flight._pose[0, 3:] = 0.0
+        elif flight.steps == 5:
+            flight._pose[0, 3:] = (0.6, 0.0, 0.0, 0.0)  # short, but a direction
+
+    spatial = Body("a", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0), (0.0,) * 6)
+    asked = scene() if planar else Scene("flight", 1, 3, (spatial,), (), (0.0, 0.0, -10.0), 1.0)
+    toy = Toy({3}, unturned)
+    with pytest.raises(EngineError, match=r"^pose: a quaternion has no length"):
+        run(toy, asked, 0.1, {})
+    assert toy.built[0].closed == 1
+
+
 def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def sideways(flight: Flight) -> None:
         flight._twist[0, 1] = 0.125 if flight.steps == 2 else 0.0

@@ -14,10 +14,17 @@ def run(*arguments):
     return CliRunner().invoke(main, ["findings", *arguments])
 
 
-def test_an_unknown_reason_is_refused_in_one_line():
-    result = run("--prove", "phlogiston")
+@pytest.mark.parametrize(
+    ("asked", "hint"),
+    [("stack-touching", "you mean 'stack-touching-start'"), ("phlogiston", "`crosscheck findings` has the reasons")],
+)
+def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, hint):
+    """Hundreds of names are no hint."""
+    result = run("--prove", asked)
     assert result.exit_code == 2
-    assert "there is no reason called 'phlogiston'" in result.output and "stack-touching-start" in result.output
+    (said,) = (line for line in result.output.splitlines() if asked in line)
+    assert f"there is no reason called {asked!r}" in said and hint in said
+    assert len(said) < 240
 
 
 def test_all_means_every_experiment_of_the_chosen_engines():

@@ -124,6 +124,36 @@ def test_a_number_of_a_scene_file_is_told_by_its_name_and_no_search_is_promised(
     assert answer.cure == "no other profile does better"
 
 
+@pytest.mark.parametrize(
+    ("scene", "metric", "value", "words"),
+    [
+        ("pinch", "creep", -0.003, "lets the box creep up at 0.003 instead of 0"),
+        ("pinch", "creep", 0.003, "lets the box creep down at 0.003 instead of 0"),
+        ("edge_drop", "rise", -0.004, "falls with 0.004; true: rises with 2"),
+        ("edge_drop", "rise", -0.004, "falls with 0.004 instead of 3"),
+        ("edge_drop", "rise", 0.5, "rises with 0.5 instead of 2"),
+        ("incline", "creep", 0.5, "creeps at 0.5 where it should stick"),
+        ("incline", "creep", -0.5, "creeps uphill at 0.5 where it should stick"),
+        (
+            "wedge",
+            "acceleration",
+            -0.5,
+            "the block slides up the face with 0.5; true: the block slides along the face with 2",
+        ),
+        ("incline", "acceleration", -0.5, "slides uphill with 0.5; true: slides with 2"),
+        ("thin_wall", "rebound_ratio", -0.5, "comes back at -0.5 of its speed (below 0: it has passed) instead of 2"),
+        ("stacked_balls", "energy_lost", -0.5, "adds 0.5 of the energy; true: takes 2 of the energy"),
+        ("conveyor", "pull", -0.5, "is held back by 0.5; true: is pulled by 2"),
+    ],
+)
+def test_a_direction_is_told_in_words_and_not_by_a_sign_that_contradicts_them(scene, metric, value, words):
+    truth = 0.0 if metric == "creep" else -3.0 if words.endswith("instead of 3") else 2.0
+    (answer,) = answers(
+        [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": scene, "metric": metric}]
+    )
+    assert answer.wrong == f"{words} (e=0.8 height=1)"
+
+
 def test_what_is_nearer_is_no_cure():
     rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
     rows += [

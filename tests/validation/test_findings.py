@@ -366,6 +366,7 @@ def test_a_release_candidate_is_of_its_release():
 def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
     key = row_key(replace(SLOT, iterations=iterations), "creep")
     assert key == ("default", "incline", "2", "ratio=0.99", "1/240", written, "creep")
+    assert row_key(SLOT, "apex[2]")[-1] == "apex[2]"  # one of several is listed alone
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,27 @@ def test_a_round_body_clear_of_a_corner_does_not_overlap(dimension):
     assert metrics.deepest_overlap(scene, trajectory) == 0.0
 
 
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("shapes", [*PLANAR, *SPATIAL, (HalfSpace((0.0, 1.0)), Box((0.4, 0.7)))])
+def test_a_pose_that_gives_no_distance_is_neither_apart_nor_shallow(shapes):
+    """A NaN after a depth that is a number was passed over, and left an overlap of 0, which passes."""
+    a, b = shapes
+    d = 2 if isinstance(b, Disc) or len(getattr(b, "half_extents", (0, 0, 0))) == 2 else 3
+    turn = (0.0,) if d == 2 else (1.0, 0.0, 0.0, 0.0)
+    pose_a, pose_b = (np.array([[0.0] * d + list(turn)] * 70) for _ in range(2))
+    pose_b[:, d - 1] = np.linspace(0.3, 9.0, 70)  # from inside to far away
+    assert deepest(a, pose_a, b, pose_b) > 0.0
+    pose_b[60, 0] = math.nan
+    assert np.isnan(overlap(a, pose_a, b, pose_b)).tolist() == [k == 60 for k in range(70)]
+    assert math.isnan(deepest(a, pose_a, b, pose_b))
+    body = Body("b", b, 1.0, 1.0 if d == 2 else (1.0,) * 3, tuple(pose_b[0]))
+    scene = Scene("s", 1, d, (Body("a", a, motion="fixed"), body), (Pair(),), (0.0,) * d, 1.0)
+    still = np.zeros((70, 2, 3 if d == 2 else 6))
+    trajectory = Trajectory(np.arange(70) * 0.01, np.stack([pose_a, pose_b], 1), still, None, 0.01, "completed")
+    assert math.isnan(metrics.deepest_overlap(scene, trajectory))
+    assert [math.isnan(value) for value, _ in invariants.deepest(scene, trajectory)] == [True, True]
+
+
 def test_a_tilted_half_space_is_measured_along_its_normal():
     face, box = HalfSpace((-math.sin(0.3), math.cos(0.3)), 0.25), Box((0.5, 0.5))
     centre = 0.75 * np.array(face.normal)

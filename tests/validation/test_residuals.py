@@ -251,3 +251,25 @@ def test_every_contact_is_recorded_from_the_first_step_on_whatever_the_scene_sam
     for scene in ("stack", "long_rest"):
         assert measured(Slot(scene, (("duration", 2.0),), 2, "chipmunk", "tuned", 1 / 60)).refused == ""
     assert [(sampling.stride, sampling.contacts_from) for sampling in wanted] == [(1, 0.0)] * 2
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("part", ["point", "normal", "impulse"])
+def test_a_contact_that_is_not_told_in_numbers_leaves_no_share_of_it(part):
+    """Contacts of other packages: infinite impulses are more than any share, a place that is none tells no slip."""
+    scene, found = sliding()
+    getattr(found.contacts.rows, part)[2, 0] = math.inf if part == "impulse" else math.nan
+    told, count = residuals(scene, found)
+    assert count == 5 and all(value is None or math.isfinite(value) for value, _ in told.values())
+    without = {name for name, (value, _) in told.items() if value is None}
+    assert {"point": {"slip"}, "normal": {"pull", "cone"}, "impulse": set(LAWS)}[part] <= without
+    assert all("not a number" in why for value, why in told.values() if value is None)
+
+
+def test_a_momentum_that_is_no_number_is_not_passed_over_for_a_smaller_one():
+    bodies = tuple(Body(name, Disc(0.5), 1.0, 0.1, (x, 0.0, 0.0)) for name, x in (("a", 0.0), ("b", 1.0), ("c", 5.0)))
+    row = (0, 1, (0.5, 0.0), (1.0, 0.0), (0.3, 0.0), 0.0)
+    scene, found = touching(2, bodies, row, (Pair(),), np.zeros((2, 3, 3)))
+    assert residuals(scene, found)[0]["momentum"][0] == pytest.approx(1.0)
+    found.twist[1, 2, 0] = math.nan  # of the last body: those before it miss a finite momentum
+    assert residuals(scene, found)[0]["momentum"][0] is None

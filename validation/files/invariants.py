@@ -144,9 +144,9 @@ def deepest(scene: Scene, trajectory: Trajectory) -> tuple[Measured, Measured]:
     """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m]."""
     beyond, depth = 0.0, 0.0
     for (i, j), overlap in metrics.overlaps(scene, trajectory).items():
-        depth = max(depth, float(overlap.max()))
+        depth = metrics.largest([depth, overlap.max()])
         granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j))
-        beyond = max(beyond, float((overlap - granted).max()))
+        beyond = metrics.largest([beyond, (overlap - granted).max()])
     return (beyond, ""), (depth, "")
 
 

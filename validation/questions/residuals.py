@@ -82,7 +82,7 @@ def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int
     slip = slip - _dot(slip, normal)[:, None] * normal
     largest = float(np.abs(rows.impulse).max())
     fall = math.hypot(*scene.gravity) * found.dt
-    fastest = max(float(np.linalg.norm(np.concatenate([before, after]), axis=1).max()), fall)
+    fastest = float(np.maximum(np.linalg.norm(np.concatenate([before, after]), axis=1).max(), fall))
     if largest == 0.0:
         return _nothing("no contact carried anything"), len(rows.a)
     work = largest * fastest
@@ -94,7 +94,11 @@ def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int
         "slip": np.maximum(_dot(pt, slip), 0.0).max() / work if work else 0.0,
         "momentum": _momentum(scene, found, sample) / largest,
     }
-    return {name: (float(value), "") for name, value in numbers.items()}, len(rows.a)
+    said = "a contact's point, normal or impulse is not a number"
+    told: dict[str, Measured] = {
+        name: (float(value), "") if math.isfinite(value) else (None, said) for name, value in numbers.items()
+    }
+    return told, len(rows.a)
 
 
 def _nothing(reason: str) -> dict[str, Measured]:
@@ -133,7 +137,8 @@ def _momentum(scene: Scene, found: Trajectory, sample: Whole) -> float:
         if body.motion == "free":
             load = body.mass * np.array(scene.gravity) + np.array(body.force)
             change = body.mass * np.diff(found.twist[:, k, :d], axis=0)
-            worst = max(worst, float(np.linalg.norm(change - load * found.dt - total[1:, k], axis=1).max()))
+            off = np.linalg.norm(change - load * found.dt - total[1:, k], axis=1)
+            worst = float(np.maximum(worst, off.max()))  # not Python's max, which passes over what is no number
     return worst
 
 

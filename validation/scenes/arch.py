@@ -149,10 +149,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         found[f"floor_load[{name}]"] = (
             (None, metrics.UNAVAILABLE) if floored is None else (float(floored[:, 1].mean()) / weight, "")
         )
-    swing = max(metrics.turned(pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (1, 2, 3))
+    swing = metrics.largest(metrics.turned(pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (1, 2, 3))
     return found | {
-        "moved": (max(leaning.way(scene, trajectory, k) for k in (1, 2, 3)), ""),
-        "off_the_faces": (float(max(off)), ""),
+        "moved": (metrics.largest(leaning.way(scene, trajectory, k) for k in (1, 2, 3)), ""),
+        "off_the_faces": (metrics.largest(off), ""),
         "turned": (swing, ""),
     }
 
@@ -246,7 +246,9 @@ SCENE = CanonicalScene(
         "face_load": "the keystone presses on a springer with {value}",
         "floor_load": "a springer presses on the floor with {value}",
         "parting": "a springer goes out with {value}",
+        "parting<0": "a springer comes in with {value}",
         "sinking": "the keystone sinks with {value}",
+        "sinking<0": "the keystone rises with {value}",
         "off_the_faces": "stones part or sink in by {value}",
         "turned": "turns: a corner moves by {value}",
     },

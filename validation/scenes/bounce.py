@@ -92,7 +92,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         none = (0.0, f"there is no apex {n}: the ball does not rise again")
         measured[f"apex[{n}]"] = (float(heights[n - 1]), "") if n <= len(heights) else none
     growth = [b - a for a, b in zip([height, *heights[:APEXES]], heights[:APEXES], strict=False)]
-    measured["apex_growth"] = (max([0.0, *(float(x) for x in growth)]) / height, "")
+    measured["apex_growth"] = (metrics.largest([0.0, *growth]) / height, "")
     measured["apex_interval_ratio"] = metrics.interval_ratio(times)
     measured["rest_time"] = metrics.last_motion(trajectory.t, velocity, least)
     return measured
@@ -205,7 +205,7 @@ def apex_error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measur
         if e**n * speed <= RESOLVED * g * dt or value is None:
             break
         errors.append(abs(value - e ** (2 * n) * height) / height)
-    return (max(errors), "") if errors else (None, "no apex is resolved at this step")
+    return (metrics.largest(errors), "") if errors else (None, "no apex is resolved at this step")
 
 
 def rebound(params: Params, height: float) -> float:

@@ -118,7 +118,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     p, t = scene.params, trajectory.t
     a, r = _sizes(p)
     found: dict[str, Measured] = {}
-    moved, until, gaps, heads = 0.0, np.zeros(len(t), dtype=bool), [], []
+    moved, until, gaps, heads = list[float](), np.zeros(len(t), dtype=bool), [], []
     for name, k, way in CARDS:
         turned, rate = metrics.tilt(trajectory, k), metrics.tilt_rate(trajectory, k)
         time, spin = metrics.crossing(t, way * (turned - turned[0]), way * rate, leaning.TOLD)
@@ -126,16 +126,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         until |= t <= (t[-1] if time[0] is None else time[0])
         gaps.append(metrics.point(trajectory, k, (-a, 0.0))[:, 1] - r)
         heads.append(metrics.point(trajectory, k, (a, 0.0)))
-        moved = max(moved, leaning.way(scene, trajectory, k))
+        moved.append(leaning.way(scene, trajectory, k))
     gaps.append(np.linalg.norm(heads[1] - heads[0], axis=1) - 2.0 * r)
     weight = p["mass"] * p["g"] * trajectory.dt
     feet = [leaning.load(trajectory, 0, k, 1, 2.0 * weight) for _, k, _ in CARDS]
     pressed = [value for value, _ in feet if value is not None]
     return found | {
-        "moved": (moved, ""),
+        "moved": (metrics.largest(moved), ""),
         "head_load": leaning.load(trajectory, 1, 2, 0, weight),
         "floor_load": (sum(pressed), "") if len(pressed) == len(feet) else (None, metrics.UNAVAILABLE),
-        "let_go": (float(max(np.abs(gap[until]).max() for gap in gaps)), ""),
+        "let_go": (metrics.largest(np.abs(gap[until]).max() for gap in gaps), ""),
     }
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import along, at, ball, between_impacts, mass_of, pose_at, states
 
@@ -73,6 +73,7 @@ def exact(scene: Scene) -> dict[str, float]:
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Speed back from the plate halfway to the wall, and when the straight ways to and from the plate meet."""
     x, velocity, measured = trajectory.pose[:, 2, 0], trajectory.twist[:, 2, 0], dict[str, Measured]()
+    metrics.numbers(x, velocity)
     turns = np.flatnonzero((velocity[:-1] > 0.0) & (velocity[1:] <= 0.0)) + 1
     for n, (time, back, _) in enumerate(blows(scene.params), 1):
         k = min(int(np.searchsorted(trajectory.t, 0.5 * (time + back) - 1e-9)), len(velocity) - 1)
@@ -162,5 +163,9 @@ SCENE = CanonicalScene(
         error,
         "the whole scene: to and fro, three times",
     ),
-    words={"speed": "is thrown back with {value}", "time": "is thrown back after {value}"},
+    words={
+        "speed": "is thrown back with {value}",
+        "speed<0": "goes on with {value}",
+        "time": "is thrown back after {value}",
+    },
 )

@@ -128,6 +128,7 @@ SCENE = CanonicalScene(
     words={
         "slipped": "slips {value} on the belt",
         "pull": "is pulled by {value}",
+        "pull<0": "is held back by {value}",
         "slip_speed": "still slips with {value} when it should go with the belt",
         "turned": "turns: its corners move by {value}",
     },

@@ -21,7 +21,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import PHASES, along, at, ball, delay, mass_of, phases, states
 
@@ -113,7 +113,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
             return None, reason
         if name.startswith("speed["):
             off.append(abs(value - truth) / scene.params["v"])
-    return max(off), ""
+    return (metrics.largest(off), "") if off else (None, "a touching row has no one answer")
 
 
 SCENE = CanonicalScene(

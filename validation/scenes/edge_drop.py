@@ -110,7 +110,8 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     truth, rise, spin = exact(scene), found["rise"], found["spin"]
     if rise[0] is None or spin[0] is None:
         return None, rise[1] or spin[1]
-    return max(abs(rise[0] - truth["rise"]) / scene.params["v"], abs(spin[0] / truth["spin"] - 1.0)), ""
+    off = [abs(rise[0] - truth["rise"]) / scene.params["v"], abs(spin[0] / truth["spin"] - 1.0)]
+    return metrics.largest(off), ""
 
 
 SCENE = CanonicalScene(
@@ -148,6 +149,7 @@ SCENE = CanonicalScene(
     ),
     words={
         "rise": "rises with {value}",
+        "rise<0": "falls with {value}",
         "spin": "spins with {value}",
         "sideways": "leaves sideways with {value}",
         "twisted": "twists with {value}",

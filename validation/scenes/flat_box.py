@@ -108,7 +108,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     rebound, edge = found["rebound_ratio"], found["edge_speed"]
     if rebound[0] is None or edge[0] is None:
         return None, rebound[1] or edge[1]
-    return max(abs(rebound[0] - scene.params["e"]), edge[0] / scene.params["v"]), ""
+    return metrics.largest([abs(rebound[0] - scene.params["e"]), edge[0] / scene.params["v"]]), ""
 
 
 SCENE = CanonicalScene(

@@ -19,7 +19,7 @@ import numpy as np
 
 from adapters.scene import Body, Disc, Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import at, ball, pose_at, states, upward
 from validation.truths.quadrature import gauss
@@ -116,7 +116,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     reach = p["radius"] + p["hill"]
     level, up = (float(v) for v in trajectory.twist[-1, 1, :2])
     over = math.hypot(*(float(x) for x in trajectory.pose[-1, 1, :2])) > reach
-    cosine = (max(0.0, level) ** 2 / (p["g"] * reach)) ** (1.0 / 3.0)
+    cosine = (metrics.largest([0.0, level]) ** 2 / (p["g"] * reach)) ** (1.0 / 3.0)
     if not over or cosine > 1.0:
         why = "it does not leave"
         return {"level_speed": (level, ""), "leaving_angle": (None, why), "leaving_time": (None, why)}

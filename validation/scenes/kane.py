@@ -162,7 +162,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(length * abs(value - truth[name]))
-    return max(off) / scene.params["v"], ""
+    return metrics.largest(off) / scene.params["v"], ""
 
 
 SCENE = CanonicalScene(
@@ -210,8 +210,11 @@ SCENE = CanonicalScene(
     ),
     words={
         "rise": "rises with {value}",
+        "rise<0": "falls with {value}",
         "ahead": "moves along the floor with {value}",
+        "ahead<0": "moves back along the floor with {value}",
         "spin": "spins with {value}",
         "gain": "gains {value} of the energy of its approach",
+        "gain<0": "loses {value} of the energy of its approach",
     },
 )

@@ -123,7 +123,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         "moved": (leaning.way(scene, trajectory, 2), ""),
         "passing_time": time,
         "passing_spin": spin,
-        "let_go": (float(max(np.abs(foot[until]).max(), np.abs(head[until]).max())), ""),
+        "let_go": (metrics.largest(np.abs(end[until]).max() for end in (foot, head)), ""),
     }
 
 

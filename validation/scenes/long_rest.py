@@ -50,7 +50,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     pose = trajectory.pose[first:]
     hours = (trajectory.t[-1] - trajectory.t[first]) / HOUR
     moved = pose[-1, free, :d] - pose[0, free, :d]
-    turned = max(metrics.turned(pose[[0, -1], i]) * metrics.reach(scene.bodies[i].shape) for i in free)
+    turned = metrics.largest(metrics.turned(pose[[0, -1], i]) * metrics.reach(scene.bodies[i].shape) for i in free)
     return {
         "drift_per_hour": (float(np.linalg.norm(moved[:, :-1], axis=1).max()) / hours, ""),
         "sinking_per_hour": (float(np.abs(moved[:, -1]).max()) / hours, ""),
@@ -79,7 +79,9 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Largest of the three rates, in sides of a box per hour."""
     values = [found[metric] for metric in exact(scene)]
     missing = [reason for value, reason in values if value is None]
-    return (None, missing[0]) if missing else (max(value for value, _ in values if value is not None) / SIDE, "")
+    if missing:
+        return None, missing[0]
+    return metrics.largest(value for value, _ in values if value is not None) / SIDE, ""
 
 
 SCENE = CanonicalScene(

@@ -172,6 +172,7 @@ SCENE = CanonicalScene(
     ),
     words={
         "forward_speed": "leaves along the floor with {value}",
+        "forward_speed<0": "leaves backwards along the floor with {value}",
         "spin_speed": "leaves with a spin of {value} at its surface",
         "sideways": "leaves sideways with {value}",
     },

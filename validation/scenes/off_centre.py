@@ -279,7 +279,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(arm * abs(value - truth[name]))
-    return max(off) / (p["v"] + p["rise"]), ""
+    return metrics.largest(off) / (p["v"] + p["rise"]), ""
 
 
 SCENE = CanonicalScene(
@@ -333,6 +333,7 @@ SCENE = CanonicalScene(
         "bar_speed": "leaves the bar with {value}",
         "spin": "turns the bar with {value}",
         "energy_lost": "takes {value} of the energy that the blow has",
+        "energy_lost<0": "adds {value} of the energy that the blow has",
         "angular_defect": "changes the angular momentum by {value} of it",
         "sideways": "throws ball or bar aside with {value}",
     },

@@ -20,7 +20,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Body, HalfSpace, Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import PHASES, along, at, ball, delay, floor, mass_of, phases, states, upward
 from validation.truths.rolling import gyration, launched, struck
@@ -128,7 +128,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if measured is None:
             return None, reason
         off.append(abs(measured - value))
-    return max(off), ""
+    return metrics.largest(off), ""
 
 
 SCENE = CanonicalScene(

@@ -136,6 +136,7 @@ SCENE = CanonicalScene(
     smooth=("creep",),
     words={
         "creep": "lets the box creep down at {value}",
+        "creep<0": "lets the box creep up at {value}",
         "turned": "turns the box: its edges move with {value}",
         "grip": "grips with {value} of the force that presses",
         "carried": "carries {value} of the weight it holds",

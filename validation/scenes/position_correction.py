@@ -42,8 +42,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Highest place above that of a box on the floor, lowest below the start, way along the floor, depth at the end."""
     height, deep = trajectory.pose[:, 1, scene.dimension - 1], scene.params["depth"] * SIDE
     return {
-        "launched": (max(0.0, float(height.max()) - 0.5 * SIDE), ""),
-        "sunk": (max(0.0, float(height[0] - height.min())), ""),
+        "launched": (metrics.largest([0.0, height.max() - 0.5 * SIDE]), ""),
+        "sunk": (metrics.largest([0.0, height[0] - height.min()]), ""),
         "drift": (metrics.lateral_drift(trajectory), ""),
         "left": (float(np.clip(0.5 * SIDE - height[-1], 0.0, None)) / deep, ""),
     }

@@ -114,7 +114,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     carried, sheared = found["carried"], found["sheared"]
     if carried[0] is None or sheared[0] is None:
         return None, carried[1] or sheared[1]
-    return max(abs(carried[0] - 1.0), abs(sheared[0] - 1.0)), ""
+    return metrics.largest([abs(carried[0] - 1.0), abs(sheared[0] - 1.0)]), ""
 
 
 SCENE = CanonicalScene(

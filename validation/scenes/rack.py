@@ -109,7 +109,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(value)
-    return max(off), ""
+    return metrics.largest(off), ""
 
 
 SCENE = CanonicalScene(

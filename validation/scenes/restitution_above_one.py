@@ -19,7 +19,7 @@ import numpy as np
 
 from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import along, at, ball, between_impacts, mass_of, states
 
@@ -63,6 +63,7 @@ def exact(scene: Scene) -> dict[str, float]:
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Mean factor of the speed a blow, changes of its direction, and speed across."""
     p, twist = scene.params, trajectory.twist[:, 2]
+    metrics.numbers(twist[:, 0])
     moving = twist[np.abs(twist[:, 0]) > 0.0, 0]
     turns = int(np.count_nonzero(np.diff(np.sign(moving))))
     speed = float(np.abs(twist[-1, 0]))

@@ -196,7 +196,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(abs(value - truth[f"amplitude[{n}]"]))
-    return max(off) / (scene.params["tilt"] * pivot(scene.params).alpha), ""
+    return metrics.largest(off) / (scene.params["tilt"] * pivot(scene.params).alpha), ""
 
 
 SCENE = CanonicalScene(

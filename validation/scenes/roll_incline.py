@@ -92,7 +92,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(abs(value - truth[name]))
-    return max(off) / scene.gravity[0], ""
+    return metrics.largest(off) / scene.gravity[0], ""
 
 
 SCENE = CanonicalScene(
@@ -136,6 +136,7 @@ SCENE = CanonicalScene(
     smooth=("acceleration", "turning"),
     words={
         "acceleration": "moves off with {value}",
+        "acceleration<0": "moves uphill with {value}",
         "turning": "its surface turns faster by {value}",
     },
 )

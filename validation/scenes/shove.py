@@ -97,7 +97,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     along = np.array([math.cos(angle), -math.sin(angle)])
     corner = metrics.point(trajectory, 2, (0.5 * UPPER[0], 0.5 * UPPER[1]))[:, 0]
     face = trajectory.pose[:, 3, 0] - 0.5 * LOWER[0]
-    swung = max(metrics.turned(trajectory.pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (2, 3))
+    swung = metrics.largest(
+        metrics.turned(trajectory.pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (2, 3)
+    )
     late = metrics.late_impulses(trajectory, 2, 3, 0.5 * DURATION)
     weight = p["mass"] * p["g"] * trajectory.dt
     return {
@@ -175,7 +177,9 @@ SCENE = CanonicalScene(
     smooth=("down", "ahead"),
     words={
         "down": "goes down the slope with {value}",
+        "down<0": "goes up the slope with {value}",
         "ahead": "shoves the other box with {value}",
+        "ahead<0": "has the other box come back with {value}",
         "force": "presses on it with {value}",
         "parted": "parts from it, or overlaps, by {value}",
         "turned": "turns: corners move by {value}",

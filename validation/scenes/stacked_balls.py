@@ -21,7 +21,7 @@ import numpy as np
 
 from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor, mass_of, phases, states, upward
 
@@ -164,7 +164,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
         if value is None:
             return None, reason
         off.append(abs(value - truth[name]) / scene.params["v"])
-    return max(off), ""
+    return metrics.largest(off), ""
 
 
 SCENE = CanonicalScene(
@@ -203,7 +203,9 @@ SCENE = CanonicalScene(
     ),
     words={
         "small_speed": "throws the small ball up with {value}",
+        "small_speed<0": "sends the small ball down with {value}",
         "large_speed": "leaves the large ball with {value}",
         "energy_lost": "takes {value} of the energy",
+        "energy_lost<0": "adds {value} of the energy",
     },
 )

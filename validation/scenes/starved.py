@@ -63,7 +63,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
         if impulses is None:
             return measured
         off.append(abs(float(impulses[:, 0].mean()) / press - 1.0))
-    return measured | {"load_error": (max(off), "")}
+    return measured | {"load_error": (metrics.largest(off), "")}
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
@@ -104,7 +104,7 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
     known = [value for value in worst if value is not None]
     if len(known) < len(worst):
         return "NaN"
-    return "gave way" if max(known) > 0.1 * 2.0 * RADIUS else ""
+    return "gave way" if metrics.largest(known) > 0.1 * 2.0 * RADIUS else ""
 
 
 _HELD = "held: no ball a tenth of its diameter off its place, or inside another"

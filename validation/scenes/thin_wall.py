@@ -15,7 +15,7 @@ from collections.abc import Mapping
 
 from adapters.scene import Body, Box, Pair, Scene
 from adapters.trajectory import Trajectory
-from validation import bounds
+from validation import bounds, metrics
 from validation.canonical import (
     CanonicalScene,
     Check,
@@ -67,7 +67,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     x = trajectory.pose[:, 1, 0]
     return {
         "rebound_ratio": (float(-trajectory.twist[-1, 1, 0]) / p["v"], ""),
-        "beyond": (max(0.0, float(x.max()) + p["radius"]), ""),
+        "beyond": (metrics.largest([0.0, x.max() + p["radius"]]), ""),
     }
 
 

@@ -99,9 +99,9 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
     momentum, energy = found["momentum_drift"][0], found["energy_drift"][0]
     if momentum is None or energy is None:
         return "NaN"
-    if max(momentum, energy) > 1.0:
+    if metrics.largest([momentum, energy]) > 1.0:
         return "exploded"
-    return "changed its spin" if max(momentum, energy) > HALF else ""
+    return "changed its spin" if metrics.largest([momentum, energy]) > HALF else ""
 
 
 def _euler(own: Array, spin: Array) -> Array:
@@ -167,7 +167,8 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Larger of the drifts of angular momentum and energy."""
     values = [found[name] for name in ("momentum_drift", "energy_drift")]
-    return max(value for value, _ in values if value is not None), ""
+    missing = [reason for value, reason in values if value is None]
+    return (None, missing[0]) if missing else (metrics.largest(value for value, _ in values if value is not None), "")
 
 
 SCENE = CanonicalScene(

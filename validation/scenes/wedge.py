@@ -120,15 +120,15 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     gap = (pose[:, 2, :2] - pose[:, 1, :2]) @ off
     lifted = np.abs(pose[:, 1, 1] - pose[0, 1, 1]).max()
     swing = [metrics.turned(pose[:, k]) * metrics.reach(scene.bodies[k].shape) for k in (1, 2)]
-    moved = max(float(np.linalg.norm(pose[:, k, :2] - pose[0, k, :2], axis=1).max()) + swing[k - 1] for k in (1, 2))
+    moved = [float(np.linalg.norm(pose[:, k, :2] - pose[0, k, :2], axis=1).max()) + swing[k - 1] for k in (1, 2)]
     momentum = sum(scene.bodies[k].mass * twist[-1, k, 0] for k in (1, 2))
     return {
-        "moved": (moved, ""),
+        "moved": (metrics.largest(moved), ""),
         "given_way": metrics.mean_rate(trajectory.t, -twist[:, 1, 0]),
         "acceleration": metrics.mean_rate(trajectory.t, slip),
         "momentum": (float(momentum), ""),
-        "off_the_face": (float(max(np.abs(gap - gap[0]).max(), lifted)), ""),
-        "turned": (max(swing), ""),
+        "off_the_face": (metrics.largest([np.abs(gap - gap[0]).max(), lifted]), ""),
+        "turned": (metrics.largest(swing), ""),
     }
 
 
@@ -211,7 +211,9 @@ SCENE = CanonicalScene(
     words={
         "moved": "moves by {value} where it should stay",
         "given_way": "the wedge gives way with {value}",
+        "given_way<0": "the wedge comes back with {value}",
         "acceleration": "the block slides along the face with {value}",
+        "acceleration<0": "the block slides up the face with {value}",
         "momentum": "gains {value} along a floor without friction",
         "off_the_face": "parts from the face or sinks by {value}",
         "turned": "turns: its corners move by {value}",

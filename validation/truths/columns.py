@@ -45,15 +45,15 @@ def measure(scene: Scene, trajectory: Trajectory, layers: Layers = ()) -> dict[s
         ),
         "kinetic_energy": (float(energy[late].mean()), ""),
     }
-    scatter: list[float] = []
+    scatter: list[float | None] = []
     for i, pairs in enumerate(neighbours, 1):
         above = sum(scene.bodies[k].mass for layer in layers[i:] for k in layer) * g * trajectory.dt
         mean, deviation = metrics.interface_load(trajectory, pairs, above, WINDOW)
         measured[f"interface_impulse[{i}]"] = mean
-        if deviation is not None:
-            scatter.append(deviation)
-    none = (None, "impulses are not available")
-    measured["impulse_scatter"] = (max(scatter), "") if scatter else none
+        scatter.append(deviation)
+    known = [deviation for deviation in scatter if deviation is not None]
+    none = (None, "impulses are not available")  # those of one interface are enough: it may be the one that shakes
+    measured["impulse_scatter"] = (metrics.largest(known), "") if known and len(known) == len(scatter) else none
     return measured
 
 
@@ -107,4 +107,4 @@ def displacement(found: Mapping[str, Measured], size: float) -> Measured:
     drift, penetration = found["drift"], found["penetration"]
     if drift[0] is None or penetration[0] is None:
         return None, drift[1] or penetration[1]
-    return max(drift[0], penetration[0]) / size, ""
+    return metrics.largest([drift[0], penetration[0]]) / size, ""
