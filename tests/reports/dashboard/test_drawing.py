@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from itertools import groupby
+from itertools import groupby, pairwise
 from xml.etree import ElementTree
 
 import numpy as np
@@ -171,7 +171,7 @@ def test_every_judged_run_has_a_cell_of_its_own_filled_where_it_fails(count):
         assert [middle(cell) for cell in cells] == pytest.approx([places[i] for i in wanted], abs=3 * DRAWN)
         assert all(number(cell, "y") == STRIP[0] and number(cell, "height") == STRIP[1] - STRIP[0] for cell in cells)
     cells = sorted((number(c, "x"), number(c, "width")) for n in ("good", "bad") for c in of_class(tree, n))
-    assert all(x + wide <= other + 3 * DRAWN for (x, wide), (other, _) in zip(cells, cells[1:], strict=False))
+    assert all(x + wide <= other + 3 * DRAWN for (x, wide), (other, _) in pairwise(cells))
 
 
 @given(st.lists(st.sampled_from(["good", "bad", ""]), min_size=MANY + 1, max_size=2 * MANY))
