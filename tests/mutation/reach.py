@@ -6,8 +6,8 @@ A block is a run of statements that no branch or loop divides and that nothing b
 x: return`` is another), named by its function and its first line in there. The record of a test file is kept beside the
 copy and made anew when the file changed. What it does not know only makes a mutation score smaller: a file is given up
 after some seconds of CPU, beside those of its shared fixtures; tests that are skipped, or fail in the copy as it is,
-reach nothing. What a fixture of a whole file computed is reached by all of its tests, what a cache keeps by all that
-ask for it.
+reach nothing. What a fixture of a whole file computed, or a module while it was imported, is reached by all of its
+tests, what a cache keeps by all that ask for it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,9 @@ def instrumented(source: str, module: str) -> str:
     while start < len(tree.body) and getattr(tree.body[start], "module", "") == "__future__":
         start += 1
     names = "remembered as _remembered_by_tests, seen as _seen_by_tests"
-    tree.body[start:start] = ast.parse(f"from {PLUGIN} import {names}").body
+    begun = ast.parse(f"from {PLUGIN} import {names}\n_seen_by_tests.importing += 1").body
+    ended = ast.parse("_seen_by_tests.importing -= 1").body
+    tree.body[start:] = [*begun, ast.Try(tree.body[start:], [], [], ended)]
     return ast.unparse(ast.fix_missing_locations(tree))
 
 

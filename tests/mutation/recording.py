@@ -2,7 +2,8 @@
 
 The blocks of an instrumented copy (`reach.instrumented`) call ``seen.add`` with their own name. Pytest tells which test
 runs in the environment, which processes inherit: a line ``test<tab>block`` goes to a file of each process. What runs
-while a file is imported, or in a fixture that tests share, is reached by all of its tests, under the name of no test.
+while a module is imported, by whichever test comes first, or in a fixture that tests share, is reached by all of its
+tests, under the name of no test.
 What a cache keeps is reached by whoever asks for it (`remembered`), not only by the test that came first.
 """
 
@@ -25,7 +26,7 @@ ASKED = os.environ.get("CROSSCHECK_REACH_ASKED", "")
 class Seen(set):
     """Names of blocks; a new one is written down at once, since processes may end without a word."""
 
-    pid, file, turn = 0, -1, 0
+    pid, file, turn, importing = 0, -1, 0, 0
 
     def clear(self):
         self.turn += 1
@@ -40,7 +41,7 @@ class Seen(set):
                 self.pid = os.getpid()
                 path = os.path.join(FOLDER, f"{self.pid}.reached")
                 self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-            test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+            test = "" if self.importing else os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
             os.write(self.file, f"{test}\t{name}\n".encode())
 
 
