@@ -89,7 +89,8 @@ def instrumented(source: str, module: str) -> str:
     names = "remembered as _remembered_by_tests, seen as _seen_by_tests"
     begun = ast.parse(f"from {PLUGIN} import {names}\n_seen_by_tests.importing += 1").body
     ended = ast.parse("_seen_by_tests.importing -= 1").body
-    tree.body[start:] = [*begun, ast.Try(tree.body[start:], [], [], ended)]
+    if tree.body[start:]:
+        tree.body[start:] = [*begun, ast.Try(tree.body[start:], [], [], ended)]
     return ast.unparse(ast.fix_missing_locations(tree))
 
 

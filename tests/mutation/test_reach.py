@@ -95,6 +95,12 @@ def test_what_a_module_computes_while_it_is_imported_is_reached_by_all_tests_of_
     assert not failed and told == {"a": {"toy.x_made:0", "toy.x_asked:0"}, "b": {"toy.x_made:0"}}
 
 
+def test_a_module_of_words_alone_can_be_recorded(reach):
+    tool, _ = reach
+    for source in ("", '"""Words."""\n', '"""Words."""\n\nfrom __future__ import annotations\n'):
+        compile(tool.instrumented(source, "toy.py"), "toy.py", "exec")
+
+
 def test_a_test_that_fails_ends_no_record(reach, tmp_path):
     """Those after it are met as well: it may fail only because the sources are instrumented."""
     tool, _ = reach
