@@ -95,6 +95,21 @@ def test_what_a_module_computes_while_it_is_imported_is_reached_by_all_tests_of_
     assert not failed and told == {"a": {"toy.x_made:0", "toy.x_asked:0"}, "b": {"toy.x_made:0"}}
 
 
+def test_what_a_test_runs_in_a_pytest_of_its_own_is_reached_by_it(reach, tmp_path):
+    tool, _ = reach
+    (tmp_path / f"{tool.PLUGIN}.py").write_text(Path(tool.__file__).with_name("recording.py").read_text())
+    (tmp_path / "toy.py").write_text(tool.instrumented("def asked():\n    return 2\n", "toy.py"))
+    (tmp_path / "inner.py").write_text("def test_c():\n    import toy\n    toy.asked()\n")
+    (tmp_path / "test_toy.py").write_text(
+        "import subprocess, sys\n\ndef test_a():\n    pass\n\ndef test_b():\n"
+        "    subprocess.run([sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', 'inner.py'], check=True)\n"
+    )
+    found, failed = tool.reached(tmp_path, "test_toy.py", 20.0)
+    assert not failed and {test.rpartition("_")[2]: blocks for test, (_, blocks) in found.tests.items()} == {
+        "a": [], "b": ["toy.x_asked:0"]
+    }  # fmt: skip
+
+
 def test_a_module_of_words_alone_can_be_recorded(reach):
     tool, _ = reach
     for source in ("", '"""Words."""\n', '"""Words."""\n\nfrom __future__ import annotations\n'):
