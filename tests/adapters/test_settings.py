@@ -50,5 +50,5 @@ def test_a_setting_that_is_unknown_or_missing_is_named():
 def test_a_step_is_a_positive_finite_number_of_seconds():
     assert checked_step(1 / 240) == 1 / 240 and checked_step(5e-324) == 5e-324
     for dt in (0.0, -1 / 240, math.nan, math.inf):
-        with pytest.raises(EngineError, match="^dt: .* must be a positive, finite number of seconds$"):
+        with pytest.raises(EngineError, match=r"^dt: .* must be a positive, finite number of seconds$"):
             checked_step(dt)
