@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import time
@@ -17,7 +18,7 @@ import pytest
 from adapters.conformance.worlds import one_by_one
 from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Recorded, Scheme, Setting, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
-from adapters.stepping import advances, posed_for, run, step_count
+from adapters.stepping import _alike, advances, posed_for, run, step_count
 from adapters.trajectory import ContactRecord, Sampling, load_trajectory
 
 
@@ -331,6 +332,17 @@ def recording(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int, bool]]:
     return asked
 
 
+@pytest.mark.parametrize("done", [0, 6])
+def test_samples_that_are_asked_for_at_once_all_have_contacts_or_none_has(done: int) -> None:
+    """As many as possible: counted one by one, from every time that lies among them and beyond."""
+    dt = 0.1
+    for start, most in itertools.product(range(-1, done + 6), range(6)):
+        sampling = Sampling(1, None if start < 0 else start * dt)
+        with_contacts = [start >= 0 and done + k + 1 >= start for k in range(most)]
+        alike = [own for k, own in enumerate(with_contacts) if len(set(with_contacts[: k + 1])) == 1]
+        assert _alike(sampling, dt, done, most) == (len(alike), any(alike)), (start, most)
+
+
 @pytest.mark.parametrize(
     ("sampling", "in_one_call", "asked"),
     [
@@ -381,6 +393,18 @@ def test_a_run_that_ends_within_what_is_told_at_once_is_that_of_single_samples(
     assert found.finish == "diverged" and found.reason == single.reason and "t = 0.4 s" in found.reason
     assert found.certificate == single.certificate == {"steps": 4} and len(found.t) == 5
     assert [built.closed for built in toy.built] == [1, 1]
+
+
+def test_a_run_that_just_explodes_in_the_last_of_what_is_told_at_once_has_diverged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def burst(flight: Flight) -> None:
+        if flight.steps == 10:
+            flight._twist[0, 1] = 11.26e3
+
+    recording(monkeypatch)
+    found = run(Toy({2}, burst), scene(), 0.1, {})
+    assert found.finish == "diverged" and "t = 1 s" in found.reason
 
 
 def test_a_spin_that_is_fast_is_no_end_of_a_run_that_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

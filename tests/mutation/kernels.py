@@ -25,7 +25,7 @@ import shutil
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from checkout import copy_of_the_checkout
@@ -149,7 +149,7 @@ def record(copy: Path, folder: Path, modules: list[str]) -> dict[str, Record]:
             for module, text in plain.items():
                 (copy / module).write_text(text, encoding="utf-8")
             tests = {test: each for test, each in told.tests.items() if test not in failed}
-            kept.write_text(json.dumps(asdict(Record(tests, told.shared, told.whole))), encoding="utf-8")
+            kept.write_text(json.dumps(asdict(replace(told, tests=tests))), encoding="utf-8")
             print(f"{name}: {len(tests)} tests{'' if told.whole else ', cut short'}", flush=True)
         found[name] = Record(**json.loads(kept.read_text(encoding="utf-8")))
     return found

@@ -6,8 +6,8 @@ A block is a run of statements that no branch or loop divides and that nothing b
 x: return`` is another), named by its function and its first line in there. The record of a test file is kept beside the
 copy and made anew when the file changed. What it does not know only makes a mutation score smaller: a file is given up
 after some seconds of CPU, beside those of its shared fixtures; tests that are skipped, or fail in the copy as it is,
-reach nothing. What a fixture of a whole file computed is reached by all of its tests, what a cache keeps by all that
-ask for it.
+reach nothing. What a fixture of a whole file computed, or a module while it was imported, is reached by all of its
+tests, what a cache keeps by all that ask for it.
 """
 
 from __future__ import annotations
@@ -48,12 +48,14 @@ LEAVING = (ast.Return, ast.Raise, ast.Break, ast.Continue)
 class Record:
     """What one test file reaches: test -> seconds and blocks.
 
-    ``shared`` are the seconds of CPU of its shared fixtures, ``whole`` whether all of its tests were met.
+    ``shared`` are the seconds of CPU of its shared fixtures, ``whole`` whether all of its tests were met, ``limit`` the
+    seconds of CPU after which none was begun.
     """
 
     tests: dict[str, tuple[float, list[str]]]
     shared: float
     whole: bool
+    limit: float
 
 
 def test_files() -> list[str]:
@@ -85,7 +87,10 @@ def instrumented(source: str, module: str) -> str:
     while start < len(tree.body) and getattr(tree.body[start], "module", "") == "__future__":
         start += 1
     names = "remembered as _remembered_by_tests, seen as _seen_by_tests"
-    tree.body[start:start] = ast.parse(f"from {PLUGIN} import {names}").body
+    begun = ast.parse(f"from {PLUGIN} import {names}\n_seen_by_tests.importing += 1").body
+    ended = ast.parse("_seen_by_tests.importing -= 1").body
+    if tree.body[start:]:
+        tree.body[start:] = [*begun, ast.Try(tree.body[start:], [], [], ended)]
     return ast.unparse(ast.fix_missing_locations(tree))
 
 
@@ -147,10 +152,15 @@ def environment(copy: Path, folder: Path, seconds: float, asked: Path | None = N
 
 
 def record(copy: Path, records: Path, seconds: float) -> None:
-    """Record every test file that has no record, in an instrumented copy, which is as it was afterwards."""
+    """Record every test file that has no record, or a shorter one that ended before it, in an instrumented copy.
+
+    The copy is as it was afterwards.
+    """
     records.mkdir(parents=True, exist_ok=True)
     shutil.copy2(Path(__file__).with_name("recording.py"), copy / f"{PLUGIN}.py")
-    lacking = [name for name in test_files() if not record_of(records, name).exists()]
+    known = recorded(records)
+    lacking = [name for name in test_files()
+               if name not in known or not (known[name].whole or known[name].limit >= seconds)]  # fmt: skip
     if not lacking:
         return
     modules = [str(path.relative_to(copy)) for name in PACKAGES for path in (copy / name).rglob("*.py")]
@@ -192,7 +202,7 @@ def reached(copy: Path, name: str, seconds: float) -> tuple[Record, set[str]]:
                 found[test].add(block)
         tests = {test: (cost, sorted(found[test] | found[""])) for test, (how, cost) in ended.items() if how != SKIPPED}
         told = (folder / "shared").read_text(encoding="utf-8") if (folder / "shared").exists() else "0"
-        record = Record(tests, float(told), (folder / "whole").exists())
+        record = Record(tests, float(told), (folder / "whole").exists(), seconds)
         return record, {test for test, (how, _) in ended.items() if how == FAILED}
 
 

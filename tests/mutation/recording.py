@@ -1,8 +1,10 @@
 """What a test reaches, recorded in every process that it starts; copied to where the tests run, as a pytest plugin.
 
-The blocks of an instrumented copy (`reach.instrumented`) call ``seen.add`` with their own name. Pytest tells which test
-runs in the environment, which processes inherit: a line ``test<tab>block`` goes to a file of each process. What runs
-while a file is imported, or in a fixture that tests share, is reached by all of its tests, under the name of no test.
+The blocks of an instrumented copy (`reach.instrumented`) call ``seen.add`` with their own name. Which test runs stands
+in the environment, which processes inherit, and under a name of our own, since some of them are pytest again: a line
+``test<tab>block`` goes to a file of each process. What runs
+while a module is imported, by whichever test comes first, or in a fixture that tests share, is reached by all of its
+tests, under the name of no test.
 What a cache keeps is reached by whoever asks for it (`remembered`), not only by the test that came first.
 """
 
@@ -20,12 +22,14 @@ FOLDER = os.environ.get("CROSSCHECK_REACH", "")
 LIMIT = float(os.environ.get("CROSSCHECK_REACH_SECONDS", "inf"))
 #: A file that names tests which shall not run: they have been asked already.
 ASKED = os.environ.get("CROSSCHECK_REACH_ASKED", "")
+#: Where the test that runs is named.
+CURRENT = "CROSSCHECK_REACH_TEST"
 
 
 class Seen(set):
     """Names of blocks; a new one is written down at once, since processes may end without a word."""
 
-    pid, file, turn = 0, -1, 0
+    pid, file, turn, importing = 0, -1, 0, 0
 
     def clear(self):
         self.turn += 1
@@ -40,7 +44,7 @@ class Seen(set):
                 self.pid = os.getpid()
                 path = os.path.join(FOLDER, f"{self.pid}.reached")
                 self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-            test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+            test = "" if self.importing else os.environ.get(CURRENT, "")
             os.write(self.file, f"{test}\t{name}\n".encode())
 
 
@@ -97,6 +101,7 @@ def _write(name, text):
 
 
 def pytest_runtest_logstart(nodeid):
+    os.environ[CURRENT] = nodeid
     seen.clear()
     _before[:] = _cpu(), _shared[0]
 
@@ -131,18 +136,18 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_fixture_setup(fixturedef, request):
-    test = os.environ.get("PYTEST_CURRENT_TEST")
+    test = os.environ.get(CURRENT)
     shared = fixturedef.scope != "function" and test is not None
     begun = _cpu()
     if shared:
-        os.environ["PYTEST_CURRENT_TEST"] = ""
+        os.environ[CURRENT] = ""
         seen.clear()
         _shared[1] += 1
     try:
         return (yield)
     finally:
         if shared:
-            os.environ["PYTEST_CURRENT_TEST"] = test
+            os.environ[CURRENT] = test
             _shared[1] -= 1
             if not _shared[1]:  # one that asks for another has its seconds
                 _shared[0] += _cpu() - begun

@@ -80,6 +80,42 @@ def test_what_a_cache_keeps_is_reached_by_all_who_ask_for_it(asked):
     assert asked("outer", -2) == {"outer:0", "inner:0", "sign:0", "sign:3"}
 
 
+def test_what_a_module_computes_while_it_is_imported_is_reached_by_all_tests_of_the_file(reach, tmp_path):
+    """The test that imports it first need not be the one that looks."""
+    tool, _ = reach
+    (tmp_path / f"{tool.PLUGIN}.py").write_text(Path(tool.__file__).with_name("recording.py").read_text())
+    toy = "def made():\n    return 1\n\ndef asked():\n    return 2\n\nKEPT = made()\n"
+    (tmp_path / "toy.py").write_text(tool.instrumented(toy, "toy.py"))
+    (tmp_path / "test_toy.py").write_text(
+        "def test_a():\n    import toy\n    assert toy.asked()\n\n"
+        "def test_b():\n    from toy import KEPT\n    assert KEPT == 1\n"
+    )
+    found, failed = tool.reached(tmp_path, "test_toy.py", 10.0)
+    told = {test.rpartition("_")[2]: set(blocks) for test, (_, blocks) in found.tests.items()}
+    assert not failed and told == {"a": {"toy.x_made:0", "toy.x_asked:0"}, "b": {"toy.x_made:0"}}
+
+
+def test_what_a_test_runs_in_a_pytest_of_its_own_is_reached_by_it(reach, tmp_path):
+    tool, _ = reach
+    (tmp_path / f"{tool.PLUGIN}.py").write_text(Path(tool.__file__).with_name("recording.py").read_text())
+    (tmp_path / "toy.py").write_text(tool.instrumented("def asked():\n    return 2\n", "toy.py"))
+    (tmp_path / "inner.py").write_text("def test_c():\n    import toy\n    toy.asked()\n")
+    (tmp_path / "test_toy.py").write_text(
+        "import subprocess, sys\n\ndef test_a():\n    pass\n\ndef test_b():\n"
+        "    subprocess.run([sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', 'inner.py'], check=True)\n"
+    )
+    found, failed = tool.reached(tmp_path, "test_toy.py", 20.0)
+    assert not failed and {test.rpartition("_")[2]: blocks for test, (_, blocks) in found.tests.items()} == {
+        "a": [], "b": ["toy.x_asked:0"]
+    }  # fmt: skip
+
+
+def test_a_module_of_words_alone_can_be_recorded(reach):
+    tool, _ = reach
+    for source in ("", '"""Words."""\n', '"""Words."""\n\nfrom __future__ import annotations\n'):
+        compile(tool.instrumented(source, "toy.py"), "toy.py", "exec")
+
+
 def test_a_test_that_fails_ends_no_record(reach, tmp_path):
     """Those after it are met as well: it may fail only because the sources are instrumented."""
     tool, _ = reach

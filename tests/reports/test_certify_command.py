@@ -2,12 +2,14 @@
 
 import json
 import math
+import re
 
 import pytest
 from click.testing import CliRunner
 
 from reference_solver.certification import Gate, piles, rotation
 from reference_solver.certification.orders import RATES, Order
+from reference_solver.certification.self_test import JUDGED, SIZES, Corruption, Trial
 from reports.command import certifying, main
 
 
@@ -112,3 +114,36 @@ def test_orders_are_shown_beside_their_errors(monkeypatch):
     assert [row["order"] for row in json.loads(result.stdout)] == [1.0, None]
     for shown in ("round-off", "bounce [m]", "0.05", "0.00313"):
         assert shown in result.stderr
+
+
+def planted(monkeypatch, missed, flags):
+    """Run the self-test with two corruptions of twenty sizes each; ``missed`` are those that nothing sees."""
+    law = Corruption("law", "friction", "block", lambda *given: given, "no check asks for it")
+    motion = Corruption("motion", "a place", "ball", lambda *given: given)
+    made = [Trial(law, size, () if ("friction", size) in missed else ("coulomb", "energy")) for size in SIZES]
+    made += [Trial(motion, size, () if ("a place", size) in missed else ("gap",)) for size in SIZES]
+    monkeypatch.setattr(certifying, "trials", lambda: iter(made))
+    return CliRunner().invoke(main, ["certify", "--self-test", *flags])
+
+
+def test_the_self_test_says_by_what_each_corruption_is_caught_at_each_size(monkeypatch):
+    result = planted(monkeypatch, {("friction", SIZES[0])}, ["--json"])
+    rows = json.loads(result.stdout)
+    assert result.exit_code == 0 and len(rows) == 2 * len(SIZES)
+    assert rows[0] == {
+        "family": "law", "corruption": "friction", "scene": "block", "size": SIZES[0], "caught": False, "by": [],
+    }  # fmt: skip
+    assert [row["caught"] for row in rows] == [False] + [True] * (2 * len(SIZES) - 1)
+    assert rows[1]["by"] == ["coulomb", "energy"] and rows[-1]["size"] == SIZES[-1]
+    cells = [[cell.strip() for cell in re.split("[│┃|]", line)[1:-1]] for line in result.stderr.splitlines()]
+    (first,), (second,) = ([row for row in cells if row and row[0] == name] for name in ("law", "motion"))
+    assert first == ["law", "friction", "block", "MISSED", *["coulomb"] * (len(SIZES) - 1), "no check asks for it"]
+    assert second == ["motion", "a place", "ball", *["gap"] * len(SIZES), ""]
+    assert f"2 of 2 caught at size {JUDGED:g}, 95% promised" in result.stderr and "missed:" not in result.stderr
+
+
+def test_the_self_test_fails_where_too_little_is_caught_at_the_size_that_is_judged(monkeypatch):
+    result = planted(monkeypatch, {("friction", JUDGED)}, [])
+    assert result.exit_code == 1 and result.stdout == ""
+    assert f"1 of 2 caught at size {JUDGED:g}, 95% promised" in result.stderr
+    assert "missed: friction, block: no check asks for it" in result.stderr

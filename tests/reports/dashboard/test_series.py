@@ -19,7 +19,7 @@ from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
 from validation.posed import resolve
-from validation.records.store import Store
+from validation.records.store import RELEASE_TITLE, Store
 
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
 
@@ -249,6 +249,47 @@ def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeyp
     with pytest.raises(pytest.fail.Exception):
         panels(store, history_folder)
     store.close()
+
+
+def of_releases(folder, observation, answers):
+    """A store in which releases of an engine answered one cell with these errors."""
+    who, store = ("chipmunk", "tuned"), Store(folder)
+    for version, error in answers:
+        run, _ = store.start(f"{RELEASE_TITLE}chipmunk=={version}: impact", [], fresh=True, apart=version)
+        store.add(run, replace(observation(who, error), engine_version=version))
+        store.finish(run)
+    return store
+
+
+def test_releases_are_points_in_the_order_of_their_versions_apart_from_runs(tmp_path, observation):
+    store = of_releases(tmp_path, observation, [("7.10.0", 0.3), ("7.9.0", 0.0)])
+    (panel,) = panels(store, tmp_path)
+    newest = store.release_runs("chipmunk", "7.10.0")[0].id
+    store.close()
+    assert (panel.key, panel.over) == (("chipmunk", "tuned", "impact", 2), "releases")
+    assert [(point.label, point.version) for point in panel.points] == [("7.9.0", "7.9.0"), ("7.10.0", "7.10.0")]
+    assert [point.error for point in panel.points] == [pytest.approx(0.0, abs=1e-15), pytest.approx(0.3)]
+    assert panel.points[1].run == newest and "7.10.0" in panel.points[1].title
+    assert panel.flips == [1] and panel.points[0].fails == 0 < panel.points[1].fails
+
+
+def test_a_release_is_judged_once_and_again_once_it_was_asked_more(tmp_path, observation, monkeypatch):
+    store = of_releases(tmp_path, observation, [("7.9.0", 0.0), ("7.10.0", 0.3)])
+    judged = []
+
+    def summarised(*of):
+        judged.append(of[0][0].engine_version)
+        return summarise(*of)
+
+    monkeypatch.setattr("reports.dashboard.series.summarise", summarised)
+    first = panels(store, tmp_path)
+    assert judged == ["7.9.0", "7.10.0"]
+    assert panels(store, tmp_path) == first and judged == ["7.9.0", "7.10.0"]
+    store.close()
+    store = of_releases(tmp_path, observation, [("7.9.0", 0.1)])
+    (panel,) = panels(store, tmp_path)
+    store.close()
+    assert judged[2:] == ["7.9.0"] and panel.points[0].error == pytest.approx(0.1)
 
 
 def test_a_run_keeps_its_own_summary_so_that_no_dashboard_judges_it_again(tmp_path, monkeypatch):

@@ -270,6 +270,30 @@ def test_single_numbers_keep_the_momentum_of_a_spinning_bar_and_a_ball_within_th
     assert 0.0 < found[0] <= band < 0.1 * found[1]
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_law_of_what_is_booked_rounds_one_number_at_a_time_at_the_end_of_the_scene(dimension):
+    """Every coordinate of both velocities once, by roundings of a single of the fastest, one after another."""
+    canonical = CATALOGUE["off_centre"]
+    scene, shown = canonical.scene(dimension, {"whirl": -2.0}), []
+
+    def measure(scene, motion):
+        shown.append(motion)
+        return {"lost": (-0.25, "")}
+
+    value, band = booked_law("lost")(scene, DT, measure)
+    assert (value, band) == (0.0, 0.25 * 2 * dimension) and len(shown) == 2 * dimension
+    fastest, moved = max(math.hypot(*body.twist[:dimension]) for body in scene.bodies), set()
+    for motion in shown:
+        assert motion.t == pytest.approx([0.0, scene.duration], abs=DT) and motion.dt == DT
+        assert (motion.pose == motion.pose[0]).all() and (motion.twist[0] == [b.twist for b in scene.bodies]).all()
+        ((body, axis),) = np.argwhere(motion.twist[1] != motion.twist[0])
+        off = motion.twist[1, body, axis] - motion.twist[0, body, axis]
+        assert 2.0**-24 * fastest <= off <= 64 * 2.0**-24 * fastest
+        moved.add((int(body), int(axis)))
+    assert moved == {(body, axis) for body in range(2) for axis in range(dimension)}
+    assert booked_law("lost")(scene, DT, lambda scene, motion: {"lost": (None, "not told")}) is None
+
+
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_a_bar_that_turns_wrongly_fails(size):
     canonical, scene, truth = made("off_centre")

@@ -260,6 +260,19 @@ def test_landings_that_are_found_late_pass(params, dt, late):
     assert failing(canonical, scene, rocking(scene, dt, late=late)) == set()
 
 
+@pytest.mark.parametrize("dt", [1 / 30, 1 / 60, 1 / 960])
+@pytest.mark.parametrize("params", [{"aspect": 0.1, "tilt": 0.5}, {"aspect": 0.1, "tilt": 0.95}])
+def test_however_coarse_the_steps_no_tilt_is_allowed_at_which_a_block_would_not_come_back(params, dt):
+    """A tilt between upright and balance is as far off as either of them at most."""
+    canonical, scene = made("rocking_block", **params)
+    truth, alpha = canonical.exact(scene), math.atan(params["aspect"])
+    tops = {c.metric: c for c in canonical.checks(scene, dt) if c.metric.startswith("amplitude")}
+    assert len(tops) == 3
+    for metric, check in tops.items():
+        top = truth[metric]
+        assert 0.0 < top < alpha and 0.0 < check.bound <= max(top, alpha - top) * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_a_landing_that_leaves_too_much_and_a_block_that_slides_fail(size):
     canonical, scene = made("rocking_block")

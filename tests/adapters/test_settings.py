@@ -1,0 +1,54 @@
+"""What a setting may be: each kind takes what it says in words, and nothing beside it."""
+
+import math
+
+import pytest
+
+from adapters.engine import EngineError
+from adapters.settings import checked, checked_step, flag, number, whole, word
+
+KINDS = {"iterations": whole(1, 20), "skin": number(0.0, 0.5), "warm": flag, "solver": word("PGS", "Newton")}
+GOOD = {"iterations": 4, "skin": 0.01, "warm": True, "solver": "Newton"}
+
+
+def test_what_fits_is_handed_on_as_it_is_and_as_a_copy():
+    found = checked("toy", KINDS, GOOD)
+    assert found == GOOD and found is not GOOD
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("iterations", 1), ("iterations", 20), ("skin", 0), ("skin", 0.0), ("skin", 0.5), ("warm", False),
+     ("solver", "PGS")],
+)  # fmt: skip
+def test_the_ends_of_a_range_and_each_word_belong_to_it(name, value):
+    assert checked("toy", KINDS, GOOD | {name: value})[name] == value
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        *(("iterations", v, "a whole number from 1 to 20") for v in (0, 21, True, 4.0, "4", None)),
+        *(("skin", v, "a number from 0 to 0.5") for v in (-1e-9, 0.51, True, "0.1", None, math.nan, math.inf)),
+        *(("warm", v, "true or false") for v in (0, 1, "true", None)),
+        *(("solver", v, "one of PGS, Newton") for v in ("pgs", "", 1, None, ["PGS"])),
+    ],
+)
+def test_another_value_is_refused_by_the_name_of_its_setting_and_what_it_must_be(name, value, wanted):
+    with pytest.raises(EngineError) as refused:
+        checked("toy", KINDS, GOOD | {name: value})
+    assert str(refused.value) == f"{name}: {value!r} must be {wanted}"
+
+
+def test_a_setting_that_is_unknown_or_missing_is_named():
+    with pytest.raises(EngineError, match=r"^sweeps: toy has no such setting, it has iterations, skin, warm, solver$"):
+        checked("toy", KINDS, GOOD | {"sweeps": 3})
+    with pytest.raises(EngineError, match=r"^skin: this setting is missing$"):
+        checked("toy", KINDS, {name: value for name, value in GOOD.items() if name != "skin"})
+
+
+def test_a_step_is_a_positive_finite_number_of_seconds():
+    assert checked_step(1 / 240) == 1 / 240 and checked_step(5e-324) == 5e-324
+    for dt in (0.0, -1 / 240, math.nan, math.inf):
+        with pytest.raises(EngineError, match=r"^dt: .* must be a positive, finite number of seconds$"):
+            checked_step(dt)

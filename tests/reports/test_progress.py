@@ -1,0 +1,99 @@
+"""The progress line: what it counts, and what is said where a plan does not end."""
+
+import io
+import re
+
+import pytest
+from rich.console import Console
+
+from reports import progress
+from validation.cells import Observation, Outcome, Slot
+from validation.records.store import Store
+
+SLOTS = [Slot("impact", (("v", float(v)),), 2, "toy", "default", 1 / 240) for v in range(1, 5)]
+
+
+def answer(slot):
+    return Observation(slot, "c", 1, "1", Outcome.OK)
+
+
+@pytest.fixture
+def planned(tmp_path, monkeypatch):
+    """`planned(cells, slots, **options)`: the run of a plan that `cells(todo, leave)` answers, and the text."""
+    store = Store(tmp_path)
+    monkeypatch.setattr(progress, "warm_up", lambda *of: None)
+
+    def make(cells, slots=SLOTS, terminal=True, **options):
+        def run_cells(todo, jobs, timeout, keep, shown, record, leave):
+            return cells(todo, leave)
+
+        monkeypatch.setattr(progress, "run_cells", run_cells)
+        text = io.StringIO()
+        console = Console(file=text, force_terminal=terminal, width=120, color_system=None, highlight=False)
+        return progress.run_plan(store, "quick: impact", slots, console, **options), text.getvalue()
+
+    make.store = store
+    yield make
+    store.close()
+
+
+def counted(text):
+    """What the progress line counted, in order: done and of how many."""
+    return [(int(a), int(b)) for a, b in re.findall(r"(\d+)/(\d+)", text)]
+
+
+def test_the_line_counts_every_cell_that_ends_and_names_the_last(planned):
+    run, said = planned(lambda todo, leave: map(answer, todo))
+    assert counted(said)[-1] == (4, 4) and "impact on toy" in said
+    assert run.finished and {o.slot for o in planned.store.observations(run)} == set(SLOTS)
+
+
+def test_who_writes_into_a_file_gets_no_line(planned):
+    _, said = planned(lambda todo, leave: map(answer, todo), terminal=False)
+    assert counted(said) == [] and "\x1b" not in said
+
+
+def test_what_was_left_is_said_by_reason_and_the_same_plan_goes_on_with_it_alone(planned):
+    def cells(todo, leave):
+        yield answer(todo[0])
+        for slot in todo[1:3]:
+            leave(slot, "three time-outs [of toy]")
+        leave(todo[3], "another")
+
+    run, said = planned(cells)
+    lines = [line.strip() for line in said.splitlines()]
+    assert "left: 2 cells, three time-outs [of toy]" in lines and "left: 1 cell, another" in lines
+    assert "this run is not complete; the same command resumes it" in lines and not run.finished
+    asked = []
+    again, said = planned(lambda todo, leave: map(answer, asked.extend(todo) or todo))
+    assert asked == SLOTS[1:] and again.id == run.id and again.finished
+    assert f"resuming run {run.id}: 1 of 4 cells done" in said
+    assert min(counted(said)) == (1, 4) and max(counted(said)) == (4, 4)
+
+
+def test_ctrl_c_says_that_nothing_is_lost_and_loses_nothing(planned):
+    def cells(todo, leave):
+        yield answer(todo[0])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        planned(cells)
+    (run,) = planned.store.runs()
+    assert [o.slot for o in planned.store.observations(run)] == SLOTS[:1] and not run.finished
+    _, said = planned(lambda todo, leave: map(answer, todo))
+    assert "1 of 4 cells done" in said
+
+
+def test_answers_that_are_known_are_kept_and_not_asked_again_and_others_are_not_taken(planned):
+    asked = []
+    elsewhere = Slot("impact", (("v", 9.0),), 2, "toy", "default", 1 / 240)
+    run, said = planned(
+        lambda todo, leave: map(answer, asked.extend(todo) or todo), known=[answer(SLOTS[1]), answer(elsewhere)]
+    )
+    assert asked == [SLOTS[0], SLOTS[2], SLOTS[3]] and counted(said)[-1] == (4, 4)
+    assert {o.slot for o in planned.store.observations(run)} == set(SLOTS) and run.finished
+
+
+def test_a_bench_ends_its_run_itself(planned):
+    run, _ = planned(lambda todo, leave: map(answer, todo), finish=False)
+    assert not run.finished

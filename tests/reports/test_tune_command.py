@@ -1,0 +1,124 @@
+"""``tune``: what a search found, in a line each, and the status that says whether something better is there."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main, tuning
+from validation.settings.decisive import ALONE, Decisive, Part
+from validation.settings.tuning import Score, Search, Trial, groups
+
+BEFORE, AFTER, HELD = Score(3, 12.34), Score(1, 4.0), (Score(2, 1.0), Score(2, 0.96))
+
+
+def result(engine, profile, group, changes, needless=()):
+    trials = (Trial({"slop": 0.1}, AFTER, ()), Trial({"slop": 0.2}, BEFORE, ("creep",)))
+    return Search(engine, profile, group, BEFORE, AFTER, changes, HELD, trials, dict(needless))
+
+
+@pytest.fixture
+def tune(monkeypatch):
+    """`tune(words, changes, needless)`: the command where every search finds that, and what was searched."""
+
+    def run(*words, changes=(), needless=()):
+        asked = []
+
+        def search(engine, profile, name, jobs, dimensions, said):
+            asked.append((engine, profile, name, jobs, dimensions))
+            said({"slop": 0.1, "sweeps": 4}, AFTER)
+            return result(engine, profile, name, dict(changes), needless)
+
+        monkeypatch.setattr(tuning, "search", search)
+        return CliRunner().invoke(main, ["tune", *words]), asked
+
+    return run
+
+
+def lines(text):
+    return [line.strip() for line in text.splitlines()]
+
+
+def test_all_groups_are_searched_from_the_tuned_profile_in_all_dimensions_of_the_engine(tune):
+    done, asked = tune("chipmunk")
+    assert done.exit_code == 0 and asked == [("chipmunk", "tuned", name, 1, (2,)) for name in groups()]
+    done, asked = tune("bullet", "--group", "slide", "--jobs", "2")
+    assert asked == [("bullet", "tuned", "slide", 2, (2, 3))]
+    done, asked = tune("bullet", "--group", "slide", "--profile", "one", "--dim", "3")
+    assert asked == [("bullet", "one", "slide", 1, (3,))]
+
+
+def test_where_nothing_is_better_that_is_said_and_the_status_is_0(tune):
+    done, _ = tune("chipmunk", "--group", "slide")
+    said = lines(done.stderr)
+    assert done.exit_code == 0 and done.stdout == ""
+    assert said == [
+        "chipmunk/tuned on slide",
+        "slop = 0.1, sweeps = 4: 1 fail, 4.0 decades",
+        "chipmunk/tuned slide: 3 fail, 12.3 decades; 2 tried; none is better",
+    ]
+
+
+def test_what_is_better_is_said_with_what_was_held_out_and_the_status_is_1(tune):
+    done, _ = tune("chipmunk", "--group", "slide", "--json", changes={"slop": 0.1}, needless={"bias": 0.0})
+    assert done.exit_code == 1
+    assert lines(done.stderr)[2:] == [
+        "chipmunk/tuned slide: 3 fail, 12.3 decades; 2 tried; better: slop = 0.1 -> 1 fail, 4.0 decades "
+        "(held out 2 fail, 1.0 decades -> 2 fail, 1.0 decades)",
+        "as shipped does as well: bias = 0.0",
+    ]
+    (plain,) = json.loads(done.stdout)
+    assert (plain["engine"], plain["profile"], plain["group"]) == ("chipmunk", "tuned", "slide")
+    assert plain["changes"] == {"slop": 0.1} and plain["before"] == {"failing": 3, "decades": 12.34}
+    assert [trial["changes"] for trial in plain["trials"]] == [{"slop": 0.1}, {"slop": 0.2}]
+
+
+def test_a_group_that_there_is_not_and_an_engine_without_candidates_are_refused_in_a_line(tune):
+    done, asked = tune("chipmunk", "--group", "nosuch")
+    assert done.exit_code == 2 and asked == []
+    assert "'nosuch' is not one of" in done.stderr and all(name in done.stderr for name in groups())
+    done, asked = tune("reference")
+    assert (done.exit_code, asked) == (2, [])
+    assert "nobody has named stock settings of reference to try" in done.stderr
+
+
+def cured(scene, *decide):
+    parts = tuple(Part(name, "1", 2.0, 2.0, ALONE) for name in decide)
+    return Decisive("chipmunk", "7", "default", "tuned", scene, 2, ({},), ("drift",), 9.0, 0.5, parts)
+
+
+@pytest.fixture
+def measured(monkeypatch, tmp_path):
+    """`measured(listed, found)`: ``tune --decisive`` where these cures are listed, and those are measured."""
+
+    def run(listed, found, *words):
+        monkeypatch.setattr(tuning, "measured_of", lambda engine: listed)
+        monkeypatch.setattr(tuning, "measure_all", lambda engine, jobs: found)
+        monkeypatch.setattr(tuning, "folder_of", lambda engine: tmp_path)
+        return CliRunner().invoke(main, ["tune", "chipmunk", "--decisive", *words])
+
+    return run
+
+
+def test_what_decides_a_cure_is_said_and_kept_and_the_status_tells_whether_it_is_what_was_listed(measured, tmp_path):
+    found = [cured("stack", "slop"), cured("impact", "sweeps")]
+    done = measured(found[::-1], found)
+    assert done.exit_code == 0
+    assert lines(done.stdout) == ["chipmunk/default stack: cured by slop", "chipmunk/default impact: cured by sweeps"]
+    kept = (tmp_path / "decisive.csv").read_text(encoding="utf-8")
+    assert "slop" in kept and "sweeps" in kept
+    for listed in ([cured("stack", "slop")], [cured("stack", "bias"), found[1]], [*found, cured("bounce", "slop")]):
+        assert measured(listed, found).exit_code == 1
+    plain = json.loads(measured(found, found, "--json").stdout)
+    assert [(each["scene"], each["parts"][0]["setting"]) for each in plain] == [("stack", "slop"), ("impact", "sweeps")]
+
+
+def test_an_engine_without_cures_and_a_list_that_is_no_longer_true_are_refused_in_a_line(measured, monkeypatch):
+    def stale(engine, jobs):
+        raise ValueError("the profile changes no setting of stack")
+
+    monkeypatch.setattr(tuning, "measure_all", stale)
+    done = CliRunner().invoke(main, ["tune", "chipmunk", "--decisive"])
+    assert done.exit_code == 2 and "tune: the profile changes no setting of stack" in done.stderr
+    done = CliRunner().invoke(main, ["tune", "reference", "--decisive"])
+    assert done.exit_code == 2 and "nobody has named cures of reference to measure" in done.stderr
