@@ -35,6 +35,12 @@ def is_file(argument: str) -> bool:
     return argument not in CATALOGUE and _FILE.fullmatch(argument) is not None
 
 
+def is_model(argument: str) -> bool:
+    """Whether the argument names a file that is a model of an engine."""
+    found = _FILE.fullmatch(argument)
+    return argument not in CATALOGUE and found is not None and not found["path"].lower().endswith(_OWN)
+
+
 def is_known(argument: str) -> bool:
     """Whether the argument names a scene of the catalogue, or a file."""
     return argument in CATALOGUE or is_file(argument)

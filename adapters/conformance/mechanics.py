@@ -100,7 +100,7 @@ def spin(engine: Engine) -> str:
 
 def _conserved(engine: Engine, what: str, measure: Callable[[Scene, Trajectory], tuple[Array, float]]) -> str:
     for profile, order in product(engine.profiles, (1, -1)):
-        scene = accepted(engine, profile, glancing())
+        scene = accepted(engine, profile, glancing(), glancing(0.0))
         scene = scene if order == 1 else _swapped(scene)
         for given in in_all_dimensions(engine, scene):
             found = driven(engine, given, profile)
@@ -189,7 +189,7 @@ def impulse(engine: Engine) -> str:
     """Impulses account for the momentum of the body they name: sum J = m dv on b, and -J on a."""
     silent = ""
     for profile, order in product(engine.profiles, (1, -1)):
-        for scene in in_all_dimensions(engine, accepted(engine, profile, striking(order))):
+        for scene in in_all_dimensions(engine, accepted(engine, profile, striking(order), striking(order, 0.0))):
             total, gained = _exchanged(engine, scene, profile)
             if total is None:
                 silent = f"{profile}: contact impulses are not reported"
@@ -211,7 +211,7 @@ def sampling(engine: Engine) -> str:
     """State and contacts of a sample are of the same instant: what a step reports is what it changed."""
     silent = ""
     for profile in engine.profiles:
-        for scene in in_all_dimensions(engine, accepted(engine, profile, striking())):
+        for scene in in_all_dimensions(engine, accepted(engine, profile, striking(), striking(restitution=0.0))):
             total, gained = _exchanged(engine, scene, profile)
             if total is None:
                 silent = f"{profile}: contact impulses are not reported"

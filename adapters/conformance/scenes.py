@@ -1,7 +1,7 @@
 """Small scenes of the checks, in the plane; engines that live in space get them lifted.
 
 Bodies touch one point each unless a box stands on a floor, so that the order in which a solver visits its contacts
-changes nothing. An engine that refuses boxes is shown the same scene without them.
+changes nothing. An engine that refuses boxes, or a rebound, is shown the same scene without.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ def resting(order: int = 1, gravity: float = GRAVITY, box: bool = True) -> Scene
     return Scene("check_resting", 1, 2, bodies[::order], (pair,), (0.0, -gravity), 24 * DT)
 
 
-def striking(order: int = 1) -> Scene:
+def striking(order: int = 1, restitution: float = 0.5) -> Scene:
     """A ball strikes another one of three times its mass in free space; ``order`` -1 swaps them in the scene."""
     bodies = (
         Body("light", Disc(0.5), 1.0, 0.125, (-0.52, 0.0, 0.0), (2.0, 0.0, 0.0)),
         Body("heavy", Disc(0.5), 3.0, 0.375, (0.52, 0.0, 0.0)),
     )
-    return Scene("check_striking", 1, 2, bodies[::order], (Pair(restitution=0.5),), (0.0, 0.0), 48 * DT)
+    return Scene("check_striking", 1, 2, bodies[::order], (Pair(restitution=restitution),), (0.0, 0.0), 48 * DT)
 
 
 def flying() -> Scene:
@@ -51,13 +51,13 @@ def flying() -> Scene:
     return Scene("check_flying", 1, 2, (ball,), (), (0.6 * GRAVITY, -0.8 * GRAVITY), 48 * DT)
 
 
-def glancing() -> Scene:
+def glancing(restitution: float = 0.5) -> Scene:
     """Two spinning balls meet off-centre and slowly in free space, with friction."""
     bodies = (
         Body("light", Disc(0.5), 1.0, 0.125, (-0.45, 0.3, 0.0), (0.25, 0.0, 0.8)),
         Body("heavy", Disc(0.5), 3.0, 0.375, (0.361, -0.3, 0.0), (0.0, 0.0, -0.3)),
     )
-    return Scene("check_glancing", 1, 2, bodies, (Pair(restitution=0.5, friction=0.5),), (0.0, 0.0), 72 * DT)
+    return Scene("check_glancing", 1, 2, bodies, (Pair(restitution=restitution, friction=0.5),), (0.0, 0.0), 72 * DT)
 
 
 def rolling() -> Scene:

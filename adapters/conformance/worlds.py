@@ -131,7 +131,7 @@ def fresh(engine: Engine) -> str:
 
 def _three() -> tuple[tuple[Scene, ...], ...]:
     other = resting(-1, 4.0), resting(-1, 4.0, box=False)
-    return (resting(), resting(box=False)), other, (striking(),)
+    return (resting(), resting(box=False)), other, (striking(), striking(restitution=0.0))
 
 
 def _interleaved(engine: Engine, profile: str, scenes: list[Scene]) -> list[np.ndarray]:

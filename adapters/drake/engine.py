@@ -18,11 +18,12 @@ from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
 from adapters.drake.translation import frictions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
+from adapters.meeting import meeting_pairs
 from adapters.model import PROFILE
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
-from adapters.scene import Scene
+from adapters.scene import Capsule, Cylinder, Scene, Sphere
 from adapters.settings import checked_step
 
 #: What the solver of a convex step leaves, as a share of what it changes, and of a speed [m/s]; measured 6e-6 at most.
@@ -38,6 +39,20 @@ APPROXIMATE: Mapping[str, str] = MappingProxyType(
 )
 
 
+def _unsound(scene: Scene) -> str | None:
+    """Why a capsule or a cylinder that can meet anything but a ball is refused; see the quirk."""
+    if not any(isinstance(body.shape, Capsule | Cylinder) for body in scene.bodies):
+        return None
+    for i, j, _ in meeting_pairs(scene):
+        rod, other = scene.bodies[i], scene.bodies[j]
+        if not isinstance(rod.shape, Capsule | Cylinder):
+            rod, other = other, rod
+        if isinstance(rod.shape, Capsule | Cylinder) and not isinstance(other.shape, Sphere):
+            kind = type(rod.shape).__name__.lower()
+            return f"{rod.name}.shape: Drake's contact of a {kind} is exact with balls alone, it can meet {other.name}"
+    return None
+
+
 @final
 class DrakeEngine(Engine):
     """Spatial engine; see the module's docstring for its step."""
@@ -51,6 +66,7 @@ class DrakeEngine(Engine):
         customary_dt=1.0 / 1000.0,
         roles=MappingProxyType({"default": "shipped", "sap": "one", "tamsi": "tuned"}),
         apart=True,
+        abilities=frozenset({"capsule", "cylinder"}),
         quirks=(
             Quirk(
                 "contacts have no restitution: what they dissipate depends on the speed, and on the step",
@@ -77,6 +93,14 @@ class DrakeEngine(Engine):
                 "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
                 "CalcContactFrictionFromSurfaceProperties",
             ),
+            Quirk(
+                "on a face a capsule or a cylinder has one point, over which it rocks for ever or sinks, or a surface "
+                "of facets, over which it does not roll; where an end meets another one, or a box, the normal is wrong "
+                "by a tenth of a radian and more",
+                "these pairs are refused, but for a model's own profile; with a ball the point is exact",
+                "ComputePointPairPenetration, AddCompliantHydroelasticProperties; measured with 1.51.1, "
+                "tests/adapters/test_rods_of_drake.py",
+            ),
             Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 1.51.1"),
         ),
     )
@@ -97,7 +121,7 @@ class DrakeEngine(Engine):
         return version("drake")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse restitution, bodies that are moved as prescribed, and tables that no single bodies' numbers give."""
+        """Refuse restitution, moved bodies, tables that no single bodies' numbers give, and rods that touch no ball."""
         for body in scene.bodies:
             if body.motion == "prescribed":
                 return f"{body.name}.motion: the adapter moves no body as prescribed"
@@ -105,7 +129,7 @@ class DrakeEngine(Engine):
             return "pairs: contacts of drake have no restitution"
         if profile != PROFILE and frictions(scene) is None:  # a model brings its bodies' own numbers
             return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
-        return None
+        return None if profile == PROFILE else _unsound(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -10,7 +10,7 @@ import numpy as np
 from adapters.drake.profiles import APPROXIMATIONS, OWN
 from adapters.drake.translation import frictions, pair_of
 from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 
 class DrakeSimulation(Simulation):
@@ -73,6 +73,11 @@ class DrakeSimulation(Simulation):
             made: Any = drake.HalfSpace()
         elif isinstance(shape, Sphere):
             made = drake.Sphere(shape.radius)
+        elif isinstance(shape, Capsule | Cylinder):
+            kind = drake.Capsule if isinstance(shape, Capsule) else drake.Cylinder
+            made = kind(shape.radius, 2.0 * shape.half_length)
+            # Theirs lie along z, the scene's along x.
+            place = place.multiply(drake.RigidTransform(drake.RotationMatrix.MakeYRotation(0.5 * np.pi), np.zeros(3)))
         else:
             assert isinstance(shape, Box)
             made = drake.Box(*(2.0 * half for half in shape.half_extents))
@@ -87,7 +92,7 @@ class DrakeSimulation(Simulation):
         if OWN in settings:
             _, kind, resolution, modulus, stiffness, dissipation, relaxation = settings[OWN][index]
         else:
-            surface = settings["boxes"] == "hydroelastic" and not isinstance(shape, Sphere)
+            surface = settings["boxes"] == "hydroelastic" and isinstance(shape, Box | HalfSpace)
             kind = "none" if not surface else "compliant" if free else "rigid"
             resolution, modulus = shape.smallest_size, settings["modulus"]
             # Two in series: each has twice the pair's. Times of a pair add up.

@@ -60,7 +60,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     out of reach, in the same and in a fresh process; exits with 1 if that changes an answer.
 
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
-    if not all of it ran.
+    if not all of it ran. FAILs of a model, of which nothing is listed, are shown and are no alarm.
     """
     console = terminal(stderr=True)
     for name in ("junit", "markdown"):

@@ -8,8 +8,10 @@ import pytest
 
 from adapters import registry
 from adapters.conformance import CHECKS, check_adapter, items
+from adapters.conformance.faults import FAULTS
 from adapters.conformance.mechanics import contacts
 from adapters.conformance.spoilt import Spoilt
+from adapters.conformance.toy import ToyEngine
 from adapters.engine import Contacts, Expected
 from adapters.receipts import QUANTITIES
 from adapters.scene import Box
@@ -71,6 +73,27 @@ def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_cla
     }  # fmt: skip
     assert "balls only" in str(told["receipt friction"])
     assert told["receipt gravity"].status == told["states"].status == told["contacts"].status == "ok"
+
+
+@pytest.mark.parametrize(
+    ("fault", "seen"),
+    [("", []), ("impulse of the wrong body", ["impulse", "sampling"]), ("world shared with another", ["fresh"])],
+)
+def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
+    class Dull:
+        def refuses(self, scene, profile):
+            rebounds = any(restitution > 0.0 for restitution, _ in scene.materials())
+            return "pairs: no restitution" if rebounds else super().refuses(scene, profile)
+
+    class Healthy(Dull, ToyEngine):
+        pass
+
+    class Broken(Dull, Spoilt):
+        pass
+
+    engine = Broken(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Healthy()
+    asked = ("momentum", "spin", "impulse", "sampling", "fresh")
+    assert [name for name in asked if CHECKS[name](engine)] == seen
 
 
 def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):

@@ -128,7 +128,7 @@ def test_cylinders_and_capsules_lie_along_their_bodies_first_axis():
     assert lowered(replace(found, bodies=found.bodies[:2])) is not None
 
 
-@pytest.mark.parametrize("path", [path for path in READ if path.name != "rollers.sdf"], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", READ, ids=lambda path: path.name)
 def test_a_model_moves_as_drake_moves_its_own_file(path):
     """Profile `model` against the file itself in Drake alone, gravity aside, which Drake does not read.
 

@@ -14,9 +14,11 @@ from adapters.scene import Body, Disc, HalfSpace, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from reports.command import main
 from reports.spread import spread_lines
+from reports.wording import row_id
 from validation import posed
 from validation.cells import Observation, Outcome, Slot
 from validation.files.model_files import _momentum_check, canonical_from_text, momentum_drift
+from validation.judging.rows import Row, predictions_of, rows_of
 from validation.judging.verdicts import Physics, judge_physics
 from validation.questions.spread import spreads
 from validation.records.store import Store
@@ -54,6 +56,38 @@ def test_it_runs_as_made_on_its_own_engine_and_rigid_elsewhere(ran):
     assert {row["metric"] for row in rows} >= {"energy_growth", "penetration", "momentum_drift", "final[ball.vx]"}
     planar = [row for row in rows if (row["engine"], row["metric"]) == ("chipmunk", "energy_growth")]
     assert {row["physics"] for row in planar if row["dimension"] == 2} == {"pass"}
+
+
+def test_what_fails_says_that_the_model_is_your_own_and_is_no_alarm(tmp_path):
+    """A column that bears the name of a scene of ours, of which MuJoCo has a law that would explain it."""
+    path = tmp_path / "own.xml"
+    path.write_text((MODELS / "column_of_ten.xml").read_text().replace("column of ten", "stack"))
+    assert 'model="stack"' in path.read_text()
+    words = ("run", path, "--engine", "mujoco", "--profile", "default", "--dim", 3, "--param", "duration=0.5",
+             "--jobs", 1)  # fmt: skip
+    done = call(*words, "--out", tmp_path, status=(0,))
+    assert "default 3-D  FAIL 1/2" in done.stdout and "overlaps by" in done.stdout
+    assert "Needs attention" not in done.stdout
+    assert "nothing is listed of a model: what is wrong reads FAIL and does not fail the command" in done.stderr
+    rows = json.loads(call(*words, "--out", tmp_path / "again", "--json", status=(0,)).stdout)
+    (row,) = [row for row in rows if row["physics"] == "fail"]
+    assert (row["metric"], row["standing"], row["reason"]) == ("penetration", None, "not listed: your own model")
+    assert predictions_of(Row(**row)) == []
+    assert "not listed: your own model" in call("explain", row_id(row), "--out", tmp_path, status=(0,)).stdout
+
+
+@pytest.mark.parametrize(
+    ("engine", "profile", "standing"),
+    [("bullet", "tuned", None), ("reference", "classical", None), ("reference", "reference", "new")],
+)
+def test_a_profile_that_promises_a_solution_keeps_its_promise_of_models_too(engine, profile, standing):
+    name = posed.pinned(str(MODELS / "ball_on_floor.xml"))
+    slot = Slot(name, (), 3, engine, profile, 1 / 240, None)
+    found = {"energy_growth": (0.0, ""), "penetration": (1.0, "")}
+    rows = {row.metric: row for row in rows_of("run", [Observation(slot, "c", 1, "1.0", Outcome.OK, "", found)])}
+    row = rows["penetration"]
+    assert (row.physics, row.standing, row.alarming) == ("fail", standing, standing is not None)
+    assert row.reason.endswith("not listed: your own model")
 
 
 def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypatch):

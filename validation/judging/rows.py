@@ -15,7 +15,7 @@ from adapters.engine_folder import covering
 from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.findings import Findings, FindingsError, Known, known_of
+from validation.findings import Findings, FindingsError, Known, known_of, solutions_of
 from validation.findings.files import brought_by_ours, findings_of
 from validation.judging.studies import StudyResult, results, study_of
 from validation.judging.verdicts import (
@@ -28,11 +28,13 @@ from validation.judging.verdicts import (
     judge_physics,
     predicted,
 )
-from validation.posed import is_file, resolve
+from validation.posed import is_file, is_model, resolve
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
+#: Why a row of a model has no standing.
+OWN_MODEL = "not listed: your own model"
 #: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
 TRUTH_SHARE = 0.1
 
@@ -173,6 +175,8 @@ def _verdict(observation: Observation, scene: Scene, check: Check, value: float 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
         return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
+    if is_model(slot.scene):  # nothing can be listed of it; a profile that promises a solution keeps its promise
+        return Known(None, slot.profile in solutions_of(slot.engine), OWN_MODEL)
     findings, why_not = _findings(slot.engine)
     if why_not:
         return Known(None, False, why_not)
@@ -213,9 +217,12 @@ def _certificate(observation: Observation, check: Check) -> str:
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
-    """What laws say about a FAIL; at iterations asked for those alone that follow an engine's sweeps."""
+    """What laws say about a FAIL; at iterations asked for those alone that follow an engine's sweeps.
+
+    They are of the catalogue's scenes: a file that has the name of one of them is another scene.
+    """
     slot = observation.slot
-    if judge_physics(value, check) is not Physics.FAIL:
+    if judge_physics(value, check) is not Physics.FAIL or is_file(slot.scene):
         return []
     laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
     return predicted(laws, scene, slot, resolve(slot.scene).measure)
@@ -223,7 +230,7 @@ def _predictions(observation: Observation, scene: Scene, check: Check, value: fl
 
 def predictions_of(row: Row) -> list[Prediction]:
     """What deviation laws say about a failing row, whether or not it is so; nothing about a study."""
-    if row.physics != Physics.FAIL.value or len(row.cells) > 1:
+    if row.physics != Physics.FAIL.value or len(row.cells) > 1 or is_file(row.scene):
         return []
     slot = slot_from_dict(row.slot)
     canonical = resolve(slot.scene)
