@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-mujoco = pytest.importorskip("mujoco")
+pytest.importorskip("mujoco")
 
 from adapters.engine import EngineError
 from adapters.lift import lift
@@ -201,6 +201,8 @@ def test_an_overlap_is_taken_away_no_faster_than_a_step_falls_and_nothing_hops()
 
 def made(mu: float, rounds: int) -> float:
     """How far shifts are apart after so many rounds of the first step of a slide."""
+    import mujoco
+
     scene = scene_of(FLOOR, slab((1.0, 0.0, 0.0)), mu=mu, g=DOWN)
     chosen = settings(scene, rounds=rounds)
     simulation = ENGINE.build(scene, DT, chosen)
@@ -211,7 +213,7 @@ def made(mu: float, rounds: int) -> float:
 
 @pytest.mark.parametrize("mu", [0.2, 0.5, 1.0, 2.0])
 def test_a_round_leaves_what_the_contraction_says(mu: float) -> None:
-    """mu^2/(1 + mu^2) of a box that moves without turning, but for softness: 1e-4 of an inverse mass, of normal and tangent."""
+    """mu^2/(1 + mu^2) of a box that does not turn, but for softness: 1e-4 of an inverse mass, across and along."""
     assert abs(made(mu, 2) / made(mu, 1) - mu**2 / (1.0 + mu**2)) <= 2e-4
 
 

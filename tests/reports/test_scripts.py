@@ -151,7 +151,8 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 
 @pytest.mark.parametrize(("engine", "runs", "shaken"), [
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
-    ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True), ("reference", True, False),
+    ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
+    ("reference", True, False),
 ])  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
