@@ -210,8 +210,11 @@ ROLES: Mapping[Role, str] = {
     "tuned": "best stock settings, chosen by what a scene needs",
     "one": "one set of stock settings for all scenes",
     "solution": "solves its contact problem and says whether it did; what fails there is a defect",
-    "matched": "made to follow the textbook's law by settings that nobody ships; in no ranking",
+    "matched": "the textbook's law in the place of the engine's own, by a loop around its solver: what it does is not "
+    "the engine's contact law; in no ranking",
 }
+#: Roles of profiles that are asked and shown, but neither compared nor recommended: nobody gets them by settings.
+UNRANKED: frozenset[Role] = frozenset({"matched"})
 Precision = Literal["double", "single"]
 #: Name of the profile in the rows of an engine that cannot be asked for its own.
 NOT_KNOWN = "?"

@@ -7,7 +7,7 @@ import os
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
-from adapters.engine import Engine, EngineError, EngineFacts, Role
+from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
 from adapters.foreign import Found, checked_facts, probe, said_by
 from adapters.plain import NAME, is_visible, one_line
 
@@ -164,6 +164,12 @@ def profile_of(name: str, role: Role) -> str | None:
     """Profile of an engine that has this role; None if it has none, or cannot be asked."""
     told = facts(name)
     return told.profile(role) if told else None
+
+
+def is_ranked(name: str, profile: str) -> bool:
+    """Whether a profile of an engine stands in rankings and counts as a cure (`adapters.engine.UNRANKED`)."""
+    told = facts(name)
+    return told is None or told.roles.get(profile) not in UNRANKED
 
 
 def solver() -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from adapters.registry import is_ranked
 from reports.cures import decided_by, told_cures
 from reports.findings import REFUSED, severity
 from reports.matrix import UNJUDGED
@@ -93,7 +94,7 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         dimensions[row["scene"]].add(row["dimension"])
     found = []
     for scene in dimensions:
-        own = {key[1:]: group for key, group in groups.items() if key[0] == scene}
+        own = {key[1:]: group for key, group in groups.items() if key[0] == scene and is_ranked(*key[1:])}
         good = [key for key, group in own.items() if not _failing(group)]
         price = {key: _price(costs or {}, scene, key) for key in good}
         good.sort(key=lambda key: price[key])
@@ -154,9 +155,10 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
 
 def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
-    others = {name: group for name, group in own.items() if name != profile}
-    good = [name for name, group in others.items() if not _failing(group)]
     failed = _failing(own[profile])
+    engine = failed[0]["engine"]
+    others = {name: group for name, group in own.items() if name != profile and is_ranked(engine, name)}
+    good = [name for name, group in others.items() if not _failing(group)]
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
     listed = told_cures(row["engine"], row["engine_version"], row["scene"], profile, dimensions)
     if good:

@@ -15,6 +15,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from adapters.engine import ROLES
+from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
 from reports.wording import LABELS, MARKS, SHORT, mark_of
 
@@ -100,6 +102,16 @@ def matrix_of(rows: Iterable[Mapping[str, Any]]) -> Matrix:
             counts[row["scene"]].add(row["iterations"])
     fields, sweeps = ({key: Field(counter) for key, counter in marks.items()} for marks in (own, swept))
     return Matrix(tuple(lines), tuple(columns), fields, sweeps, {k: tuple(sorted(v)) for k, v in counts.items()})
+
+
+def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
+    """One line for each profile that is shown and in no ranking: what it is."""
+    lines = []
+    for engine, profile in columns:
+        told = facts(engine)
+        if told is not None and not is_ranked(engine, profile):
+            lines.append(f"{engine}/{profile}: {ROLES[told.roles[profile]]}")
+    return lines
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:

@@ -17,6 +17,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from adapters.registry import is_ranked
 from reports.answers import Answer, answers, configured
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
@@ -105,7 +106,7 @@ def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Ite
     for row in configured(rows):
         asked[family[row["scene"]], (row["engine"], row["profile"])].add(row["scene"])
     for name, scenes in families.items():
-        own = {c: f for (line, c), f in matrix.fields.items() if line[0] == name and f.judged}
+        own = {c: f for (line, c), f in matrix.fields.items() if line[0] == name and f.judged and is_ranked(*c)}
         good = [_named(c, len(asked[name, c]), len(scenes)) for c, f in own.items() if not f.missed]
         others = sorted((f.missed / f.judged, c) for c, f in own.items() if f.missed)
         near = [f"{'/'.join(c)} {share(own[c].missed, own[c].judged)}" for _, c in others][:NEAREST]

@@ -9,12 +9,17 @@ half-way into the overlap in which a step finds it, which is where a rod's arm i
     balls that meet without friction, many at once     f >= 0
     a rod that lands on an edge, with friction         |f_t| <= mu f_n: a cone that a slip leaves by lifting
 
+The same rod under Newton's and Coulomb's laws is what profile ``matched`` makes of it: at the place where a step finds
+the end, half-way into the overlap, its arm is shorter by that.
+
 Source: MuJoCo documentation, "Computation: constraint model" and "Modeling: solver parameters". Nothing here runs it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -45,21 +50,43 @@ def convex_blow_law(profile: str, metric: str) -> Law:
         if scene.dimension != 2 or any(scene.gravity) or not reflects or chosen["margin"] or chosen["tolerance"]:
             return None
         d = float(chosen["solimp"][0])
-        found = []
-        for moved in (0.0, *(k * GAP_ROUND_OFF for k in PERTURBATIONS)):
-            motion = _balls(scene, dt, d, moved)
-            if motion is None and chosen["solreffriction"] == "stick" and chosen["impratio"] == 1.0:
-                motion = _rod(scene, dt, d, moved)
-            value = None if motion is None else measure(scene, motion)[metric][0]
-            if value is None:
-                return None
-            found.append(value)
-        value, *others = found
-        speed = max(float(np.linalg.norm(body.twist[:2])) for body in scene.bodies)
-        spread = SPREAD_FACTOR * max(abs(other - value) for other in others)
-        return value, spread + SUM_ROUND_OFF * max(1.0, speed)
+        sticks = chosen["solreffriction"] == "stick" and chosen["impratio"] == 1.0
+
+        def motion(moved: float) -> Trajectory | None:
+            balls = _balls(scene, dt, d, moved)
+            return _rod(scene, dt, moved, partial(_yielding, d=d)) if balls is None and sticks else balls
+
+        return _told_alike(scene, metric, measure, motion)
 
     return law
+
+
+def matched_blow_law(profile: str, metric: str) -> Law:
+    """What Newton's and Coulomb's laws make of ``metric`` at the place where the engine finds a rod's end."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        if scene.dimension != 2 or any(scene.gravity):
+            return None
+        return _told_alike(scene, metric, measure, lambda moved: _rod(scene, dt, moved, _rigid))
+
+    return law
+
+
+def _told_alike(
+    scene: Scene, metric: str, measure: Measure, motion: Callable[[float], Trajectory | None]
+) -> Prediction | None:
+    """Value of a motion, and a band from starts that are moved by round-off."""
+    found = []
+    for moved in (0.0, *(k * GAP_ROUND_OFF for k in PERTURBATIONS)):
+        path = motion(moved)
+        value = None if path is None else measure(scene, path)[metric][0]
+        if value is None:
+            return None
+        found.append(value)
+    value, *others = found
+    speed = max(float(np.linalg.norm(body.twist[:2])) for body in scene.bodies)
+    spread = SPREAD_FACTOR * max(abs(other - value) for other in others)
+    return value, spread + SUM_ROUND_OFF * max(1.0, speed)
 
 
 def _balls(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None:
@@ -120,7 +147,12 @@ def _parted(v: Array, lightness: Array, touching: list[tuple[int, int, Array, fl
     return None
 
 
-def _rod(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None:
+#: ``blow(mobility, closing, restitution, friction)``: impulse on a rod's end over its mass, normal and tangent [m/s],
+#: of an end with this mobility over the mass (2, 2) that closes with this velocity (2,) [m/s]; None without one answer.
+Blow = Callable[[Array, Array, float, float], Array | None]
+
+
+def _rod(scene: Scene, dt: float, moved: float, blow: Blow) -> Trajectory | None:
     """A box that lands on an edge, ``moved`` [m] higher up, without turning before; None for anything else."""
     if len(scene.bodies) != 2:
         return None
@@ -141,8 +173,10 @@ def _rod(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None:
     lever = below - 0.5 * depth
     share = rod.mass / moment_of(rod)
     mobility = np.array([[1.0 + arm * arm * share, arm * lever * share], [arm * lever * share, 1.0 + lever**2 * share]])
-    whole = mobility + (1.0 - d) / d / CORNERS_OF_AN_EDGE * np.eye(2)
-    normal, tangent = _in_cone(whole, -np.array([(1.0 + material.restitution) * down, along]) / d, material.friction)
+    struck_with = blow(mobility, np.array([down, along]), material.restitution, material.friction)
+    if struck_with is None:
+        return None
+    normal, tangent = struck_with
     after = np.array([along + tangent, down + normal, (arm * normal + lever * tangent) * share])
     steps = step_count(scene.duration, dt)
     late = (np.arange(steps + 1) > struck)[:, None]
@@ -150,6 +184,27 @@ def _rod(scene: Scene, dt: float, d: float, moved: float) -> Trajectory | None:
     poses = np.array(rod.pose) + np.vstack([np.zeros(3), np.cumsum(speeds[1:], axis=0) * dt])
     pose, twist = (np.stack([np.zeros_like(part), part], axis=1) for part in (poses, speeds))
     return _told(dt, pose, twist)
+
+
+def _yielding(mobility: Array, closing: Array, e: float, friction: float, d: float) -> Array:
+    """Impulse of contacts of impedance ``d`` that ask for reflection and for no slip, in one convex problem."""
+    whole = mobility + (1.0 - d) / d / CORNERS_OF_AN_EDGE * np.eye(2)
+    return _in_cone(whole, -np.array([(1.0 + e) * closing[0], closing[1]]) / d, friction)
+
+
+def _rigid(mobility: Array, closing: Array, e: float, friction: float) -> Array | None:
+    """Impulse by Newton's and Coulomb's laws: it sticks, or slips to a side; None where they have not one answer."""
+    normal, tangent = closing
+    found = []
+    sticking = np.linalg.solve(mobility, [-(1.0 + e) * normal, -tangent])
+    if abs(sticking[1]) <= friction * sticking[0]:
+        found.append(sticking)
+    for way in (1.0, -1.0):
+        ease = mobility[0] @ (1.0, -way * friction)
+        slipping = -(1.0 + e) * normal / ease * np.array([1.0, -way * friction]) if ease > 0.0 else np.zeros(2)
+        if slipping[0] > 0.0 and way * (tangent + mobility[1] @ slipping) > 0.0:
+            found.append(slipping)
+    return found[0] if len(found) == 1 else None
 
 
 def _in_cone(whole: Array, aim: Array, friction: float) -> Array:

@@ -45,7 +45,7 @@ class MujocoEngine(Engine):
         dimensions=frozenset({3}),
         scheme=Scheme("contacts at the old pose; forces, contacts and friction in one solve; velocity; position", 1),
         customary_dt=1.0 / 500.0,
-        roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
+        roles=MappingProxyType({"default": "shipped", "tuned": "tuned", "matched": "matched"}),
         colour="#d255f8",
         abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "cylinder", "hull"}),
         quirks=(
@@ -142,7 +142,7 @@ class MujocoEngine(Engine):
         declared = {"impulse": _impulses(settings, dt)}
         if settings["integrator"] == "RK4":
             declared |= _second_order_fall()
-        if settings["solref"] != "reflect" and needs.regime == "impact":
+        if settings["solref"] != "reflect" and "rounds" not in settings and needs.regime == "impact":
             law = contact_law(settings, needs.restitution, needs.friction, dt)
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))

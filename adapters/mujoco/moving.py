@@ -59,10 +59,10 @@ def enter_motions(model, data, motions):
         data.efc_aref[row : row + len(rows)] -= data.efc_KBIP[row : row + len(rows), 1] * rows
 
 
-def script_lines(scene: Scene, dt: float) -> tuple[list[str], list[str]]:
-    """Lines that a script needs before its loop, and the lines of a step."""
+def script_lines(scene: Scene, dt: float, second_half: str) -> tuple[list[str], list[str]]:
+    """Lines that a script needs before its loop, and those of a step; ``second_half`` is a line, or empty: MuJoCo's."""
     if not moved(scene):
-        return [], ["mujoco.mj_step(model, data)"]
+        return [], ["mujoco.mj_step1(model, data)", second_half] if second_half else ["mujoco.mj_step(model, data)"]
     first = {i: face for i, (face, _) in motions(scene, dt, 0).items()}
     faces = ["# Velocities of faces that move, by the numbers of their bodies.", f"faces = {first}"]
     pairs, before, after = [], [], []
@@ -74,28 +74,29 @@ def script_lines(scene: Scene, dt: float) -> tuple[list[str], list[str]]:
     step = [*before, "mujoco.mj_step1(model, data)", f"enter_motions(model, data, {{{', '.join(pairs)}}})"]
     return (
         ["", "", *inspect.getsource(enter_motions).splitlines(), "", "", *faces],
-        [*step, "mujoco.mj_step2(model, data)", *after],
+        [*step, second_half or "mujoco.mj_step2(model, data)", *after],
     )
 
 
 class Moved:
     """Moves the faces of one model and lets its contacts know."""
 
-    def __init__(self, mujoco: Any, scene: Scene, dt: float, model: Any, data: Any) -> None:
-        self._mujoco, self._scene, self._dt, self._model, self._data = mujoco, scene, dt, model, data
+    def __init__(self, scene: Scene, dt: float, model: Any, data: Any) -> None:
+        self._scene, self._dt, self._model, self._data = scene, dt, model, data
         self.faces = {i: int(model.body(f"body{i}").mocapid[0]) for i, b in moved(scene).items() if is_moved_face(b)}
         self._geoms = {i: int(model.geom(f"geom{i}").id) for i in moved(scene)}
         self._given = motions(scene, dt, 0)
 
-    def step(self, step: int) -> None:
-        """Make step number ``step``."""
+    def enter(self, step: int) -> None:
+        """Let the contacts of step number ``step`` know how faces move; after ``mj_step1``."""
         given = motions(self._scene, self._dt, step)
-        self._mujoco.mj_step1(self._model, self._data)
         enter_motions(self._model, self._data, {self._geoms[i]: motion for i, motion in given.items()})
-        self._mujoco.mj_step2(self._model, self._data)
-        for i, row in self.faces.items():
-            self._data.mocap_pos[row] += self._dt * np.array(given[i][0])
         self._given = given
+
+    def move(self) -> None:
+        """Move the faces on at the end of a step."""
+        for i, row in self.faces.items():
+            self._data.mocap_pos[row] += self._dt * np.array(self._given[i][0])
 
     def state(self, poses: Any, twists: Any) -> None:
         """Write where the faces are and how they move over the last step (the first, before any)."""

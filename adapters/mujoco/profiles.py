@@ -2,6 +2,7 @@
 
 default   as shipped
 tuned     best stock settings for what a scene needs
+matched   Newton's and Coulomb's laws by references that a loop around the solver sets (`adapters.mujoco.matched`)
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.mujoco.matched import AGREED
 from adapters.mujoco.options import CARRIED
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
 from adapters.needs import Needs
@@ -20,6 +22,8 @@ MANUAL = f"{DOC}, modeling: solver parameters"
 FRICTION = f"{DOC}, modeling: friction, slow slippage"
 REFLECT = f"{DOC}, computation/speculative: elastic restitution"
 
+DE_SAXCE = "De Saxce and Feng, The bipotential method, 1998; adapters/mujoco/matched.py"
+NEWTON = "Newton's law of restitution; adapters/mujoco/matched.py"
 MEASURED = "measured with 4.0.1"
 CARRIES = "a load needs a spring of stiffness kappa/dt^2 to rest on"
 
@@ -29,6 +33,14 @@ RIGID = (IMPEDANCE_RANGE[1], IMPEDANCE_RANGE[1], 0.001, 0.5, 1.0)
 #: in ten steps and stays clear of the limit of 1. 0.5 rests less deep still, but a column of ten at one Newton step
 #: explodes with it (`crosscheck tune mujoco --group stand`).
 KAPPA = 0.1
+#: The same for blows whose softness a loop undoes round by round: what a contact yields then falls by 1e-2 a round, and
+#: forces, which are differences over (1 - d)/d, have 2e-14 of round-off in place of 2e-12.
+FIRM = (0.99, 0.99, 0.001, 0.5, 1.0)
+#: Tolerance of Newton's method where its answer is looked at again: a step that gains less than this share of the mean
+#: inertia's kinetic energy at 1 m/s^2 gains round-off. With 0 it goes on to its count, a hundred times as long.
+SOLVED = 1e-15
+#: Rounds that are allowed where friction needs fewer.
+FEWEST_ROUNDS = 100
 
 
 def default(needs: Needs, dt: float) -> list[Setting]:
@@ -93,13 +105,43 @@ def _resting(needs: Needs, dt: float) -> list[Setting]:
     return settings
 
 
+def matched(needs: Needs, dt: float) -> list[Setting]:
+    """Newton's restitution and Coulomb's friction by references of our own, wherever anything can touch."""
+    if needs.regime == "free":
+        return tuned(needs, dt)
+    fall, depth = needs.pull * dt, (1.0 - RIGID[0]) / KAPPA * needs.pull * dt**2
+    firm = RIGID if needs.regime == "rest" else FIRM
+    return _replaced(
+        default(needs, dt),
+        Setting("cone", "elliptic", "Coulomb's cone is round", f"{DOC}, computation"),
+        Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
+        Setting("solref", (0.0, -firm[0] / dt), "asks for velocity 0 one step later; the loop adds the rest", MANUAL),
+        Setting("solimp", firm, "what is left of the load is small, and the loop asks for it", MANUAL),
+        Setting("tolerance", SOLVED, "Newton goes on until a step gains no more than round-off", MEASURED),
+        Setting("margin", depth, "bodies that touch at a distance of exactly 0 are in contact", f"{DOC}, margin"),
+        Setting("rounds", _rounds(needs.friction), "enough for the shifts to agree without the secant", DE_SAXCE),
+        Setting("push_out", KAPPA, "share of an overlap that a step takes away", CARRIES),
+        Setting("push_out_speed", fall, "no faster than the load brings it back in a step: nothing hops", NEWTON),
+    )
+
+
+def _rounds(friction: float) -> int:
+    """Rounds after which `adapters.mujoco.matched` agrees by its contraction alone, of a ball as of a box.
+
+    The slower of two: ``mu^2 G/(1 + mu^2 G)`` a round with G = 7/2, the mobility of a ball's surface, and that of the
+    softness, 1e-4 of an inverse mass, which mass ratios of 1e4 slow down to two thirds.
+    """
+    slip = 3.5 * friction**2
+    return max(FEWEST_ROUNDS, math.ceil(math.log(AGREED) / math.log(slip / (1.0 + slip)))) if slip else FEWEST_ROUNDS
+
+
 def _replaced(settings: list[Setting], *changes: Setting) -> list[Setting]:
     """Settings with those of the same name replaced, others appended."""
     new = {setting.name: setting for setting in (*settings, *changes)}
     return list(new.values())
 
 
-PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned})
+PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned, "matched": matched})
 
 
 #: Settings whose value is one of these words.
@@ -117,9 +159,13 @@ NUMBERS = {
     "noslip_iterations": (0, True),
     "kappa_elastic": (0.0, False),
     "kappa_plastic": (0.0, False),
+    "rounds": (1, True),
+    "push_out": (0.0, False),
+    "push_out_speed": (0.0, False),
 }
 NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
 ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
+ONLY_MATCHED = frozenset({"rounds", "push_out", "push_out_speed"})
 #: Settings that only a model brings (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
 #: switched off, and pairs (indices of bodies) with a softness of their own.
 BROUGHT = frozenset({"solver", "disabled", "apart"})
@@ -135,6 +181,7 @@ def check_settings(settings: Mapping[str, Any]) -> None:
         Naming the setting.
     """
     wanted = NAMES if settings.get("solref") == "reflect" else NAMES - ONLY_REFLECT
+    wanted = wanted if ONLY_MATCHED & set(settings) else wanted - ONLY_MATCHED
     for name in sorted((set(settings) - BROUGHT) ^ wanted):
         raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
     for name, words in WORDS.items():

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from adapters.engine import EngineError
+from adapters.mujoco.matched import SECOND_HALF, loop_lines
 from adapters.mujoco.moving import is_moved_face, script_lines
 from adapters.mujoco.profiles import check_settings
 from adapters.mujoco.releases import Mjcf
@@ -20,8 +21,10 @@ def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> st
     Raises
     ------
     EngineError
-        For an external load or a course: a model has no word for them.
+        For an external load, a course or a loop around the solver: a model has no word for them.
     """
+    if "rounds" in settings:
+        raise EngineError("rounds: MJCF has no word for a loop around the solver; python has")
     for body in scene.bodies:
         if body.motion == "free" and any((*body.force, *body.torque)):
             raise EngineError(f"{body.name}.force: MJCF has no word for an external load; python has")
@@ -62,7 +65,8 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     for row, i in enumerate(moving):
         if scene.bodies[i].course is not None:
             drives.append(f"data.qvel[{6 * row} : {6 * row + 3}] = {velocity(scene.bodies[i])}")
-    before, step = script_lines(scene, dt)
+    before, step = script_lines(scene, dt, SECOND_HALF if "rounds" in settings else "")
+    before += loop_lines(scene, settings) if "rounds" in settings else []
     return text(lines + _state(scene) + before + stepped([*drives, *step]))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
 from adapters.mujoco.spec import Spec, has_joint, rotation, start
@@ -35,7 +36,8 @@ class MujocoSimulation(Simulation):
         self._moving = [i for i, body in enumerate(scene.bodies) if has_joint(body)]
         driven = [(row, scene.bodies[i]) for row, i in enumerate(self._moving)]
         self._driven = [(6 * row, body) for row, body in driven if body.course is not None]
-        self._moved = Moved(mujoco, scene, dt, self._model, self._data) if moved(scene) else None
+        self._moved = Moved(scene, dt, self._model, self._data) if moved(scene) else None
+        self._matched = Matched(mujoco, scene, settings, self._model, self._data) if "rounds" in settings else None
         self._made = 0
         self._poses = np.array([body.pose for body in scene.bodies], dtype=float)
         self._twists = np.zeros((len(scene.bodies), 6))
@@ -60,7 +62,7 @@ class MujocoSimulation(Simulation):
         EngineError
             If MuJoCo dropped contacts for want of memory.
         """
-        if self._driven or self._moved:
+        if self._driven or self._moved or self._matched:
             for _ in range(steps):
                 self._drive()
         else:
@@ -72,13 +74,22 @@ class MujocoSimulation(Simulation):
                 raise EngineError("memory: MuJoCo's arena is too small, it dropped contacts")
 
     def _drive(self) -> None:
-        """Make a step in which bodies move by a course, faces move or surfaces run."""
+        """Make a step in which bodies move by a course, faces move, surfaces run or references are matched."""
         for row, body in self._driven:
             self._data.qvel[row : row + 3] = velocity_over(body, self._dt, self._made)
-        if self._moved:
-            self._moved.step(self._made)
+        mj, model, data = self._mujoco, self._model, self._data
+        if self._moved or self._matched:
+            mj.mj_step1(model, data)
+            if self._moved:
+                self._moved.enter(self._made)
+            if self._matched:
+                self._matched.step2()
+            else:
+                mj.mj_step2(model, data)
+            if self._moved:
+                self._moved.move()
         else:
-            self._mujoco.mj_step(self._model, self._data)
+            mj.mj_step(model, data)
         self._made += 1
 
     def pose(self) -> Array:
@@ -167,4 +178,5 @@ class MujocoSimulation(Simulation):
         mj.mj_mulM(model, data, inertial, data.qacc)
         residual = np.abs(inertial - data.qfrc_smooth - data.qfrc_constraint).max()
         warnings = {mj.mju_warningText(k, 0): int(w.number) for k, w in enumerate(data.warning) if w.number}
-        return {"residual": float(residual), "newton_steps": data.solver_niter.tolist(), "warnings": warnings}
+        found = {"residual": float(residual), "newton_steps": data.solver_niter.tolist(), "warnings": warnings}
+        return found | (self._matched.told() if self._matched else {})

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from adapters.registry import profile_of
+from adapters.registry import is_ranked, profile_of
 from reports.cures import ROLES, Change, changes, how_measured, pasteable
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
@@ -112,7 +112,7 @@ def _choice(
     costs: Mapping[tuple[Any, ...], Cost],
 ) -> Choice | None:
     candidates: list[Candidate] = []
-    for column in source.columns:
+    for column in (column for column in source.columns if is_ranked(*column)):
         steps = {key[4]: rows for key, rows in grouped.items() if key[:4] == (*line, *column)}
         if steps:
             candidates.append(_candidate(line, column, steps, costs))

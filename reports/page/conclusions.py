@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from adapters.registry import is_ranked
 from reports.answers import answers as answers_of
 from reports.page.source import Source
 from reports.page.verdicts import (
@@ -38,7 +39,7 @@ def joined(words: Iterable[str], last: str = "and") -> str:
 def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
     """Engine -> its profiles that pass every judged row of ``scene``, in every dimension the engine has."""
     found: dict[str, list[str]] = {}
-    for engine, profile in source.columns:
+    for engine, profile in (column for column in source.columns if is_ranked(*column)):
         rows = [r for r in source.of(scene=scene, engine=engine, profile=profile) if r["outcome"] != "unsupported"]
         judged = [row for row in rows if row["physics"] or row["outcome"] != "ok"]
         if judged and all(mark_of(row) == "pass" for row in judged):

@@ -14,7 +14,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from adapters.registry import profile_of
+from adapters.registry import is_ranked, profile_of
 from reports.page.charts import dodged, named, styled, svg
 from reports.page.figures import Figure
 from reports.page.source import Plain, Source
@@ -193,7 +193,8 @@ def _answers(rebounds: Sequence[Plain]) -> list[str]:
         shipped, asked = values.get(profile_of(engine, "shipped") or ""), own[0]["asked"]
         if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
             continue
-        better = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}
+        nearer = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}
+        better = {p: v for p, v in nearer.items() if is_ranked(engine, p)}
         best = min(better, key=lambda p: abs(better[p] - asked), default=None)
         cure = "" if best is None else f"; profile {best} gives {number(better[best], 4)}"
         said.append(f"{engine} as shipped rebounds with {number(shipped, 3)} where {asked:g} is asked{cure}.")

@@ -28,7 +28,7 @@ FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 FLAT = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
 CUBE = (1.0 / 6.0,) * 3
 BALL = (0.1,) * 3
-PROFILES = ("default", "tuned")
+PROFILES = ("default", "tuned", "matched")
 DT = 1.0 / 240.0
 G = 9.81
 #: A thousand roundings of 2.2e-16, and a factor of five for their order.

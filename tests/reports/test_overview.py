@@ -70,8 +70,10 @@ def test_the_matrix_of_the_whole_catalogue_stands_in_the_first_thirty_lines_and_
     )
     assert f"e {overview.share(5, 10 * len(scenes))}" in line
     assert re.search(r"stacks and statics +reference/reference, chipmunk/default, ", rest)
-    assert "mujoco/default bounce: rebounds" in rest and "matched or tuned" not in rest
-    assert re.search(r"mujoco/default bounce: [^;]*; tuned or matched cures it", rest)
+    assert re.search(r"mujoco/default bounce: rebounds [^;]*; tuned cures it", rest)
+    # What is matched is shown with what it is, and recommended nowhere.
+    assert "mujoco/matched: the textbook's law in the place of the engine's own" in rest
+    assert not re.search(r"mujoco/matched[ ,(]|matched cures|matched is nearer", rest)
     assert "crosscheck show --all" in rest
 
 

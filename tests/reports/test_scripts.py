@@ -98,6 +98,12 @@ def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
 
+@pytest.mark.parametrize(("scene", "params"), [("oblique", {"e": 0.5}), ("pinch", {}), ("tumble", {})])
+def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, tmp_path):
+    pytest.importorskip("mujoco")
+    assert_same_bits(slot_of("mujoco", scene, params, "matched", 3), tmp_path)
+
+
 @pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco", "reference"])
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
 def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
@@ -145,9 +151,11 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 
 @pytest.mark.parametrize(("engine", "runs", "shaken"), [
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
-    ("mujoco", False, True), ("reference", True, False),
+    ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
+    ("reference", True, False),
 ])  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
+    engine, _, profile = engine.partition(" ")
     found = registry.find(engine).engine
     if found is None:
         pytest.skip(f"{engine} is not installed")
@@ -156,7 +164,7 @@ def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     path, course = tmp_path / "driven.toml", COURSE if shaken else ""
     moved = ("fixed", 1.0, "") if runs else ("prescribed", 0.0, COURSE)
     path.write_text(DRIVEN % (*moved, course))
-    slot = slot_of(engine, pinned(str(path)), {}, found.facts.profile("textbook") or "tuned", 2)
+    slot = slot_of(engine, pinned(str(path)), {}, profile or found.facts.profile("textbook") or "tuned", 2)
     allowed = ("reference_solver",) if engine == registry.solver() else ()
     pose, twist = printed(slot, tmp_path, allowed)
     expected = ended(slot)
@@ -243,6 +251,8 @@ def test_mjcf_says_what_it_has_no_word_for(tmp_path):
     path.write_text(LOADED.format(**SPATIAL))
     done = CliRunner().invoke(main, ["export", str(path), "--engine", "mujoco", "--to", "mjcf"])
     assert done.exit_code == 2 and "box.force: MJCF has no word" in done.output
+    done = CliRunner().invoke(main, ["export", "slide", "--engine", "mujoco", "--profile", "matched", "--to", "mjcf"])
+    assert done.exit_code == 2 and "rounds: MJCF has no word for a loop around the solver" in done.output
 
 
 def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):

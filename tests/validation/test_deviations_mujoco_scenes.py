@@ -44,6 +44,9 @@ CELLS = [
     ("kane", {}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
     ("kane", {"e": 0.5, "mu": 0.1}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
     ("kane", {"along": -0.727, "mu": 0.1}, "tuned", 2, {"rise", "ahead", "spin", "gain"}),
+    ("kane", {}, "matched", 2, {"rise", "ahead", "spin", "gain"}),
+    ("kane", {"e": 0.5, "mu": 0.1}, "matched", 2, {"rise", "ahead", "spin", "gain"}),
+    ("kane", {"along": -0.727, "mu": 0.1}, "matched", 2, {"rise", "ahead", "spin", "gain"}),
 ]
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from adapters.registry import find
+from adapters.registry import find, is_ranked
 from validation.bench.reading import POINT
 from validation.bench.units import Unit, iteration_units, overhead_units, size_units, work_unit
 from validation.bench.work import accuracy
@@ -91,7 +91,12 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
                 found.update(dict.fromkeys(slots(wanted)))
                 for count in sweep.counts(scene):
                     found.update(dict.fromkeys(slots(replace(wanted, iterations=[count]))))
-    return list(found)
+    return [slot for slot in found if _is_benched(sweep.request, slot.engine, slot.profile)]
+
+
+def _is_benched(request: Request, engine: str, profile: str) -> bool:
+    """Whether a profile is run for its error and timed: one without a rank only where it is named."""
+    return profile in request.profiles or (not request.profiles and is_ranked(engine, profile))
 
 
 def answered(store: Store, slots: Sequence[Slot]) -> tuple[str, list[Observation]]:
@@ -121,7 +126,7 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
         (name, profile)
         for name in request.engines
         for profile in (getattr(find(name).engine, "profiles", None) or ())
-        if not request.profiles or profile in request.profiles
+        if _is_benched(request, name, profile)
     ]
     dimensions = tuple(request.dimensions) or (2, 3)
     units += overhead_units(engines, dimensions)

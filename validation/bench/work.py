@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from adapters.registry import is_ranked
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot
@@ -111,12 +112,13 @@ def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:
 
 
 def with_fronts(points: pd.DataFrame) -> pd.DataFrame:
-    """Mark the lower envelopes: of each series, and over all engines of a scene."""
+    """Mark the lower envelopes: of each series, and over all engines of a scene, of profiles that have a rank."""
     points = points.copy()
     for column, names in (("on_front", SERIES), ("best", SERIES[:2])):
         points[column] = False
-        if len(points):
-            for _, group in points.groupby(names, sort=False):
+        known = points if column == "on_front" else points[_has_rank(points)]
+        if len(known):
+            for _, group in known.groupby(names, sort=False):
                 points.loc[group.index, column] = lower_envelope(group["cost"], group["error"])
     return points
 
@@ -173,9 +175,16 @@ def _no_point(group: pd.DataFrame) -> str:
     return reasons[0] if reasons else "not timed"
 
 
+def _has_rank(table: pd.DataFrame) -> pd.Series:
+    """Which rows are of profiles that have a rank."""
+    known = [is_ranked(engine, profile) for engine, profile in zip(table["engine"], table["profile"], strict=True)]
+    return pd.Series(known, index=table.index, dtype=bool)
+
+
 def _ranked(table: pd.DataFrame, column: str, factor: str) -> pd.DataFrame:
     if len(table):
-        grouped = table.groupby(["scene", "dimension", "level"])[column]
+        names = [table[name] for name in ("scene", "dimension", "level")]
+        grouped = table[column].where(_has_rank(table)).groupby(names)
         table["rank"] = grouped.rank(method="min")
         table["tied"] = _tied(table, column)
         best = grouped.transform("min")
@@ -198,7 +207,7 @@ def _tied(table: pd.DataFrame, column: str) -> pd.Series:
     for _, group in table.groupby(["scene", "dimension", "level"]):
         best = group[group["rank"] == 1]
         if len(best):
-            tied.loc[group.index] = group["cost_low"] <= best["cost_high"].max()
+            tied.loc[group.index] = (group["cost_low"] <= best["cost_high"].max()) & group["rank"].notna()
     return tied
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from adapters.engine import NOT_KNOWN, Engine, EngineError
 from adapters.needs import needs
-from adapters.registry import facts, find
+from adapters.registry import facts, find, is_ranked
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size
@@ -93,6 +93,8 @@ def _engine_slots(
         for variation in _variations(request, canonical):
             if not variation.runs_in(dimension):
                 continue
+            if not _is_asked(request, canonical, variation, name, profile):
+                continue
             params = canonical.minimal(variation.params)
             brought = canonical.brought(name, profile)
             scene = canonical.scene(dimension, variation.params)
@@ -106,6 +108,13 @@ def _engine_slots(
                         continue
                     for ulp in (*request.ulps, *_moves(request, canonical, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp)
+
+
+def _is_asked(request: Request, canonical: CanonicalScene, variation: Variation, engine: str, profile: str) -> bool:
+    """Whether a suite asks a profile this cell: the quick one asks those without a rank what stands for a scene."""
+    if request.suite != "quick" or request.params or profile in request.profiles or is_ranked(engine, profile):
+        return True
+    return canonical.stands_for_it(variation.params)
 
 
 def _one_profile(name: str) -> str:

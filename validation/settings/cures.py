@@ -19,14 +19,14 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adapters.engine_folder import CURES, belongs_of, candidates_of, inside
-from adapters.registry import find, load, profile_of
+from adapters.registry import find, is_ranked, load, profile_of
 from adapters.stepping import step_count
 from validation.bench.lane import Lane
 from validation.bench.units import Unit
@@ -222,7 +222,7 @@ def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Uns
 
 def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tuple[_Found | None, list[_Found]]:
     """The best change, and all single settings that are no worse than it."""
-    others = [name for name in load(engine).profiles if name != own[0].profile]
+    others = [name for name in load(engine).profiles if name != own[0].profile and is_ranked(engine, name)]
     wholes = {name: [changes_of(slot, name) for slot in own] for name in others}
     singles = _singles(engine, own, list(wholes.values()))
     found = _useful(trials.all(singles), failing)
@@ -304,7 +304,7 @@ def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> R
 
 def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
     """Profile that has all settings of a cure."""
-    for name in load(engine).profiles if best else ():
+    for name in filter(partial(is_ranked, engine), load(engine).profiles) if best else ():
         wanted = [changes_of(slot, name) for slot in slots]
         if best and all(each.items() <= w.items() for each, w in zip(best.changes, wanted, strict=True)):
             return name

@@ -1,0 +1,157 @@
+"""Newton's restitution and Coulomb's friction exactly, made of MuJoCo's own solver: the loop of profile ``matched``.
+
+MuJoCo's contacts are one convex problem: their forces lie in the cones of friction, the accelerations ``J a - aref`` in
+the dual cones, and each contact yields by its regulariser R. Newton's and Coulomb's laws ask for something else, which
+a shift of the references ``aref`` between MuJoCo's own calls reaches:
+
+    normal      no rebound below a speed; above it the velocity -e v is asked for, one step later
+    slip        ``aref_n`` is lowered by mu |slip|/dt, so that what the dual cone lifts, it lifts to nothing (De Saxce)
+    softness    ``aref`` is raised by R f, so that what a contact yields to its own force, it is asked for beforehand
+
+The last two depend on the answer: a round solves, looks at slips and forces, and solves again. Of one contact the first
+error falls by ``mu^2 G/(1 + mu^2 G)`` a round, G being its mobility along the face over that across it (1 of a box that
+only slides, 7/2 of a ball), the second by ``R/(G + R)``, 1e-4; a secant along the last change (Anderson's mixing of
+depth one) makes five rounds of dozens. Rounds end when all shifts agree with what they gave to `AGREED`.
+
+Sources: De Saxce and Feng, "The bipotential method" (1998), the shift; Hestenes and Powell (1969), the method of
+multipliers, the softness; Anderson (1965), the secant; MuJoCo documentation, computation: constraint model.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from adapters.scene import Scene
+from adapters.script import literal
+
+#: How well shifts agree in the end, as a share of the largest acceleration that contacts have to make: some thousand
+#: roundings, which forces of contacts 1e4 times stiffer than their bodies cost.
+AGREED = 1e-13
+#: The share that may be missed in the end.
+SETTLED = 1e-3
+
+
+def matched_step2(mujoco, model, data, restitution, law):
+    """Make the second half of a step, after ``mj_step1``, with Newton's and Coulomb's laws.
+
+    Parameters
+    ----------
+    restitution
+        Of two geoms by their numbers, the smaller first; 0 where it is not stated.
+    law
+        The part of an overlap that a step takes away, and the fastest that it does so [m/s]; most rounds; the share of
+        the largest acceleration at which they end.
+
+    Returns
+    -------
+    made, apart
+        Rounds, and how far from each other shifts and what they gave are in the last, as such a share.
+    """
+    share, fastest, rounds, agreed = law
+    contacts, dt = data.contact, model.opt.timestep
+    touching = np.array(contacts.efc_address) >= 0
+    normal = contacts.efc_address[touching]
+    if not len(normal):
+        mujoco.mj_step2(model, data)
+        return 0, 0.0
+    # A contact without friction has one row: it is given its own for both tangents, and mu = 0.
+    rough = contacts.dim[touching] > 1
+    mu = np.where(rough, contacts.friction[touching, 0], 0.0)
+    first, second = normal + rough, normal + 2 * rough
+    pairs = np.sort(contacts.geom[touching], axis=1).tolist()
+    e = np.array([restitution.get((a, b), 0.0) for a, b in pairs])
+    # As compiled, references ask for the velocity 0 one step later: -v/dt.
+    asked = data.efc_aref.copy()
+    approach = asked[normal] * dt
+    out = np.minimum(-share * contacts.dist[touching] / dt, fastest)
+    asked[normal] += np.where((approach > 0.0) & (e > 0.0), np.maximum(e * approach, out), out) / dt
+    mujoco.mj_fwdActuation(model, data)
+    mujoco.mj_fwdAcceleration(model, data)
+    missed, shift, last = np.empty(data.nefc), np.zeros(data.nefc), None
+    mujoco.mj_mulJacVec(model, data, missed, data.qacc_smooth)
+    largest = np.abs(missed - asked).max() or 1.0
+    made = 0
+    while made < rounds:
+        made += 1
+        data.efc_aref[:] = asked + shift
+        mujoco.mj_fwdConstraint(model, data)
+        mujoco.mj_mulJacVec(model, data, missed, data.qacc)
+        missed -= asked
+        given = data.efc_R * data.efc_force
+        given[normal] -= mu * np.hypot(missed[first], missed[second])
+        change = given - shift
+        apart = float(np.abs(change).max() / largest)
+        if not apart > agreed:
+            break
+        shift = given
+        if last is not None:
+            bend = change - last[1]
+            if np.abs(bend).max() <= agreed * largest:
+                break
+            along = change @ bend / max(bend @ bend, 1e-300)
+            if abs(along) < 100.0:
+                shift = given - along * (given - last[0])
+        last = given, change
+    mujoco.mj_checkAcc(model, data)
+    mujoco.mj_Euler(model, data)
+    return made, apart
+
+
+def by_geoms(model, rebounding):
+    """Restitution by the numbers of two geoms, the smaller first, of rows of two bodies by theirs and restitution."""
+    geom = {body: int(model.geom(f"geom{body}").id) for row in rebounding for body in row[:2]}
+    return {tuple(sorted((geom[a], geom[b]))): e for a, b, e in rebounding}
+
+
+def rebounding(scene: Scene) -> list[tuple[int, int, float]]:
+    """Pairs of bodies that have a restitution, and which."""
+    return [(a, b, material.restitution) for a, b, material in scene.contact_pairs() if material.restitution > 0.0]
+
+
+def law_of(settings: Mapping[str, Any]) -> tuple[float, float, int, float]:
+    """What `matched_step2` is handed as law."""
+    return float(settings["push_out"]), float(settings["push_out_speed"]), int(settings["rounds"]), AGREED
+
+
+#: Line of a script that makes the second half of a step.
+SECOND_HALF = "matched_step2(mujoco, model, data, RESTITUTION, LAW)"
+
+
+def loop_lines(scene: Scene, settings: Mapping[str, Any]) -> list[str]:
+    """Lines that a script needs before its loop: the functions above and what they are handed."""
+    functions = ["", "", *inspect.getsource(by_geoms).splitlines(), "", ""]
+    functions += [*inspect.getsource(matched_step2).splitlines(), "", ""]
+    return [
+        *functions,
+        f"RESTITUTION = by_geoms(model, {rebounding(scene)})",
+        "# Part of an overlap taken away in a step, most speed of that, most rounds, and where they end.",
+        f"LAW = {literal(law_of(settings))}",
+    ]
+
+
+class Matched:
+    """Makes the second halves of one model's steps and remembers how they ended."""
+
+    def __init__(self, mujoco: Any, scene: Scene, settings: Mapping[str, Any], model: Any, data: Any) -> None:
+        self._mujoco, self._model, self._data = mujoco, model, data
+        self._restitution, self._law = by_geoms(model, rebounding(scene)), law_of(settings)
+        self.most, self.apart, self.unsolved = 0, 0.0, 0
+
+    def step2(self) -> None:
+        """Make the second half of a step."""
+        made, apart = matched_step2(self._mujoco, self._model, self._data, self._restitution, self._law)
+        self.most, self.apart = max(self.most, made), max(self.apart, apart)
+        self.unsolved += not apart <= SETTLED
+
+    def told(self) -> dict[str, Any]:
+        """How the rounds ended; a run with a step in which they do not agree is none of this profile's answers."""
+        found: dict[str, Any] = {"rounds": self.most, "shifts_apart": self.apart}
+        if self.unsolved:
+            steps = "step" if self.unsolved == 1 else "steps"
+            reason = f"in {self.unsolved} {steps} the shifts of references do not settle: {self.apart:.2g} apart"
+            found |= {"certified": False, "reasons": [reason]}
+        return found
