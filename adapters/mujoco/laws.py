@@ -6,6 +6,7 @@ from adapters.law import AskedLaw, Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.convex_blows import convex_blow_law, matched_blow_law
+from adapters.mujoco.leaning import leaning_law
 from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_asked, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
@@ -37,6 +38,11 @@ _BECAUSE = {
     ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
     ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
     "corners, a blow is off by 1e-4 of it",
+    (
+        "tuned",
+        "edges",
+    ): "contact is a spring: a block that stands on its edge gives by a hair, and once its weight is past "
+    "the edge it tips as a rigid one does",
     ("tuned", "shared"): "impedance ends at 0.9999: each rebound is short of 1e-4 of it",
     (
         "tuned",
@@ -61,6 +67,11 @@ _BLOWS = (
     ("tuned", "flat_box", ("rebound_ratio", "impulse")),
     ("tuned", "edge_drop", ("rise", "spin", "impulse")),
     ("tuned", "off_centre", ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost")),
+)
+#: What a stack of leaning blocks shows; of how many blocks, its scene says.
+_EDGES = (
+    *("stands", "settle_time", "drift", "penetration", "kinetic_energy", "impulse_scatter"),
+    *(f"interface_impulse[{k}]" for k in range(1, 21)),
 )
 _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver parameters, slow slippage"
 
@@ -95,6 +106,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         for profile, scene, metrics in _BLOWS
         for metric in metrics
     ),
+    *(_deviation("tuned", "overhang", metric, leaning_law("tuned", metric), "edges") for metric in _EDGES),
     _deviation("tuned", "rack", "energy_defect", convex_blow_law("tuned", "energy_defect"), "shared"),
     *(
         _deviation("tuned", "kane", metric, convex_blow_law("tuned", metric), "rubbed")
