@@ -17,14 +17,17 @@ gap, and keep their normals.
 Nothing here is Newton's own code: it is what its formulas make of a scene, in doubles and in singles. The steps are
 compiled loops (`recurrence`).
 
-A law predicts what doubles make of the scene. Its band is about roundings, which are drawn. What rests or slides moves
-by a fixed way a step, which is rounded at the place where it is: the same fraction of a last digit is lost in each
-step, and a depth of 0.1 mm has three digits. Doubles and singles therefore make steps that are longer by some ten-
-thousandths, in which another fraction is lost, and what singles miss of doubles at one length is a draw. The engine
-does the same operations in an order of its own, which is one more draw of the same kind. Its distance in units of the
-root mean square of n draws is a Student's t of n degrees of freedom, if draws are normal. The last operation of a step
-is no such sum: what it leaves of a number is a unit in the last place, or none. Of each number of a draw one is added
-or taken, or neither, by chance.
+A law predicts what doubles make of the scene and what roundings add to it in the mean. Its band is about roundings,
+which are drawn. What rests or slides moves by a fixed way a step, which is rounded at the place where it is: the same
+fraction of a last digit is lost in each step, and a depth of 0.1 mm has three digits. Doubles and singles therefore
+make steps that are longer by some ten-thousandths, in which another fraction is lost, and what singles miss of doubles
+at one length is a draw. The engine does the same operations in an order of its own, which is one more draw of the same
+kind. The mean of draws is not nothing where roundings keep a motion going: a column that comes to rest in doubles
+trembles in singles, in every draw, and its loads are off to the same side. The distance of one more draw from the mean
+of n, over their standard deviation and the root of 1 + 1/n, is a Student's t of n - 1 degrees of freedom, if draws are
+normal. A number that is counted, in steps or samples, may be off by one in all of a few draws and not in the next: a
+band is never less than their mean. The last operation of a step is no such sum: what it leaves of a number is a unit in
+the last place, or none. Of each number of a draw one is added or taken, or neither, by chance.
 
 What the engine's own order of operations makes of a place is beyond draws where it is the same in every step. The band
 has a bound of that beside them: what doubles miss if both points of each contact are seen apart by a share of their
@@ -38,7 +41,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,30 +51,22 @@ from adapters.means import means
 from adapters.needs import needs
 from adapters.newton.column import column_moved, column_of
 from adapters.newton.profiles import PROFILES
-from adapters.newton.shipped import LEAST_APPROACH, STOPPED
+from adapters.newton.roundings import LIMITS, ROUNDINGS, Roundings, roundings_of
+from adapters.newton.shipped import INNER, LEAST_APPROACH, STOPPED
 from adapters.newton.telling import told_contacts, told_trajectory
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.single_precision import UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import Measured, Trajectory
 
-#: Sweeps over the contacts of one pair in each sweep over rebounds. [_restitution_manifold_inner_iterations]
-INNER = 8
-#: Draws of roundings, and the band in units of their root mean square: Student's t of 8 degrees of freedom is beyond
-#: 7.12 once in 10 000 times, on either side.
-DRAWS, QUANTILE = 8, 7.12
+#: Draws of roundings, and the band in units of their standard deviation: Student's t of 7 degrees of freedom is beyond
+#: 7.88 once in 10 000 times, on either side; an eighth of the variance more for the mean, which is drawn as well.
+DRAWS, QUANTILE = 8, 7.88
 #: Share by which the steps of one draw are longer than those of the next: a way of 0.2 mm a step (g dt^2 at 1/240 s) at
 #: a place of half a metre loses another fraction of 2^-24 m, by the golden ratio, which fills the unit evenly.
 LONGER = 1.618e-4
-#: Roundings of the place where two points touch, of which one tells depth and slip: each is taken from the world to a
-#: body's axes (taken away, turned about two axes) and back (turned, added), and may be half a unit off each time. At a
-#: place that does not change they are off the same way in every step, which no draw shows.
-ROUNDINGS = 12.0
-#: Round-off of a single number, as a share of it.
-UNIT = 2.0**-24
 #: Share of a value beyond which a band says nothing about it.
 VAGUE = 0.02
-#: Most that roundings make of a number that would be nothing: ten of 2^-24 in each of a thousand steps, to one side.
-ROUNDED_OFF = 1e4 * UNIT
 #: Most bodies that are followed.
 MOST_BODIES = 12
 
@@ -272,9 +267,7 @@ def moved(
     ``iterations``: sweeps that are asked for, in place of the profile's.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
-    chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-    if iterations is not None:
-        chosen["iterations"] = iterations
+    chosen = settings_of(scene, dt, profile, iterations)
     if followed(spatial):
         return _moved(scene, dt, chosen, single, longer, blur)
     column = column_of(spatial)
@@ -282,6 +275,12 @@ def moved(
         return None
     steps, flat = step_count(scene.duration, dt), scene.dimension == 2
     return column_moved(spatial, column, steps, dt, longer, chosen, single, blur, flat)
+
+
+def settings_of(scene: Scene, dt: float, profile: str, iterations: int | None) -> dict[str, Any]:
+    """What a profile sets, with the sweeps that are asked for."""
+    chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+    return chosen if iterations is None else chosen | {"iterations": iterations}
 
 
 class _Asked:
@@ -297,13 +296,19 @@ class _Asked:
         return hash(self.told)
 
 
+class _Said(NamedTuple):
+    """Of each metric its value and the band that roundings ask for, and how many roundings there are."""
+
+    table: Mapping[str, tuple[float, float]]
+    counted: Roundings | None
+
+
 @lru_cache(maxsize=4096)  # tables of some twenty numbers: more cells than any suite asks of one engine
-def _readings(
-    asked: _Asked, dt: float, profile: str, iterations: int | None = None
-) -> Mapping[str, tuple[float, float]]:
-    """What doubles make of each metric, and the band that roundings ask for."""
+def _readings(asked: _Asked, dt: float, profile: str, iterations: int | None = None) -> _Said:
+    """What the recurrence makes of each metric of a scene."""
     scene = asked.scene
     values: Mapping[str, Measured] = {}
+    counted: Roundings | None = None
     missed: dict[str, list[float]] = {}
     chance = np.random.default_rng(0)
     for draw in range(DRAWS):
@@ -311,13 +316,17 @@ def _readings(
             moved(scene, dt, profile, single, draw * LONGER, iterations=iterations) for single in (False, True)
         )
         if exact is None or rounded is None:
-            return {}
+            return _Said({}, None)
+        if not draw:
+            spatial = scene if scene.dimension == 3 else lift(scene)
+            counted = roundings_of(spatial, exact, dt, settings_of(scene, dt, profile, iterations))
         found, other = asked.measure(scene, exact), asked.measure(scene, _told_otherwise(rounded, scene, chance))
         values = values or found
         for metric, (value, _) in found.items():
             told = other[metric][0]
-            missed.setdefault(metric, []).append(math.inf if value is None or told is None else abs(value - told))
-    bands = {metric: QUANTILE * math.sqrt(sum(miss * miss for miss in each) / DRAWS) for metric, each in missed.items()}
+            missed.setdefault(metric, []).append(math.inf if value is None or told is None else told - value)
+    mean = {metric: float(np.mean(each)) for metric, each in missed.items()}
+    bands = {metric: _band(each) for metric, each in missed.items()}
     share = ROUNDINGS * UNIT
     for blur in ((share, 0.0, 0.0), (0.0, share, 0.0), (0.0, 0.0, share)):
         blurred = moved(scene, dt, profile, blur=blur, iterations=iterations)
@@ -325,7 +334,18 @@ def _readings(
         for metric, (value, _) in values.items():
             told = found[metric][0] if metric in found else None
             bands[metric] += math.inf if value is None or told is None else abs(value - told)
-    return {metric: (value, bands[metric]) for metric, (value, _) in values.items() if value is not None}
+    table = {
+        metric: (value + mean[metric], bands[metric]) for metric, (value, _) in values.items() if value is not None
+    }
+    return _Said(table, counted)
+
+
+def _band(missed: list[float]) -> float:
+    """Band about the mean of draws: of one more of them, and of a unit that is counted."""
+    if not np.isfinite(missed).all():
+        return math.inf
+    scatter = float(np.std(missed, ddof=1)) * math.sqrt(1.0 + 1.0 / len(missed))
+    return max(QUANTILE * scatter, abs(float(np.mean(missed))))
 
 
 def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generator) -> Trajectory:
@@ -345,31 +365,31 @@ def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generato
 
 
 def _predicted(
-    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None, least: float
+    scene: Scene, dt: float, measure: Measure, metric: str, profile: str, iterations: int | None, balance: bool
 ) -> Prediction | None:
-    value, band = _readings(_Asked(scene, measure), dt, profile, iterations).get(metric, (0.0, math.inf))
+    table, counted = _readings(_Asked(scene, measure), dt, profile, iterations)
+    value, band = table.get(metric, (0.0, math.inf))
     band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
-    return (value, band) if 0.0 < band <= max(VAGUE * abs(value), least) else None
+    most = max(VAGUE * abs(value), LIMITS[metric](counted) if balance and counted else 0.0)
+    return (value, band) if 0.0 < band <= most else None
 
 
 def motion_law(metric: str, profile: str, balance: bool = False) -> Law:
     """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference.
 
-    ``balance``: it is the difference of numbers of order 1 that would be the same, so that all of it may be round-off.
+    ``balance``: all of it may be round-off, as much as `roundings` counts.
     """
-    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, None, least)
+        return _predicted(scene, dt, measure, metric, profile, None, balance)
 
     return law
 
 
 def swept_law(metric: str, profile: str, balance: bool = False) -> AskedLaw:
     """As `motion_law`, at another number of sweeps."""
-    least = ROUNDED_OFF if balance else 0.0
 
     def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
-        return _predicted(scene, dt, measure, metric, profile, iterations, least)
+        return _predicted(scene, dt, measure, metric, profile, iterations, balance)
 
     return law

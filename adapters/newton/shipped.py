@@ -4,6 +4,8 @@ from __future__ import annotations
 
 #: Sweeps over positions, and over rebounds. [`SolverXPBD`, iterations, rigid_contact_restitution_iterations]
 ITERATIONS, REBOUND_ITERATIONS = 2, 2
+#: Sweeps over the contacts of one pair in each sweep over rebounds. [_restitution_manifold_inner_iterations]
+INNER = 8
 #: Share of an overlap that a sweep takes back. [`SolverXPBD`, rigid_contact_relaxation]
 RELAXATION = 0.8
 #: Friction about the normal and against rolling [m]. [`ModelBuilder.ShapeConfig`, mu_torsional, mu_rolling]
