@@ -25,7 +25,7 @@ from adapters.needs import Needs
 from adapters.reference.profiles import PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
-from adapters.reference.start import overlap_at_the_start
+from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
 
 #: Steps cut at events, with constant accelerations between them.
@@ -82,7 +82,7 @@ class ReferenceEngine(Engine):
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Whatever the solver's own validation says about the model.
 
-        And bodies that overlap or jam at the start, where a profile promises a solution.
+        And bodies that overlap, or lie too far away, at the start, where a profile promises a solution.
         """
         try:
             solver_model(scene)
@@ -90,7 +90,7 @@ class ReferenceEngine(Engine):
             return str(error).splitlines()[0]
         if self.facts.roles[profile] != "solution":
             return None
-        return overlap_at_the_start(scene)
+        return overlap_at_the_start(scene) or too_far_at_the_start(scene)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.

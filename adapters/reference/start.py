@@ -1,4 +1,4 @@
-"""What a scene must not ask of a profile that promises a solution: bodies that share space, or jam, at the start."""
+"""What a scene must not ask of a profile that promises a solution: bodies that share space, or lie too far away."""
 
 from __future__ import annotations
 
@@ -8,6 +8,28 @@ import numpy as np
 
 from adapters.scene import HalfSpace, Scene
 from adapters.shapes import reach
+
+
+def too_far_at_the_start(scene: Scene) -> str | None:
+    """Say which body lies where numbers are too coarse for its size; None if there is none.
+
+    A place of 1e8 m is told in steps of 1.5e-8 m: a gap, an arm or a depth is known no better there. The certificate
+    has a limit for it, a share of the smallest half width; it is asked here, before a run that could only be INVALID.
+    """
+    from reference_solver.certificate import GATES
+
+    limit = next(gate.limit for gate in GATES if gate.name == "resolution")
+    for body in scene.bodies:
+        if isinstance(body.shape, HalfSpace):
+            continue
+        place = max(abs(x) for x in body.pose[: scene.dimension])
+        last = float(np.finfo(float).eps) * place
+        if last > limit * 0.5 * body.shape.smallest_size:
+            return (
+                f"{body.name} lies {place:.3g} m away, where numbers have steps of {last:.2g} m: "
+                "too coarse for its size to certify a solution"
+            )
+    return None
 
 
 def overlap_at_the_start(scene: Scene) -> str | None:

@@ -228,7 +228,8 @@ def _listed(source: Source, engine: str) -> list[Listed]:
         count = sum(family.reason in text for text in rows)
         found.append(Listed(family.id, family.reason, f"{family.source} (releases {family.releases})", where, count))
     for entry in findings.unsupported:
-        where = f"{entry.scene} {f'{entry.dimension}-D' if entry.dimension else ''}".strip()
+        asked = (f"{name}={value:g}" for name, value in entry.params)
+        where = " ".join((entry.scene, *([f"{entry.dimension}-D"] if entry.dimension else []), *asked))
         count = sum(1 for row in source.of(engine=engine, outcome="unsupported") if _is_about(row, entry))
         found.append(Listed(entry.id, entry.reason, entry.source, where, count))
     return found

@@ -231,3 +231,18 @@ def test_nothing_that_is_a_scene_is_refused() -> None:
     for dimension in (2, 3):
         scene = make(floor(dimension), body("ball", dimension, (0.0, 1.0)), e=1.0, mu=2.0)
         assert all(ENGINE.refuses(scene, profile) is None for profile in PROFILES)
+
+
+@both
+def test_what_lies_too_far_to_be_certified_is_refused_before_it_runs_and_nothing_else(dimension: int) -> None:
+    """The certificate of a run says the same: on either side of the limit of one step of numbers in half widths."""
+    limit = 1e-8 * 0.5 / float(np.finfo(float).eps)
+    refusal = None
+    for share in (0.9, 1.1):
+        scene = make(floor(dimension), body("ball", dimension, (share * limit, 1.0)), T=0.01)
+        refusal = ENGINE.refuses(scene, "reference")
+        assert ENGINE.refuses(scene, "classical") is None
+        found = drive(scene, "reference").certificate
+        assert found["resolution"] == pytest.approx(share * 1e-8, rel=1e-12)
+        assert (refusal is not None) == (share > 1.0) == ("coordinates too large" in " ".join(found["reasons"]))
+    assert refusal is not None and refusal.startswith(f"ball lies {1.1 * limit:.3g} m away")

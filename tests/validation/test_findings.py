@@ -222,6 +222,8 @@ MORE_UNSUPPORTED = UNSUPPORTED.replace('id = "planar"', 'id = "again"')
         (UNSUPPORTED.replace("3", "1"), HEAD,
          "{families}: unsupported planar: dimension must be 2 or 3, or missing for both"),
         (MORE_UNSUPPORTED.replace('"it is planar"', "7"), HEAD, "{families}: unsupported again: reason is missing"),
+        (UNSUPPORTED + 'params = { far = "far" }\n', HEAD,
+         "{families}: unsupported planar: params must be a table of numbers"),
         (FAMILY, "a,b\n", "{members}: the first line must be "
          "family,profile,dimension,params,dt,iterations,metric,value,band"),
         (FAMILY, HEAD + MEMBER + MEMBER, "{members}:3: default incline 2 ratio=0.99 1/240  creep stands twice"),
@@ -377,6 +379,9 @@ def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
         (Unsupported("u", ("tuned",), "*", 0, "why", "source"), False),
         (Unsupported("u", ("*",), "stack", 0, "why", "source"), False),
         (Unsupported("u", ("*",), "*", 3, "why", "source"), False),
+        (Unsupported("u", ("*",), "*", 0, "why", "source", SLOT.params), True),
+        (Unsupported("u", ("*",), "*", 0, "why", "source", (("ratio", 0.5),)), False),
+        (Unsupported("u", ("*",), "*", 0, "why", "source", (("far", 1e8),)), False),
     ],
 )
 def test_what_an_unsupported_entry_speaks_about(entry, covered):

@@ -69,7 +69,10 @@ class Family:
 
 @dataclass(frozen=True)
 class Unsupported:
-    """Cells that an engine cannot be asked, and why; ``"*"`` and 0 mean any scene and any dimension."""
+    """Cells that an engine cannot be asked, and why; ``"*"`` and 0 mean any scene and any dimension.
+
+    ``params`` are values that a cell must have, of those that differ from the scene's defaults.
+    """
 
     id: str
     profiles: tuple[str, ...]
@@ -77,6 +80,7 @@ class Unsupported:
     dimension: int
     reason: str
     source: str
+    params: tuple[tuple[str, float], ...] = ()
 
     def covers(self, slot: Slot) -> bool:
         """Whether the engine cannot be asked this slot."""
@@ -84,6 +88,7 @@ class Unsupported:
             _among(slot.profile, self.profiles)
             and self.scene in ("*", slot.scene)
             and self.dimension in (0, slot.dimension)
+            and set(self.params) <= set(slot.params)
         )
 
 

@@ -116,9 +116,13 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
 
 
 def _unsupported(path: Path, entry: Mapping[str, Any]) -> Unsupported:
-    return Unsupported(
-        **_fields(path, "unsupported", entry, ("id", "profiles", "scene", "dimension", "reason", "source"))
-    )
+    """Read one entry; ``params`` may be left out."""
+    told = {name: value for name, value in entry.items() if name != "params"}
+    fields = _fields(path, "unsupported", told, ("id", "profiles", "scene", "dimension", "reason", "source"))
+    params = entry.get("params", {})
+    if not isinstance(params, dict) or not all(type(value) in (int, float) for value in params.values()):
+        raise FindingsError(f"{path}: unsupported {entry['id']}: params must be a table of numbers")
+    return Unsupported(**fields, params=tuple(sorted((name, float(value)) for name, value in params.items())))
 
 
 def _members(engine: str, path: Path, families: Mapping[str, Family]) -> dict[Key, Finding]:
