@@ -53,9 +53,9 @@ def nulls(scenes: tuple[str, ...], param: tuple[str, ...], dim: tuple[int, ...],
     console = terminal()
     for head in dict.fromkeys((row["scene"], row["dimension"], params_text(row["params"])) for row in rows):
         console.print(Text(f"{head[0]} {head[1]}-D{' ' + head[2] if head[2] else ''}: errors", style="bold"))
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         for heading in ("check", "truth", "tolerance", *NULLS):
-            table.add_column(heading)
+            table.add_column(heading, overflow="fold", no_wrap=heading == "check")
         for row in rows:
             if (row["scene"], row["dimension"]) == head[:2]:
                 errors = [number(row["nulls"].get(name, {}).get("error"), 2) for name in NULLS]

@@ -319,8 +319,8 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("standing", row["reason"] or "-"),
     ]
     if better:
-        text = "; ".join(f"{c.name} {c.before} -> {c.after} ({_why(c)})" for c in differing)
-        lines.append(("cure", f"profile {better} passes this row. It differs in: {text}."))
+        lines.append(("cure", f"profile {better} passes this row. It differs in:"))
+        lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing]
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     told = told_cures(row["engine"], row["engine_version"], row["scene"], row["profile"], [row["dimension"]])
     lines += [("smallest" if better else "cure", text) for text in told if mark_of(row) != "pass"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -92,12 +93,18 @@ def times(ratio: float | None) -> str:
 
 @dataclass(frozen=True)
 class Mark:
-    """What a cell shows: mark, words after it, where it leads, and the longer text."""
+    """What a cell shows: mark, words after it, where it leads, the longer text, and the share that does not pass."""
 
     mark: str
     text: str
     href: str = ""
     title: str = ""
+    share: float = 0.0
+
+    @property
+    def twentieths(self) -> int:
+        """The share, rounded up: a length that the page has a class for, as it runs no styles of single elements."""
+        return math.ceil(20.0 * self.share)
 
     @property
     def sign(self) -> str:
@@ -138,7 +145,8 @@ def family_mark(field: Field | None, anchor: str) -> Mark:
         return Mark(field.mark if field else "unsupported", "")
     text = "" if not field.judged else f"{field.missed}/{field.judged}" if field.missed else str(field.judged)
     said = ", ".join(f"{n} {SAID[m][1]}" for m, n in field.marks.most_common())
-    return Mark(field.mark, text, "#" + anchor, said if len(field.marks) > 1 else "")
+    share = field.missed / field.judged if field.judged else 0.0
+    return Mark(field.mark, text, "#" + anchor, said if len(field.marks) > 1 else "", share)
 
 
 @dataclass(frozen=True)

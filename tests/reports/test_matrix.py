@@ -163,3 +163,9 @@ def test_the_legend_explains_the_marks_and_fits_where_it_stands(short, lines, wo
     assert len(text.splitlines()) == lines and word in text
     assert not short or max(map(len, text.splitlines())) <= 80
     assert legend() == legend(False)
+
+
+def test_a_cell_that_is_missing_counts_among_what_does_not_pass():
+    """Who leaves cells out must not look better by it."""
+    field = Field(Counter({"pass": 6, "missing": 2, "unsupported": 5}))
+    assert (field.judged, field.missed, field.mark) == (8, 2, "missing")

@@ -1,12 +1,14 @@
 """Tables and marks of the page, from rows made up for one thing each."""
 
 from collections import Counter
+from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from reports import cures as told_cures
+from reports import page
 from reports.matrix import Field
 from reports.page import cost, fairness
 from reports.page.charts import log_scale
@@ -148,3 +150,13 @@ def test_a_row_is_counted_for_an_entry_that_covers_it_and_by_which_it_is_known(s
     assert fairness._is_about({"standing": standing, "slot": slot.as_dict()}, entry) is (
         standing == "known" and covered
     )
+
+
+@pytest.mark.parametrize(("missed", "judged", "length"), [(0, 8, 0), (1, 289, 1), (1, 20, 1), (26, 283, 2), (8, 8, 20)])
+def test_the_bar_of_a_field_is_the_share_that_does_not_pass_and_never_nothing_where_one_does_not(
+    missed, judged, length
+):
+    found = family_mark(Field(Counter({"known": missed, "pass": judged - missed})), "there")
+    assert found.twentieths == length
+    drawn = (Path(page.__file__).parent / "templates" / "page.css").read_text()
+    assert not length or f".w{length} {{ --share: {5 * length}%; }}" in drawn

@@ -104,6 +104,18 @@ def test_ours_come_first_and_only_its_own_code_is_in_a_scene_s_identity(drop, si
     assert {name for name in before if before[name] != after[name]} == {"drop"}
 
 
+def test_what_runs_and_measures_a_cell_is_in_its_identity(monkeypatch):
+    """Else a cell that was stored stands for one that other code would run or measure."""
+    hashed = set()
+    monkeypatch.setattr(identity, "_hash_files", lambda paths: hashed.update(map(str, paths)) or "0" * 16)
+    for cached in (identity.scene_code, identity.adapter_hash):
+        cached.__wrapped__({identity.scene_code: "stack", identity.adapter_hash: "chipmunk"}[cached])
+    ends = ("validation/running/execution.py", "validation/running/certification.py", "validation/scenes/stack.py",
+            "validation/metrics.py", "validation/geometry.py", "validation/truths/columns.py", "adapters/stepping.py",
+            "adapters/receipts.py", "adapters/probes.py", "adapters/chipmunk/simulation.py")  # fmt: skip
+    assert [end for end in ends if not any(path.endswith(end) for path in hashed)] == []
+
+
 @pytest.mark.parametrize(
     ("name", "code", "said"),
     [

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -22,6 +23,17 @@ pymunk = pytest.importorskip("pymunk", reason="pymunk is an optional engine")
 
 SLOT = Slot("stack", (("n", 2.0),), 2, "chipmunk", "default", QUICK_DT)
 OURS = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"scene": "impact"}, {"params": (("n", 3.0),)}, {"dimension": 3}, {"engine": "bullet"}, {"profile": "tuned"},
+     {"dt": 1 / 960}, {"iterations": 20}, {"ulp": 1}, {"switched": (("iterations", 3),)}],
+    ids=lambda changed: next(iter(changed)),
+)  # fmt: skip
+def test_all_that_is_asked_of_a_cell_is_in_the_key_that_it_is_stored_by(changed):
+    """A moved start that was stored as its unmoved cell would be its answer, and leave it no floor."""
+    assert replace(SLOT, **changed).key() != SLOT.key()
 
 
 def test_a_switched_slot_is_another_cell_that_survives_json_and_is_never_listed():
