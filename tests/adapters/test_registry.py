@@ -12,7 +12,9 @@ import pytest
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.needs import needs
 from reports.listing import engines
+from validation.catalogue import CATALOGUE
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -236,3 +238,18 @@ def test_a_run_and_the_tests_fail_without_a_required_engine(monkeypatch, tmp_pat
         done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
         assert done.returncode != 0
         assert "CROSSCHECK_REQUIRE_ENGINES: not installed: havok" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("name", [each for each in registry.names() if registry.find(each).engine is not None])
+def test_every_setting_has_one_name_a_reason_and_a_source_that_are_words(name: str) -> None:
+    """They are printed, compared with other runs and kept as JSON: nothing there may be missing or told twice."""
+    engine = registry.find(name).engine
+    assert engine is not None
+    for profile in engine.profiles:
+        for scene in ("impact", "stack", "conveyor"):
+            asked = needs(CATALOGUE[scene].scene(max(engine.facts.dimensions), {}))
+            settings = engine.settings(profile, asked, 1.0 / 240.0)
+            assert len({setting.name for setting in settings}) == len(settings) > 0
+            for setting in settings:
+                assert isinstance(setting.because, str) and isinstance(setting.source, str), setting
+                assert setting.because and setting.name.isidentifier(), setting

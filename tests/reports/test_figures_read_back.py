@@ -9,6 +9,9 @@ import pandas as pd
 import pytest
 
 from reports.page import figures
+from reports.page.scenes import _iteration_table, _iterations
+from validation.cells import Observation, Outcome, Slot
+from validation.posed import resolve
 
 COUNTS = (4, 20, 100)
 ERRORS = {"chipmunk": (0.5, 0.05, 0.005), "bullet": (0.5, 0.5, 1e-12)}
@@ -79,3 +82,34 @@ def test_without_two_counts_there_is_nothing_to_draw():
     assert figures.error_against_iterations(table().iloc[:0], "stack", 2, 1 / 240, "drift") is None
     alone = table({"chipmunk": (0.5,), "bullet": (0.1,)}, (4,))
     assert figures.error_against_iterations(alone, "stack", 2, 1 / 240, "drift") is None
+
+
+def observed(who, iterations, off, dt=1 / 240):
+    """Balls that rebound with a ratio that is off by so much, at an iteration count; None is the profile's own.
+
+    In every cell that the scene's declared error is the worst of.
+    """
+    canonical = resolve("impact")
+    for params in canonical.primary.variations(dt):
+        e = canonical.complete(params)["e"]
+        of = Slot("impact", tuple(sorted(params.items())), 2, *who, dt, iterations=iterations)
+        yield Observation(of, "c", 1, "1", Outcome.OK, metrics={"rebound_ratio": (e + off, "")})
+
+
+def test_what_was_asked_at_several_counts_is_drawn_by_engine_and_profile_and_nothing_else_is():
+    one, other = ("chipmunk", "default"), ("bullet", "tuned")
+    asked = [*observed(one, 4, 0.1), *observed(one, 40, 0.01), *observed(other, 4, 0.2), *observed(other, 40, 0.2)]
+    beside = [*observed(one, None, 0.4), *observed(one, 10, 0.3, 1 / 60)]  # nobody chose a count; another step
+    found = _iteration_table([*asked, *beside])
+    assert sorted(found["error"]) == pytest.approx([0.01, 0.1, 0.2, 0.2])
+    assert sorted(found[["engine", "profile", "iterations"]].itertuples(index=False, name=None)) == [
+        ("bullet", "tuned", 4), ("bullet", "tuned", 40), ("chipmunk", "default", 4), ("chipmunk", "default", 40)
+    ]  # fmt: skip
+    assert "chipmunk/default, 4 iterations: error 0.1" in set(found["label"])
+    figure = _iterations(found, "impact", 2)
+    tree = ElementTree.fromstring(str(figure.picture))
+    said = {node.get("data-is") for node in tree.iter()} - {None}
+    assert said == {"chipmunk/default", "bullet/tuned", *found["label"]}  # lines, and points to hover over
+    primary = resolve("impact").primary
+    assert any(primary.name in (node.text or "") for node in tree.iter())
+    assert _iterations(found, "impact", 3) is None and _iterations(found, "bounce", 2) is None

@@ -129,3 +129,15 @@ def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
     quick, standard = (slots(Request(["impact"], ["chipmunk"], suite=suite)) for suite in ("quick", "standard"))
     assert set(quick) < set(standard) and len(standard) == 4 * len(quick)
     assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))
+
+
+def test_a_study_is_listed_at_a_scene_s_defaults_whether_or_not_a_variation_has_them(monkeypatch):
+    """Its rows are those of the scene without parameters: a study that no family could name would stay new for ever."""
+    canonical = CATALOGUE["incline"]
+    others = tuple(v for v in canonical.variations("standard") if canonical.minimal(v.params))
+    assert canonical.studies and others
+    slot = Slot("incline", (), 2, "toy", "default", plan.QUICK_DT)
+    for studies, standard in ((canonical.studies, True), ((), False)):
+        monkeypatch.setattr(plan, "CATALOGUE", {"incline": replace(canonical, studies=studies, standard=others)})
+        assert plan.is_standard(slot) is standard
+        assert not plan.is_standard(replace(slot, iterations=3)) and not plan.is_standard(replace(slot, dt=1 / 60))

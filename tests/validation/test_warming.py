@@ -2,14 +2,20 @@
 
 import sys
 import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
 
 import pytest
 
+from adapters.engine import Engine
 from validation.catalogue import OURS
 from validation.cells import Slot
 from validation.running import warming
 from validation.running.execution import execute
 from validation.running.plan import Request, slots
+from validation.running.warming import Warming
 
 SLOT = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
 
@@ -59,3 +65,106 @@ def test_a_compilation_is_remembered_by_its_cpu_time(monkeypatch):
     """Waiting is what a busy machine adds; it must not make the next estimate longer."""
     monkeypatch.setattr(warming, "first_steps", lambda slot: time.sleep(0.5))
     assert warming._compile([SLOT.as_dict()]) < 0.25
+
+
+class Compiling(Engine):
+    """An engine that compiles into a folder, of a version of its sources; nothing of it runs here."""
+
+    profiles = MappingProxyType({})
+
+    def __init__(self, folder, version):
+        self.folder = folder / version
+
+    def kernels(self):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        return self.folder
+
+    version = build = declares = refuses = None
+
+
+PLAN = [replace(SLOT, engine="toy", dimension=d, scene=s, params=p) for d in (2, 3)
+        for s, p in (("impact", ()), ("impact", (("e", 0.0),)), ("bounce", ()))]  # fmt: skip
+
+
+@pytest.fixture
+def toy(monkeypatch, tmp_path):
+    """`toy(version, taken, fails)`: what is left to compile for `PLAN`, and the cells that are asked for it.
+
+    Parts run in this process one after another, for ``taken`` seconds each; that of the dimension ``fails`` dies.
+    """
+    asked = []
+
+    class Pool:
+        def __init__(self, workers, context):
+            asked.append(workers)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *of):
+            return None
+
+        def submit(self, work, slots):
+            future = Future()
+            asked.append(slots)
+            if slots[0]["dimension"] == self.fails:
+                future.set_exception(BrokenProcessPool("it died"))
+            else:
+                future.set_result(self.taken)
+            return future
+
+    def make(version="a", taken=10.0, fails=0):
+        Pool.taken, Pool.fails = taken, fails
+        engine = Compiling(tmp_path, version)
+        monkeypatch.setattr(warming, "find", lambda name: SimpleNamespace(engine=engine if name == "toy" else None))
+        monkeypatch.setattr(warming, "ProcessPoolExecutor", Pool)
+        return Warming(PLAN)
+
+    make.asked = asked
+    return make
+
+
+def test_each_scene_and_profile_of_a_dimension_is_compiled_once_and_a_part_a_dimension(toy):
+    left = toy()
+    assert len(left) == 2 and sorted(left.run(8)) == ["toy 2-D", "toy 3-D"]
+    workers, *parts = toy.asked
+    assert workers == 2  # no more than there are parts
+    assert [[(cell["dimension"], cell["scene"], cell["params"]) for cell in part] for part in parts] == [
+        [(d, "impact", {}), (d, "bounce", {})] for d in (2, 3)
+    ]
+
+
+def test_what_was_compiled_is_not_again_until_the_sources_or_the_plan_are_others(toy, monkeypatch):
+    list(toy().run(1))
+    assert toy.asked[0] == 1 and len(toy()) == 0
+    assert len(toy("b")) == 2
+    monkeypatch.setitem(globals(), "PLAN", [*PLAN, replace(PLAN[0], profile="another")])
+    assert len(toy()) == 1
+
+
+def test_a_part_that_dies_is_told_and_left_for_the_next_time(toy):
+    assert sorted(toy(fails=3).run(2)) == ["toy 2-D", "toy 3-D"]
+    left = toy()
+    assert len(left) == 1 and list(left.run(2)) == ["toy 3-D"]
+
+
+def test_what_is_expected_is_the_longest_of_before_for_each_round_of_processes(toy):
+    least = warming.FIRST / 2.0  # where none is known, or it found its kernels ready
+    assert [toy().estimate(jobs) for jobs in (0, 1, 2, 3)] == [2.0 * least, 2.0 * least, least, least]
+    list(toy(taken=10.0).run(1))
+    assert toy("b").estimate(2) == least
+    list(toy("b", taken=400.04).run(1))
+    assert toy("c").estimate(1) == 800.0 and toy("c").estimate(2) == 400.0
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"cpu_seconds": null}', '{"cpu_seconds": "long"}'])
+def test_a_mark_that_cannot_be_read_says_nothing_and_stops_nothing(toy, text, tmp_path):
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "warm-0.json").write_text(text)
+    assert toy().estimate(2) == warming.FIRST / 2.0
+
+
+def test_engines_that_compile_nothing_or_are_not_here_have_nothing_to_do(toy, monkeypatch):
+    toy()
+    monkeypatch.setattr(Compiling, "kernels", lambda self: None)
+    assert len(Warming(PLAN)) == 0 and len(Warming([SLOT])) == 0 and len(Warming([])) == 0

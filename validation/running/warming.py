@@ -45,12 +45,13 @@ class Warming:
 
     def __init__(self, slots: Sequence[Slot]) -> None:
         self._tasks: list[tuple[list[dict[str, object]], Path]] = []
-        for (name, _), group in _groups(slots).items():
+        for (name, dimension), group in _groups(slots).items():
             engine = find(name).engine
             folder = engine.kernels() if isinstance(engine, Engine) else None
             if folder is not None:
                 wanted = [slot.as_dict() for slot in group.values()]
-                mark = folder / f"warm-{hashlib.sha256(repr(sorted(group)).encode()).hexdigest()[:12]}.json"
+                of = repr((dimension, sorted(group))).encode()
+                mark = folder / f"warm-{hashlib.sha256(of).hexdigest()[:12]}.json"
                 if not mark.is_file():
                     self._tasks.append((wanted, mark))
 
