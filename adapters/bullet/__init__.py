@@ -3,6 +3,7 @@
 shipped         numbers of Bullet itself, and the releases that were looked at
 profiles        settings with their reasons
 simulation      one world in a DIRECT client
+clipped         bodies whose faces Bullet knows
 engine          the adapter
 contact_law     one ball over a face, as a scalar recurrence of the settings
 """

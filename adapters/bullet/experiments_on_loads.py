@@ -9,6 +9,11 @@ _SOLVED = {"solverResidualThreshold": 0.0, "iterations": 1000}
 #: Contact points are kept while they drift, and friction with them.
 _KEPT = _NO_DRAG | {"contactBreakingThreshold": 0.1}
 _PLAIN = dict[str, float]()
+#: Faces of hulls and boxes are clipped: all points of two of them are found in every step, where one was.
+_FACES = {"enableSAT": 1}
+#: Bodies come from the same files, their faces stay unknown.
+_FILES = {"enableSAT": 0}
+_NO_PUSH = {"contactERP": 0.0}
 
 ON_LOADS: tuple[Experiment, ...] = (
     *(
@@ -149,6 +154,50 @@ ON_LOADS: tuple[Experiment, ...] = (
             idle=(_SOLVED,),
         )
         for profile in ("default", "tuned", "one")
+    ),
+    *(
+        Experiment(
+            "wedge-hull-points",
+            "where faces are clipped the block stands on four points in every step, and all is as it should be",
+            profile,
+            "wedge",
+            metric,
+            off,
+            idle=idle,
+        )
+        for profile, metric, off, idle in (
+            ("default", "off_the_face", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+            ("default", "turned", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+            ("default", "acceleration", _FACES | _NO_DRAG, (_FACES, _NO_DRAG)),
+            ("default", "given_way", _FACES | _NO_DRAG, (_FACES, _NO_DRAG)),
+            ("tuned", "given_way", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+            ("tuned", "acceleration", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+            ("tuned", "momentum", _FACES, (_FILES,)),
+            ("one", "acceleration", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+            ("one", "off_the_face", _FACES, (_FILES, _NO_PUSH, _SOLVED)),
+        )
+    ),
+    *(
+        Experiment(
+            "arch-hull-points",
+            "where faces are clipped the keystone presses both springers alike, and sinks in as it should",
+            profile,
+            "arch",
+            metric,
+            off,
+            params,
+            idle=idle,
+        )
+        for profile, metric, params, off, idle in (
+            ("default", "face_load[left]", _PLAIN, _FACES, (_FILES, _SOLVED)),
+            ("tuned", "face_load[left]", _PLAIN, _FACES, (_FILES, _NO_PUSH)),
+            ("one", "face_load[right]", _PLAIN, _FACES, (_FILES, _NO_PUSH)),
+            ("default", "sinking", {"ratio": 0.8}, _FACES | _NO_DRAG, (_FACES, _NO_DRAG)),
+            ("tuned", "sinking", {"ratio": 0.8}, _FACES, (_FILES, _NO_PUSH)),
+            ("tuned", "face_load[right]", {"ratio": 0.8}, _FACES, (_FILES, _NO_PUSH)),
+            ("one", "parting[left]", {"ratio": 0.8}, _FACES, (_FILES, _NO_PUSH)),
+            ("one", "turned", {"ratio": 0.8}, _FACES, (_FILES, _NO_PUSH)),
+        )
     ),
     *(
         Experiment(

@@ -23,6 +23,7 @@ WORLD = frozenset(
         "contactERP",
         "contactSlop",
         "deterministicOverlappingPairs",
+        "enableSAT",
         "numSubSteps",
         "restitutionVelocityThreshold",
         "solverResidualThreshold",
@@ -147,6 +148,8 @@ def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
             raise EngineError(f"{name}: {value!r} is not a number")
         if not (math.isfinite(value) and value >= 0.0):
             raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
+    if settings.get("enableSAT", 0) not in (0, 1):
+        raise EngineError(f"enableSAT: {settings['enableSAT']!r} must be 0 or 1")
     iterations = settings.get("iterations", 50)
     if iterations != int(iterations) or iterations < 1:
         raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from adapters.bullet import clipped
 from adapters.bullet.profiles import checked
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5
@@ -102,21 +103,15 @@ class BulletSimulation(Simulation):
     def _add(self, index: int, body: Body, heaviest: float, restitution: float, friction: float) -> None:
         p, client = self._p, self._client
         sizes, position, quaternion = placement(body, self._scene)
-        if isinstance(body.shape, Sphere):
-            shape = p.createCollisionShape(p.GEOM_SPHERE, radius=sizes[0], physicsClientId=client)
-        elif isinstance(body.shape, Capsule | Cylinder):
-            kind = p.GEOM_CAPSULE if isinstance(body.shape, Capsule) else p.GEOM_CYLINDER
-            lying = {"collisionFrameOrientation": Z_TO_X}
-            shape = p.createCollisionShape(kind, radius=sizes[0], height=sizes[1], **lying, physicsClientId=client)
-        elif isinstance(body.shape, Hull):
-            shape = p.createCollisionShape(p.GEOM_MESH, vertices=body.shape.vertices, physicsClientId=client)
-        else:
-            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=sizes, physicsClientId=client)
         mass = {"free": body.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[body.motion]
         waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
-        identifier = p.createMultiBody(
-            mass, shape, -1, waiting, quaternion, useMaximalCoordinates=self._maximal, physicsClientId=client
-        )
+        common = {"useMaximalCoordinates": self._maximal, "physicsClientId": client}
+        if "enableSAT" in self._world and isinstance(body.shape, Box | HalfSpace | Hull):
+            known = bool(self._world["enableSAT"])
+            identifier = clipped.made(p, body.shape, sizes, mass, known, waiting, quaternion, **common)
+        else:
+            shape = self._shape(body, sizes)
+            identifier = p.createMultiBody(mass, shape, -1, waiting, quaternion, **common)
         self._ids.append(identifier)
         self._mass.append(mass)
         # A half-space is drawn as a box whose centre lies below the face: the scene's pose is its own.
@@ -136,6 +131,20 @@ class BulletSimulation(Simulation):
             p.changeDynamics(identifier, -1, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
         if body.motion == "prescribed":
             p.changeDynamics(identifier, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+
+    def _shape(self, body: Body, sizes: tuple[float, ...]) -> int:
+        p, client = self._p, self._client
+        how: dict[str, Any]
+        if isinstance(body.shape, Sphere):
+            kind, how = p.GEOM_SPHERE, {"radius": sizes[0]}
+        elif isinstance(body.shape, Capsule | Cylinder):
+            kind = p.GEOM_CAPSULE if isinstance(body.shape, Capsule) else p.GEOM_CYLINDER
+            how = {"radius": sizes[0], "height": sizes[1], "collisionFrameOrientation": Z_TO_X}
+        elif isinstance(body.shape, Hull):
+            kind, how = p.GEOM_MESH, {"vertices": body.shape.vertices}
+        else:
+            kind, how = p.GEOM_BOX, {"halfExtents": sizes}
+        return int(p.createCollisionShape(kind, **how, physicsClientId=client))
 
     def _ignore_pairs_that_cannot_move(self) -> None:
         """Prescribed bodies pass through fixed and prescribed ones."""

@@ -3,7 +3,9 @@
 import math
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,6 +19,8 @@ from adapters.bullet.contact_law import ContactLaw, fall
 from adapters.bullet.profiles import law_of
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
+from adapters.scene import Hull
+from validation.catalogue import CATALOGUE
 
 ENGINE = BulletEngine()
 #: Bullet's laws by path and settings, stated here once more: the profiles' own settings must give the same.
@@ -415,6 +419,7 @@ def test_worlds_built_side_by_side_do_not_share_anything():
         ({"contactERP": -0.1}, "contactERP: -0.1 must be finite and not negative"),
         ({"linearDamping": math.nan}, "linearDamping: nan must be finite"),
         ({"contactSlop": "thin"}, "contactSlop: 'thin' is not a number"),
+        ({"enableSAT": 2}, "enableSAT"),
         ({"iterations": 0}, "iterations: 0 must be a whole number of at least 1"),
         ({"iterations": 2.5}, "iterations: 2.5 must be a whole number"),
     ],
@@ -520,3 +525,39 @@ def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal):
     x, y, z, w = _turn_up_to(normal)
     assert math.hypot(x, y, z, w) == pytest.approx(1.0, abs=1e-12)
     assert (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)) == pytest.approx(normal, abs=1e-12)
+
+
+# ---- faces that are clipped ----------------------------------------------------------------------------------------
+
+
+def test_a_box_on_a_hull_has_four_points_in_every_step_where_their_faces_are_known(tmp_path, monkeypatch):
+    """Without, from the same files, it stands on one in some of them; nothing else in the run differs."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    canonical = CATALOGUE["wedge"]
+    scene = canonical.scene(2, {})
+    fewest = {}
+    for known in (0, 1):
+        found = drive(scene, enableSAT=known)
+        rows, starts = found.contacts.rows, found.contacts.offset
+        on_the_face = (rows.a == scene.index("wedge")) & (rows.b == scene.index("block"))
+        counts = [int(on_the_face[i:j].sum()) for i, j in pairwise(starts)]
+        fewest[known] = min(counts)
+        assert max(counts) == 4 and len(counts) == math.ceil(scene.duration / DT)
+    assert fewest == {0: 1, 1: 4}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_hull_from_a_file_is_the_hull_of_its_vertices():
+    """It stands on a half-space, and a ball lies a millimetre deep in its upper face."""
+    corners = tuple((x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.1, 0.1))
+    above = ball(0.1 + 0.5 - 1e-3, name="above", x=0.1)
+    hull = Body("hull", Hull(corners), 1.0, (0.02, 0.03, 0.04), (0.0, 0.0, 0.0, *UPRIGHT))
+    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), -0.1), motion="fixed")
+    gaps = {}
+    for name, changes in {"vertices": {}, "file": {"enableSAT": 0}, "faces": {"enableSAT": 1}}.items():
+        rows = drive(scene_of(floor, hull, above, duration=DT), **changes).contacts.rows
+        gaps[name] = [rows.gap[(rows.a == a) & (rows.b == b)].min() for a, b in ((0, 1), (1, 2))]
+    # A hull keeps a margin of 1 mm, but where faces are clipped; vertices of a file are rounded to 24 bits.
+    assert gaps["vertices"] == pytest.approx([-1e-3, -2e-3], abs=1e-12)
+    assert gaps["file"] == pytest.approx([-1e-3, -2e-3], abs=1e-7)
+    assert gaps["faces"] == pytest.approx([0.0, -2e-3], abs=1e-7)

@@ -71,7 +71,6 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: `tests/adapters/test_findings_of_physx.py`, that of Drake is in `tests/adapters/test_drake.py`, those of Newton but
 #: `card-tent-creep`, which is unexplained, in `tests/adapters/test_newton.py`.
 MEASURED_ONLY = {
-    "bullet": {"arch-hull-points", "wedge-hull-points"},
     "drake": {"shove-slanted-edge"},
     "newton": {
         "card-tent-creep",
