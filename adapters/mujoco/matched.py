@@ -9,10 +9,10 @@ a shift of the references ``aref`` between MuJoCo's own calls reaches:
     softness    ``aref`` is raised by R f, so that what a contact yields to its own force, it is asked for beforehand
 
 The last two depend on the answer: a round solves, looks at slips and forces, and solves again. Of one contact the first
-error falls by ``mu^2 G/(1 + mu^2 G)`` a round, G being its mobility along the face over that across it (1 of a box that
-only slides, 7/2 of a ball), the second by ``R/(G + R)``, 1 - d; a secant along the last change (Anderson's mixing of
-depth one) makes five rounds of dozens. Rounds end when all shifts agree with what they gave to `AGREED`, or when what is
-missed stays the same: four corners of a face cannot all meet distances that are rounded.
+error falls by ``mu^2 G/(1 + mu^2 G)`` a round, G being its mobility along the face over that across it (1 of a box
+that only slides, 7/2 of a ball), the second by ``R/(G + R)``, 1 - d; a secant along the last change (Anderson's mixing
+of depth one) makes five rounds of dozens. Rounds end when all shifts agree with what they gave to `AGREED`, or when
+what is missed stays the same: four corners of a face cannot all meet distances that are rounded.
 
 Sources: De Saxce and Feng, "The bipotential method" (1998), the shift; Hestenes and Powell (1969), the method of
 multipliers, the softness; Anderson (1965), the secant; MuJoCo documentation, computation: constraint model.
@@ -33,8 +33,8 @@ from adapters.script import literal
 #: roundings, which forces of contacts 1e4 times stiffer than their bodies cost.
 AGREED = 1e-13
 #: The share that may be missed in the end; a run that misses more is INVALID. Corners of a mesh are kept in single
-#: precision: four of a face contradict each other by 6e-8 m, and a tenth of that over the square of a step is 3.5e-5 g at
-#: 1/240 s, 5.6e-4 g at 1/960 s. So much is shared among them, and what it does to a number is judged by its check.
+#: precision: four of a face contradict each other by 6e-8 m, and a tenth of that over the square of a step is 3.5e-5 g
+#: at 1/240 s, 5.6e-4 g at 1/960 s. So much is shared among them; what it does to a number is judged by its check.
 SETTLED = 1e-3
 
 

@@ -129,3 +129,19 @@ def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
     quick, standard = (slots(Request(["impact"], ["chipmunk"], suite=suite)) for suite in ("quick", "standard"))
     assert set(quick) < set(standard) and len(standard) == 4 * len(quick)
     assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))
+
+
+@pytest.mark.skipif(registry.find("mujoco").engine is None, reason="mujoco is not installed")
+def test_the_quick_suite_asks_a_profile_without_a_rank_what_stands_for_a_scene():
+    def asked(**more):
+        found = slots(Request(["slide"], ["mujoco"], dimensions=[3], **more))
+        cells = {}
+        for slot in found:
+            cells.setdefault(slot.profile, set()).add((slot.params, slot.iterations))
+        return cells
+
+    quick, named, standard = asked(), asked(profiles=["matched"]), asked(suite="standard")
+    assert quick["matched"] == {(CATALOGUE["slide"].minimal(CATALOGUE["slide"].representative), None)}
+    assert len(quick["tuned"]) > 1 and named == {"matched": quick["tuned"]}
+    assert standard["matched"] == standard["tuned"]
+    assert asked(params={"mu": 0.25})["matched"] == {((("mu", 0.25),), None)}
