@@ -148,7 +148,8 @@ class Matched:
         """Make the second half of a step."""
         made, apart = matched_step2(self._mujoco, self._model, self._data, self._restitution, self._law)
         self.most, self.apart = max(self.most, made), max(self.apart, apart)
-        self.unsolved += not apart <= SETTLED
+        ran_out = made == self._law[2] and not apart <= self._law[3]
+        self.unsolved += ran_out or not apart <= SETTLED
 
     def told(self) -> dict[str, Any]:
         """How the rounds ended; a run with a step in which they do not agree is none of this profile's answers."""
