@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from adapters import registry
 from validation.bench.agreement import agreement, ratios
 from validation.bench.reading import bench_runs, overhead, scaling, scaling_fits, timings_summary
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
@@ -225,3 +226,27 @@ def test_a_fixed_parameter_replaces_the_phases():
         Request(["bounce"], ["reference"], profiles=["classical"], dimensions=[2]), [1 / 240], params={"height": 2.0}
     )
     assert [slot.params for slot in accuracy_slots(sweep)] == [(("height", 2.0),)]
+
+
+def test_what_has_no_rank_is_told_beside_the_others_and_neither_best_nor_tied(store, monkeypatch):
+    """The dearest and least exact has the first rank, where the others have none."""
+    monkeypatch.setattr("validation.bench.work.is_ranked", lambda engine, profile: engine != "b")
+    run = filled(store, {("a", STEPS[0]): 0.05, ("b", STEPS[0]): 0.01}, {("a", STEPS[0]): 0.2, ("b", STEPS[0]): 0.1})
+    points = work_points(store, run)
+    assert dict(zip(points["engine"], points["best"], strict=True)) == {"a": True, "b": False}
+    for table, column in ((time_at_equal_error(points), "cost"), (error_at_equal_time(points), "error")):
+        reached = table[table[column].notna()]
+        assert set(reached["engine"]) == {"a", "b"}
+        ranks = reached.groupby("engine")["rank"].unique()
+        assert ranks["a"].tolist() == [1.0] and np.isnan(ranks["b"]).all()
+        assert not reached[reached["engine"] == "b"]["tied"].any() and reached[reached["engine"] == "a"]["tied"].all()
+
+
+@pytest.mark.skipif(registry.find("mujoco").engine is None, reason="mujoco is not installed")
+def test_a_profile_without_a_rank_is_benched_where_it_is_named():
+    def benched(*profiles):
+        sweep = Sweep(Request(["impact"], ["mujoco"], profiles, dimensions=[2]), dts=STEPS[:1])
+        return {slot.profile for slot in accuracy_slots(sweep)}, {unit.slot.profile for unit in timed_units(sweep, [])}
+
+    assert benched() == ({"default", "tuned"},) * 2
+    assert benched("matched") == ({"matched"},) * 2

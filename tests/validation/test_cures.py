@@ -232,3 +232,8 @@ def test_what_a_committed_cure_tells_failed_before_and_passes_with_it(engine):
         where = f"{engine} {cure.scene} {cure.dimension}-D {cure.metric}"
         assert cure.before is None or abs(cure.before - cure.truth) > cure.tolerance, where
         assert cure.after is not None and abs(cure.after - cure.truth) <= cure.tolerance, where
+
+
+def test_no_cure_has_the_settings_of_a_profile_without_a_rank():
+    pytest.importorskip("mujoco")
+    assert cures._profiles("mujoco") == ["default", "tuned"]

@@ -141,3 +141,19 @@ def test_a_study_is_listed_at_a_scene_s_defaults_whether_or_not_a_variation_has_
         monkeypatch.setattr(plan, "CATALOGUE", {"incline": replace(canonical, studies=studies, standard=others)})
         assert plan.is_standard(slot) is standard
         assert not plan.is_standard(replace(slot, iterations=3)) and not plan.is_standard(replace(slot, dt=1 / 60))
+
+
+@pytest.mark.skipif(registry.find("mujoco").engine is None, reason="mujoco is not installed")
+def test_the_quick_suite_asks_a_profile_without_a_rank_what_stands_for_a_scene():
+    def asked(**more):
+        found = slots(Request(["slide"], ["mujoco"], dimensions=[3], **more))
+        cells = {}
+        for slot in found:
+            cells.setdefault(slot.profile, set()).add((slot.params, slot.iterations))
+        return cells
+
+    quick, named, standard = asked(), asked(profiles=["matched"]), asked(suite="standard")
+    assert quick["matched"] == {(CATALOGUE["slide"].minimal(CATALOGUE["slide"].representative), None)}
+    assert len(quick["tuned"]) > 1 and named == {"matched": quick["tuned"]}
+    assert standard["matched"] == standard["tuned"]
+    assert asked(params={"mu": 0.25})["matched"] == {((("mu", 0.25),), None)}

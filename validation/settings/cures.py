@@ -19,7 +19,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -222,7 +222,7 @@ def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Uns
 
 def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tuple[_Found | None, list[_Found]]:
     """The best change, and all single settings that are no worse than it."""
-    others = [name for name in load(engine).profiles if name != own[0].profile and is_ranked(engine, name)]
+    others = [name for name in _profiles(engine) if name != own[0].profile]
     wholes = {name: [changes_of(slot, name) for slot in own] for name in others}
     singles = _singles(engine, own, list(wholes.values()))
     found = _useful(trials.all(singles), failing)
@@ -235,6 +235,11 @@ def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tu
     found.sort(key=_Found.rank)
     best = found[0] if found else None
     return best, [each for each in found if best and each.size == 1 and each.failing == best.failing]
+
+
+def _profiles(engine: str) -> list[str]:
+    """Profiles whose settings may cure: those that have a rank, since the settings of others are not stock."""
+    return [name for name in load(engine).profiles if is_ranked(engine, name)]
 
 
 def _useful(found: Iterable[_Found], failing: int) -> list[_Found]:
@@ -304,7 +309,7 @@ def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> R
 
 def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
     """Profile that has all settings of a cure."""
-    for name in filter(partial(is_ranked, engine), load(engine).profiles) if best else ():
+    for name in _profiles(engine) if best else ():
         wanted = [changes_of(slot, name) for slot in slots]
         if best and all(each.items() <= w.items() for each, w in zip(best.changes, wanted, strict=True)):
             return name
