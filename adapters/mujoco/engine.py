@@ -211,7 +211,7 @@ def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
 
 
 def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:
-    """Friction over load of the box that the probe slides, by the documented law of its contacts.
+    """Friction over load of the box that the probe slides, by the law of its contacts, where that is not mu.
 
     Normal and friction are one convex problem: what stops a slip lifts the box. While it slides or flies that leaves mu
     what it is. Above mu = 1 or so the box is thrown up and turned, lands on an edge, and there a pyramid's edges across
@@ -226,6 +226,8 @@ def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str,
     for k in (0.0, 1.0, -1.0) if off else (0.0,):
         (forwards, upwards, _) = box.motion(steps, speed + k * off)[-1][1]
         ratios.append((speed + k * off - forwards) / (upwards + GRAVITY * steps * dt))
+    if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
+        return {}  # as asked
     band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)
     because = "contact is convex: what stops a slip lifts the box; a landing has less friction than mu of its load"
     return dict.fromkeys(("friction", "friction_impulse"), Declared(ratios[0], band, because))
