@@ -20,6 +20,7 @@ from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
+from validation.catalogue import CATALOGUE
 
 ENGINE = BulletEngine()
 #: Bullet's laws by path and settings, stated here once more: the profiles' own settings must give the same.
@@ -255,6 +256,26 @@ def test_friction_is_declared_wider_where_a_box_hops_within_the_slop_and_nowhere
     assert (declared.band > 1e-2 * 0.3) == hops
     assert declared.value - declared.band <= 0.3 <= declared.value + declared.band
     assert not [slip for slip in receipts(ENGINE, "one", asked, dt) if not slip.holds]
+
+
+def test_what_short_plates_brake_too_much_is_the_friction_of_points_without_a_load():
+    """Step by step: the deceleration is mu g and what points at the plates' edges hold without a load."""
+    scene = CATALOGUE["seam"].scene(2, {"plate": 0.3})
+    settings = {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)}
+    record = run(ENGINE, scene, DT, settings, EVERY_STEP)
+    box, contacts = len(scene.bodies) - 1, record.contacts
+    slowed = -np.diff(record.twist[:, box, 0])
+    carried = np.diff(record.twist[:, box, 1]) + 9.81 * DT
+    rows = contacts.rows
+    held = np.zeros(len(record.t))
+    for step, a, b in zip(contacts.step, contacts.offset[:-1], contacts.offset[1:], strict=True):
+        unloaded = (rows.b[a:b] == box) & (rows.impulse[a:b, 1] < 1e-8 * 9.81 * DT)
+        held[step] = -rows.impulse[a:b][unloaded, 0].sum()
+    sliding = record.twist[1:, box, 0] > 2.0 * 0.4 * 9.81 * DT
+    excess = (slowed - 0.4 * carried)[sliding]
+    assert excess.max() > 0.005 * 9.81 * DT and (excess > 1e-4 * 9.81 * DT).sum() == 10
+    # 1e-8: what 50 sweeps leave of the loads.
+    assert np.allclose(excess, held[1:][sliding], rtol=0.0, atol=1e-8 * 9.81 * DT)
 
 
 # ---- signs, inertia, loads ---------------------------------------------------------------------------------------
