@@ -57,6 +57,7 @@ _SWEPT: tuple[_Row, ...] = (
         for profile in ("tuned", "one")
         for params in ({"aspect": 0.2}, {"from": 25.0})
     ),
+    ("seam-points-held", "one", "seam", "braking", {"plate": 0.3}, 2, None),
     ("flat-box-sweeps-and-warm-start", "tuned", "flat_box", "rebound_ratio", {"aspect": 0.25}, 2, None),
     ("flat-box-sweeps-and-warm-start", "tuned", "flat_box", "impulse", {"aspect": 0.25}, 2, None),
 )
@@ -95,6 +96,14 @@ _SHOWN: tuple[tuple[str, Changes, tuple[Changes, ...], tuple[_Row, ...]], ...] =
         tuple(
             ("incline-points-dropped", profile, "incline", "acceleration", {"ratio": 2.0}, 2, _COARSE)
             for profile in ("tuned", "one")
+        ),
+    ),
+    (
+        "with points that are dropped after less drift none is left without a load; more sweeps do nothing",
+        {"contactBreakingThreshold": 0.02},
+        (_MORE,),
+        (
+            ("seam-points-held", "tuned", "seam", "braking", {"plate": 0.3}, 2, None),
         ),
     ),
     (

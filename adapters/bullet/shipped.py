@@ -21,6 +21,8 @@ DAMPING = float(np.float32(0.04))
 ERP = 0.08
 #: Overlap that is left alone [m].
 SLOP = 1e-5
+#: Share of the last step's impulses that a solve starts from (btContactSolverInfo.h, m_warmstartingFactor).
+WARM_STARTING = 0.85
 #: Approach speed below which there is no rebound [m/s] (btSequentialImpulseConstraintSolver.cpp:494).
 RESTITUTION_THRESHOLD = 0.2
 #: Overlap from which the rigid-body path pushes out by a velocity that is not kept [m] (pybullet.c:1825).

@@ -18,9 +18,13 @@ Newton's method on three unknowns: the cost is convex and made of quadratic piec
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 from adapters.mujoco.contact_law import ContactLaw
+from adapters.mujoco.pairs import contact_law, pair_solreffriction
+from adapters.scene import Box, Scene
 
 #: A row of the cost: Jacobian (3), reference acceleration, stiffness D.
 Row = tuple[tuple[float, float, float], float, float]
@@ -63,6 +67,28 @@ class BoxOnFace:
     inertia: float
     load: tuple[float, float]
     share: float = 2.0
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], scene: Scene, dt: float) -> Self:
+        """The problem of a scene of a level face and one upright box, under ``settings``."""
+        face, body = scene.bodies
+        assert isinstance(body.shape, Box)
+        material = scene.material(face.name, body.name)
+        law = contact_law(settings, material.restitution, material.friction, dt)
+        own = pair_solreffriction(settings, dt)
+        damping = ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else law.damping
+        half, moments = body.shape.half_extents, body.inertia
+        return cls(
+            law,
+            settings["cone"],
+            material.friction,
+            damping,
+            settings["impratio"],
+            half[0],
+            half[-1],
+            (moments[1] if isinstance(moments, tuple) else moments) / body.mass,
+            (scene.gravity[0] + body.force[0] / body.mass, scene.gravity[-1] + body.force[-1] / body.mass),
+        )
 
     def slide(self, steps: int, velocity: float = 0.0) -> list[tuple[float, float]]:
         """Position and velocity along the face from a touching start, at samples 0 ... ``steps``."""

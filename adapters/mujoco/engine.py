@@ -15,10 +15,11 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
-from adapters.mujoco.profiles import PROFILES, check_settings
+from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
@@ -26,9 +27,10 @@ from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, STEPS
-from adapters.receipts import IMPULSE_SHARE
+from adapters.probes import GRAVITY, LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
+from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
+from adapters.stepping import step_count
 
 #: Phases of a step over which a rebound is declared.
 PHASES = 128
@@ -137,12 +139,15 @@ class MujocoEngine(Engine):
         return MujocoSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Rebound of the spring and damper as shipped, over all phases of a step; sums of forces; RK4's fall."""
+        """Rebound as shipped, over all phases of a step; friction of a box that hops; sums of forces; RK4's fall."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
+        own_laws = "rounds" not in settings  # the matched profile has Newton's and Coulomb's
         declared = {"impulse": _impulses(settings, dt)}
         if settings["integrator"] == "RK4":
             declared |= _second_order_fall()
-        if settings["solref"] != "reflect" and "rounds" not in settings and needs.regime == "impact":
+        elif own_laws and needs.friction > 0.0 and not BROUGHT & set(settings):
+            declared |= _friction(settings, needs, dt)
+        if own_laws and settings["solref"] != "reflect" and needs.regime == "impact":
             law = contact_law(settings, needs.restitution, needs.friction, dt)
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
@@ -206,6 +211,29 @@ def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
     steps = math.ceil(2.0 * LANDING_LEAD + 1.0)
     because = "forces are solved to a tolerance: so much may they and the momentum differ in each step of the landing"
     return Declared(1.0, IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED, because)
+
+
+def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:
+    """Friction over load of the box that the probe slides, by the law of its contacts, where that is not mu.
+
+    Normal and friction are one convex problem: what stops a slip lifts the box. While it slides or flies that leaves mu
+    what it is. Above mu = 1 or so the box is thrown up and turned, lands on an edge, and there a pyramid's edges across
+    the slip, or an edge that stops, carry load without as much friction. Newton stops at a tolerance in each step
+    (`adapters.mujoco.predictions.solver_error`); a start that is off by it says how much that matters.
+    """
+    case = Case(needs.dimension, needs.restitution, needs.friction, dt, 0.0)
+    scene, steps = slide(case), step_count(SLIDE_TIME, dt)
+    box, speed = BoxOnFace.of(settings, scene, dt), scene.bodies[1].twist[0]
+    off = math.sqrt(12.0 * float(settings["tolerance"])) * dt
+    ratios = []
+    for k in (0.0, 1.0, -1.0) if off else (0.0,):
+        (forwards, upwards, _) = box.motion(steps, speed + k * off)[-1][1]
+        ratios.append((speed + k * off - forwards) / (upwards + GRAVITY * steps * dt))
+    if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
+        return {}  # as asked
+    band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)
+    because = "contact is convex: what stops a slip lifts the box; a landing has less friction than mu of its load"
+    return dict.fromkeys(("friction", "friction_impulse"), Declared(ratios[0], band, because))
 
 
 def _second_order_fall() -> dict[str, Declared]:

@@ -33,6 +33,7 @@ from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Path = tuple[Array, Array, Array]
 #: Contacts of the engine that each contact of the figure stands for.
 SHARE = 2.0
@@ -202,7 +203,7 @@ class LeaningBoxes:
             a, (cost, gradient, hessian) = trial, new
         return a, [(push, rub) for push, rub in zip(*self._forces(rows, a), strict=True)]
 
-    def _zones(self, rows: tuple[Array, Array, Array], a: Array) -> tuple[Array, Array, Array, Array]:
+    def _zones(self, rows: tuple[Array, Array, Array], a: Array) -> tuple[Array, Array, Mask, Mask]:
         """What each contact lacks of its lift-off and slips too much (c,), and whether it sticks or slips."""
         jacobian, asked, stiff = rows
         off = jacobian @ a - asked

@@ -30,7 +30,7 @@ from adapters.mujoco.blows import blow_of, metrics_of, steps_of
 from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.contact_law import ContactLaw
 from adapters.mujoco.motions import CORNERS, along_a_heading, as_trajectory, column, fall, is_vertical
-from adapters.mujoco.pairs import contact_law, pair_solreffriction
+from adapters.mujoco.pairs import contact_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.needs import needs
 from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
@@ -221,21 +221,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
         return None
     if any(body.twist[scene.dimension - 1 :]) or any(body.force[1:-1]) or any(body.torque):
         return None
-    settings, law = settings_of(profile, scene, dt), law_of(profile, scene, dt)
-    own = pair_solreffriction(settings, dt)
-    damping = ContactLaw.of(dt, own, tuple(settings["solimp"]), 1.0).damping if any(own) else law.damping
-    half, moments = body.shape.half_extents, body.inertia
-    return BoxOnFace(
-        law,
-        settings["cone"],
-        scene.material(face.name, body.name).friction,
-        damping,
-        settings["impratio"],
-        half[0],
-        half[-1],
-        (moments[1] if isinstance(moments, tuple) else moments) / body.mass,
-        (scene.gravity[0] + body.force[0] / body.mass, scene.gravity[-1] + body.force[-1] / body.mass),
-    )
+    return BoxOnFace.of(settings_of(profile, scene, dt), scene, dt)
 
 
 def incline_law(profile: str, metric: str) -> Law:

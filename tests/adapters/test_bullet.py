@@ -17,8 +17,11 @@ from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, 
 from adapters.bullet import BulletEngine
 from adapters.bullet.contact_law import ContactLaw, fall
 from adapters.bullet.profiles import law_of
+from adapters.bullet.shipped import WARM_STARTING
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
+from adapters.probes import Case, read_slide, slide
+from adapters.receipts import receipts
 from adapters.scene import Hull
 from validation.catalogue import CATALOGUE
 
@@ -222,6 +225,60 @@ def test_pair_friction_decelerates_by_mu_g(profile):
         record = drive(scene, profile, linearDamping=0.0, angularDamping=0.0)
         measured = (3.0 - record.twist[-1, 1, 0]) / (9.81 * record.t[-1])
         assert measured == pytest.approx(mu, rel=0.01)  # fact sheet: 0.7 % from contacts switching under a fast box
+
+
+def friction_of_the_probe(e, dt, **changes):
+    """What the sliding probe sees of mu = 0.3 under `one`, as a share of it."""
+    case = Case(2, e, 0.3, dt, 0.0)
+    asked = needs(
+        planar(FLOOR_2D, Body("box", Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.6, 0.0)), e=e, mu=0.3, gravity=(0.0, -9.81))
+    )
+    settings = {s.name: s.value for s in ENGINE.settings("one", asked, dt)} | changes
+    scene = slide(case)
+    (found,) = read_slide(case, scene, run(ENGINE, scene, dt, settings, EVERY_STEP))["friction"]
+    return found / 0.3
+
+
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 960])
+def test_a_box_that_hops_within_the_slop_has_too_much_friction_where_a_step_carries_no_load(dt):
+    """From a slop of g dt^2/2 on, whatever the step: points hold friction without a load."""
+    fall = 9.81 * dt**2
+    assert friction_of_the_probe(1.0, dt, contactSlop=0.4 * fall) == pytest.approx(1.0, abs=1e-12)
+    assert 1.05 < friction_of_the_probe(1.0, dt, contactSlop=0.7 * fall) < 1.0 + WARM_STARTING
+    off = ({"warmStartingFactor": 0.0}, {"restitutionVelocityThreshold": 9.81 * dt})
+    for change in off:
+        assert friction_of_the_probe(1.0, dt, contactSlop=0.7 * fall, **change) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("e", "dt", "hops"), [(1.0, 1 / 960, True), (1.0, 1 / 480, False), (0.0, 1 / 960, False)])
+def test_friction_is_declared_wider_where_a_box_hops_within_the_slop_and_nowhere_else(e, dt, hops):
+    asked = needs(
+        planar(FLOOR_2D, Body("box", Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.6, 0.0)), e=e, mu=0.3, gravity=(0.0, -9.81))
+    )
+    declared = ENGINE.declares("one", asked, dt)["friction"]
+    assert (declared.band > 1e-2 * 0.3) == hops
+    assert declared.value - declared.band <= 0.3 <= declared.value + declared.band
+    assert not [slip for slip in receipts(ENGINE, "one", asked, dt) if not slip.holds]
+
+
+def test_what_short_plates_brake_too_much_is_the_friction_of_points_without_a_load():
+    """Step by step: the deceleration is mu g and what points at the plates' edges hold without a load."""
+    scene = CATALOGUE["seam"].scene(2, {"plate": 0.3})
+    settings = {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)}
+    record = run(ENGINE, scene, DT, settings, EVERY_STEP)
+    box, contacts = len(scene.bodies) - 1, record.contacts
+    slowed = -np.diff(record.twist[:, box, 0])
+    carried = np.diff(record.twist[:, box, 1]) + 9.81 * DT
+    rows = contacts.rows
+    held = np.zeros(len(record.t))
+    for step, a, b in zip(contacts.step, contacts.offset[:-1], contacts.offset[1:], strict=True):
+        unloaded = (rows.b[a:b] == box) & (rows.impulse[a:b, 1] < 1e-8 * 9.81 * DT)
+        held[step] = -rows.impulse[a:b][unloaded, 0].sum()
+    sliding = record.twist[1:, box, 0] > 2.0 * 0.4 * 9.81 * DT
+    excess = (slowed - 0.4 * carried)[sliding]
+    assert excess.max() > 0.005 * 9.81 * DT and (excess > 1e-4 * 9.81 * DT).sum() == 10
+    # 1e-8: what 50 sweeps leave of the loads.
+    assert np.allclose(excess, held[1:][sliding], rtol=0.0, atol=1e-8 * 9.81 * DT)
 
 
 # ---- signs, inertia, loads ---------------------------------------------------------------------------------------

@@ -17,8 +17,9 @@ pytest.importorskip("mujoco")
 from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.pairs import contact_law, pair_solreffriction
+from adapters.mujoco.spec import Spec
 from adapters.needs import needs
-from adapters.receipts import receipts
+from adapters.receipts import _probe, receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
@@ -152,6 +153,36 @@ def test_default_declares_a_rebound_that_does_not_depend_on_e() -> None:
     declared = [ENGINE.declares("default", needs(make(FLOOR, ball("b", 1.0), e=e)), DT) for e in (0.0, 0.5, 1.0)]
     assert declared[0] == declared[1] == declared[2] and "restitution" in declared[0]
     assert "restitution" not in ENGINE.declares("tuned", needs(make(FLOOR, ball("b", 1.0), e=0.5)), DT)
+
+
+@pytest.mark.parametrize(
+    ("profile", "mu", "dt", "asks"),
+    [("default", 2.0, 1 / 240, True), ("tuned", 2.0, 1 / 960, True), ("default", 0.8, 1 / 240, False)],
+)
+def test_friction_of_a_box_that_is_thrown_up_is_what_the_documented_law_makes_of_it(profile, mu, dt, asks) -> None:
+    """Above mu = 1 the probe's box lands on an edge, with less friction than mu of the load: predicted to round-off."""
+    asked = needs(make(FLOOR, cube("box", 0.5), mu=mu, g=(1.0, 0.0, -G)))
+    assert ("friction" in ENGINE.declares(profile, asked, dt)) == asks
+    (slip,) = (slip for slip in receipts(ENGINE, profile, asked, dt) if slip.quantity == "friction")
+    assert abs(slip.measured - slip.declared) < 1e-9
+    assert (slip.declared < mu * (1.0 - 1e-3)) == asks
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_another_friction_than_asked_fails_the_receipt_of_a_box_that_is_thrown_up_too(share, monkeypatch) -> None:
+    """Planted: a model with a hundredth less or more friction, which what is declared does not follow."""
+    asked = needs(make(FLOOR, cube("box", 0.5), mu=2.0, g=(1.0, 0.0, -G)))
+    pair = Spec._geom_material
+
+    def other(spec: Spec) -> dict[str, Any]:
+        found = pair(spec)
+        return found | {"friction": [share * found["friction"][0], 0.0, 0.0]}
+
+    _probe.cache_clear()
+    monkeypatch.setattr(Spec, "_geom_material", other)
+    slips = receipts(ENGINE, "default", asked, DT)
+    _probe.cache_clear()
+    assert [slip.quantity for slip in slips if not slip.holds] == ["friction", "friction_impulse"]
 
 
 # ---- rebounds -------------------------------------------------------------------------------------------------
