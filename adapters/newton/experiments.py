@@ -49,11 +49,27 @@ EXPERIMENTS += tuple(
     for family, scene, metric, params, more in (
         ("rocking-block-few-sweeps", "rocking_block", "amplitude[1]", {}, (_AHEAD,)),
         ("rocking-block-few-sweeps", "rocking_block", "landing[2]", {}, ()),
+        ("rocking-block-few-sweeps", "rocking_block", "amplitude[2]", {}, ()),
+        ("rocking-block-few-sweeps", "rocking_block", "amplitude[3]", {}, ()),
+        ("rocking-block-few-sweeps", "rocking_block", "amplitude[1]", {"aspect": 0.5, "tilt": 0.7}, ()),
+        ("rocking-block-few-sweeps", "rocking_block", "landing[3]", {"aspect": 0.5, "tilt": 0.7}, ()),
         ("rocking-block-few-sweeps", "rocking_block", "slid", {"aspect": 0.5, "tilt": 0.7}, (_WHOLE,)),
         ("conveyor-few-sweeps", "conveyor", "hop", {}, (_AHEAD,)),
         ("conveyor-few-sweeps", "conveyor", "turned", {}, ()),
     )
 )
+_SWEPT_TWENTY = "where twenty sweeps leave little of an overlap it passes; a hundred leave it trembling in singles"
+EXPERIMENTS += tuple(
+    Experiment(
+        "starved-few-sweeps", _SWEPT_TWENTY, profile, "starved", metric, {"iterations": 20}, {}, iterations=sweeps,
+        idle=(_SLIPS_ALONE, _AHEAD),
+    )
+    for profile, metric, sweeps in (
+        ("default", "penetration", None), ("default", "kinetic_energy", None), ("default", "penetration", 1),
+        ("default", "kinetic_energy", 1), ("default", "penetration", 4), ("tuned", "penetration", 1),
+        ("tuned", "kinetic_energy", 1), ("tuned", "penetration", 4),
+    )
+)  # fmt: skip
 _GENTLY = "where each contact gives a body all that it asks for, gently and in many sweeps, it passes"
 EXPERIMENTS += tuple(
     Experiment(
