@@ -8,7 +8,7 @@ import pytest
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Sphere
 from reference_solver.compilation import from_python
 from reference_solver.needs import EVERYTHING
-from reference_solver.spatial.meeting import allocate_meeting
+from reference_solver.spatial.meeting import allocate_meeting, spin_on
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.separation import separation as separation_and_normal
 from reference_solver.spatial.state import allocate_bodies
@@ -102,6 +102,26 @@ def test_the_first_contact_with_a_wall_is_found_however_fast_a_body_turns(name, 
         assert abs(gap(np.array([t]))[0]) <= TOUCHING
         assert len(through) == 0 or t <= times[through[0]]
     assert met >= 4
+
+
+@pytest.mark.parametrize("size", [1e-6, 9e-3, 1.1e-2, 0.5, 3.0])
+def test_the_spin_of_a_turn_is_the_integral_that_it_is_said_to_be(size):
+    """exp(u psi) psi' over u by Gauss's rule, which is exact to round-off here; by its series below 1e-2 rad."""
+    random, at = np.random.default_rng(int(1e6 * size)), from_python(spin_on)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    for _ in range(5):
+        psi, rate = size * unit(random, 3), unit(random, 3)
+        path = np.zeros((6, 1))
+        path[3:, 0] = rate
+        ball = Body(Sphere(0.5), 1.0, (1.0,) * 3, (0.0, 0.0, 0.0, *STANDING))
+        meeting = meeting_of([ball], [path])
+        meeting.paths.coefficient[0, 3:, 0] = psi  # the turn so far
+        turn, spin = at(meeting.paths, 0, 0.0)
+        assert turn == pytest.approx(tuple(psi), rel=1e-15)
+        whole = 0.5 * sum(
+            w * rotation(0.5 * (u + 1.0) * psi[None])[0] @ rate for u, w in zip(nodes, weights, strict=True)
+        )
+        assert np.abs(np.array(spin) - whole).max() <= 4e-15  # some units in the last place of a rate of 1
 
 
 def test_the_direction_that_separates_two_boxes_is_a_unit_vector_along_which_their_corners_keep_the_gap():
