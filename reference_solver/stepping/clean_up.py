@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.stepping.equalities import assemble, list_rows, push, solve_rows
+from reference_solver.stepping.equalities import list_rows, push, solve_rows
 from reference_solver.stepping.lasting import BODIES, CONTACTS, SLIP, STAGES, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.operations import Bodies, displace, displacement_rate, evaluate, is_free
@@ -137,8 +137,7 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
         count += 1
     if count == 0:
         return True
-    assemble(lasting, count, False)
-    solve_rows(lasting, count, 0.0)
+    solve_rows(lasting, count, False, 0.0)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             lasting.acceleration[i, d] = 0.0

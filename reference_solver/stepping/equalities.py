@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import (
     BODIES,
     CONTACTS,
@@ -71,14 +72,14 @@ def effect(lasting: Lasting, sliding: bool, k: int, side: int, row: int, d: int)
 
 
 @inner_kernel
-def assemble(lasting: Lasting, count: int, sliding: bool) -> None:
-    """Fill the matrix of the equalities; ``sliding``: with the friction of slips.
+def assemble(lasting: Lasting, first: int, last: int, sliding: bool) -> None:
+    """Fill the matrix of the equalities from ``first`` to before ``last``; ``sliding``: with the friction of slips.
 
     Most contacts share no body: whether two do is asked before anything is multiplied.
     """
-    for j in range(count):
+    for j in range(first, last):
         kj, rj = lasting.unknown[j, 0], lasting.unknown[j, 1]
-        for i in range(count):
+        for i in range(first, last):
             lasting.matrix[i, j] = 0.0
         for side in range(2):
             body = lasting.body[kj, side]
@@ -88,7 +89,7 @@ def assemble(lasting: Lasting, count: int, sliding: bool) -> None:
                 moves = moves or lasting.change[d] != 0.0
             if not moves:
                 continue
-            for i in range(count):
+            for i in range(first, last):
                 ki = lasting.unknown[i, 0]
                 if lasting.body[ki, 0] == body or lasting.body[ki, 1] == body:
                     ri = lasting.unknown[i, 1]
@@ -120,10 +121,10 @@ def row_scale(lasting: Lasting, i: int) -> float:
 
 
 @inner_kernel
-def list_entries(matrix: Array, i: int, first: int, count: int, filled: Indices) -> int:
-    """List the columns from ``first`` on in which row i is not zero, in order; how many there are."""
+def list_entries(matrix: Array, i: int, first: int, last: int, filled: Indices) -> int:
+    """List the columns from ``first`` to before ``last`` in which row i is not zero, in order; how many there are."""
     entries = 0
-    for c in range(first, count):
+    for c in range(first, last):
         if matrix[i, c] != 0.0:
             filled[entries] = c
             entries += 1
@@ -131,24 +132,24 @@ def list_entries(matrix: Array, i: int, first: int, count: int, filled: Indices)
 
 
 @inner_kernel
-def eliminate(lasting: Lasting, count: int) -> bool:
-    """Solve for `answer` by elimination with row interchanges; False where a pivot is round-off.
+def eliminate(lasting: Lasting, first: int, last: int) -> bool:
+    """Solve for `answer` from ``first`` to before ``last``, with row interchanges; False where a pivot is round-off.
 
     Pivots are compared as entries over the roots of both rows' scales, squared: no root is taken, so that units of
     powers of two change no bit.
     """
     factor, x, scale, filled = lasting.factor, lasting.answer, lasting.spare, lasting.filled
-    for i in range(count):
+    for i in range(first, last):
         scale[i] = lasting.other[i] = row_scale(lasting, i)
         if scale[i] == 0.0:
             return False
-        for j in range(count):
+        for j in range(first, last):
             factor[i, j] = lasting.matrix[i, j]
         x[i] = lasting.right[i]
     least = 1.0
-    for j in range(count):
+    for j in range(first, last):
         best = j
-        for i in range(j + 1, count):
+        for i in range(j + 1, last):
             if factor[i, j] ** 2 * scale[best] > factor[best, j] ** 2 * scale[i]:
                 best = i
         pivot = factor[best, j] ** 2 / (scale[best] * lasting.other[j])
@@ -156,20 +157,20 @@ def eliminate(lasting: Lasting, count: int) -> bool:
             return False
         least = min(least, pivot)
         if best != j:
-            for c in range(count):
+            for c in range(first, last):
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
             x[j], x[best] = x[best], x[j]
             scale[j], scale[best] = scale[best], scale[j]
-        entries = list_entries(factor, j, j + 1, count, filled)
-        for i in range(j + 1, count):
+        entries = list_entries(factor, j, j + 1, last, filled)
+        for i in range(j + 1, last):
             if factor[i, j] != 0.0:
                 share = factor[i, j] / factor[j, j]
                 for e in range(entries):
                     factor[i, filled[e]] -= share * factor[j, filled[e]]
                 x[i] -= share * x[j]
-    for j in range(count - 1, -1, -1):
+    for j in range(last - 1, first - 1, -1):
         left = x[j]
-        for c in range(j + 1, count):
+        for c in range(j + 1, last):
             left -= factor[j, c] * x[c]
         x[j] = left / factor[j, j]
     return True
@@ -183,7 +184,7 @@ def force_weight(lasting: Lasting, i: int) -> float:
 
 
 @inner_kernel
-def least_change(lasting: Lasting, count: int, told: float) -> int:
+def least_change(lasting: Lasting, first: int, last: int, told: float) -> int:
     """Solve redundant rows for the `answer` nearest to ``told`` times the usual forces; how well they agree.
 
     With the matrix A and the weights W, squared, the change is W A^T y of the solution of A W A^T y = r: Cholesky's
@@ -192,129 +193,184 @@ def least_change(lasting: Lasting, count: int, told: float) -> int:
     """
     x, y, order, filled = lasting.answer, lasting.spare, lasting.order, lasting.filled
     largest = 0.0
-    for j in range(count):
+    for j in range(first, last):
         largest = max(largest, force_weight(lasting, j) * row_scale(lasting, j))
-    for j in range(count):
+    for j in range(first, last):
         scale = row_scale(lasting, j)
         weight = max(force_weight(lasting, j) * scale, LIGHT**2 * largest) if largest > 0.0 else 1.0
         lasting.weight[j] = weight / scale
         x[j] = told * lasting.usual[lasting.unknown[j, 0], lasting.unknown[j, 1]]
         order[j] = j
-    for i in range(count):
-        square_row(lasting, i, list_entries(lasting.matrix, i, 0, count, filled))
-    rank = decompose(lasting, count)
+    for i in range(first, last):
+        square_row(lasting, first, i, list_entries(lasting.matrix, i, first, last, filled))
+    rank = decompose(lasting, first, last)
     miss = 0.0
     for _ in range(CORRECTIONS):
-        for i in range(count):
+        for i in range(first, last):
             left = lasting.right[i]
-            for c in range(count):
+            for c in range(first, last):
                 left -= lasting.matrix[i, c] * x[c]
             y[i] = left
         miss = 0.0
-        for i in range(count):
+        for i in range(first, last):
             size = abs(lasting.right[i]) + lasting.scale[lasting.unknown[i, 0]]
             miss = max(miss, abs(y[i]) / size if size > 0.0 else 0.0)
-        substitute(lasting, count, rank)
+        substitute(lasting, first, last, rank)
         change = lasting.other
-        for c in range(count):
+        for c in range(first, last):
             change[c] = 0.0
-        for i in range(count):
-            for c in range(count):
+        for i in range(first, last):
+            for c in range(first, last):
                 change[c] += lasting.matrix[i, c] * y[i]
-        for c in range(count):
+        for c in range(first, last):
             x[c] += lasting.weight[c] * change[c]
     return REDUNDANT if miss <= CONSISTENT else CONTRADICTORY
 
 
 @inner_kernel
-def square_row(lasting: Lasting, i: int, entries: int) -> None:
-    """Row i of A W A^T up to its diagonal, into `factor`; ``entries`` of A's row are listed.
+def square_row(lasting: Lasting, first: int, i: int, entries: int) -> None:
+    """Row i of A W A^T from ``first`` up to its diagonal, into `factor`; ``entries`` of A's row are listed.
 
     Four sums at a time: a processor does not wait for one to be added before it begins the next.
     """
     matrix, factor, weighed, filled = lasting.matrix, lasting.factor, lasting.other, lasting.filled
     for e in range(entries):
         weighed[e] = matrix[i, filled[e]] * lasting.weight[filled[e]]
-    for first in range(0, i + 1, 4):
-        j, k, m = min(first + 1, i), min(first + 2, i), min(first + 3, i)
+    for at_once in range(first, i + 1, 4):
+        j, k, m = min(at_once + 1, i), min(at_once + 2, i), min(at_once + 3, i)
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for e in range(entries):
             at = filled[e]
-            a += weighed[e] * matrix[first, at]
+            a += weighed[e] * matrix[at_once, at]
             b += weighed[e] * matrix[j, at]
             c += weighed[e] * matrix[k, at]
             d += weighed[e] * matrix[m, at]
-        factor[i, first], factor[i, j], factor[i, k], factor[i, m] = a, b, c, d
+        factor[i, at_once], factor[i, j], factor[i, k], factor[i, m] = a, b, c, d
 
 
 @inner_kernel
-def decompose(lasting: Lasting, count: int) -> int:
-    """Factors L D L^T of the lower half of `factor` with interchanges noted in `order`, in place; its rank."""
+def decompose(lasting: Lasting, first: int, last: int) -> int:
+    """Factors L D L^T of the lower half of `factor`, in place; up to which row they go: others are redundant.
+
+    Interchanges are noted in `order`.
+    """
     factor, column = lasting.factor, lasting.other
-    first = 0.0
-    for j in range(count):
+    most = 0.0
+    for j in range(first, last):
         best = j
-        for i in range(j, count):
+        for i in range(j, last):
             if factor[i, i] > factor[best, best]:
                 best = i
         pivot = factor[best, best]
-        if j == 0:
-            first = pivot
-        if not pivot > RANK_SQUARED * first:
+        if j == first:
+            most = pivot
+        if not pivot > RANK_SQUARED * most:
             return j
         if best != j:
-            interchange(lasting, count, j, best)
-        for i in range(j + 1, count):
+            interchange(lasting, first, last, j, best)
+        for i in range(j + 1, last):
             factor[i, j] /= pivot
             column[i] = factor[i, j]
-        for i in range(j + 1, count):
+        for i in range(j + 1, last):
             if column[i] != 0.0:
                 share = column[i] * pivot
                 for c in range(j + 1, i + 1):
                     factor[i, c] -= share * column[c]
-    return count
+    return last
 
 
 @inner_kernel
-def interchange(lasting: Lasting, count: int, j: int, best: int) -> None:
+def interchange(lasting: Lasting, first: int, last: int, j: int, best: int) -> None:
     """Put row and column ``best`` of a symmetric matrix, whose lower half `factor` has, before those from j on."""
     factor, order = lasting.factor, lasting.order
     order[j], order[best] = order[best], order[j]
     factor[j, j], factor[best, best] = factor[best, best], factor[j, j]
-    for c in range(j):
+    for c in range(first, j):
         factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
     for c in range(j + 1, best):
         factor[c, j], factor[best, c] = factor[best, c], factor[c, j]
-    for c in range(best + 1, count):
+    for c in range(best + 1, last):
         factor[c, j], factor[c, best] = factor[c, best], factor[c, j]
 
 
 @inner_kernel
-def substitute(lasting: Lasting, count: int, rank: int) -> None:
-    """Solution of the decomposed system for the right side `spare`, in place; zero for what is redundant."""
+def substitute(lasting: Lasting, first: int, last: int, rank: int) -> None:
+    """Solution of the decomposed system for the right side `spare`, in place; zero from row ``rank`` on."""
     factor, y, order, z = lasting.factor, lasting.spare, lasting.order, lasting.other
-    for i in range(rank):
+    for i in range(first, rank):
         left = y[order[i]]
-        for c in range(i):
+        for c in range(first, i):
             left -= factor[i, c] * z[c]
         z[i] = left
-    for i in range(rank - 1, -1, -1):
+    for i in range(rank - 1, first - 1, -1):
         left = z[i] / factor[i, i]
         for c in range(i + 1, rank):
             left -= factor[c, i] * z[c]
         z[i] = left
-    for i in range(count):
+    for i in range(first, last):
         y[i] = 0.0
-    for i in range(rank):
+    for i in range(first, rank):
         y[order[i]] = z[i]
 
 
 @inner_kernel
-def solve_rows(lasting: Lasting, count: int, told: float) -> int:
-    """Solve matrix answer = right, near ``told`` times the usual forces where there is a choice; what rows are."""
-    if eliminate(lasting, count):
-        return INDEPENDENT
-    return least_change(lasting, count, told)
+def solve_rows(lasting: Lasting, count: int, sliding: bool, told: float) -> int:
+    """Solve the equalities, near ``told`` times the usual forces where there is a choice; what rows are.
+
+    Clusters of contacts that share no body that moves are solved one after the other, and `unknown` and `right` are
+    put into that order: their cost goes with the cube of a cluster, and what is redundant in one is so there alone.
+    """
+    join_bodies(lasting)
+    found, last = INDEPENDENT, 0
+    while last < count:
+        first, last = last, gather_cluster(lasting, last, count)
+        assemble(lasting, first, last, sliding)
+        if not eliminate(lasting, first, last):
+            found = max(found, least_change(lasting, first, last, told))
+    return found
+
+
+@inner_kernel
+def moves(lasting: Lasting, k: int, side: int) -> bool:
+    """Whether forces move a body of contact k; one of both they do."""
+    for d in range(lasting.size[VELOCITIES]):
+        if lasting.response[k, side, 0, d] != 0.0:
+            return True
+    return False
+
+
+@inner_kernel
+def cluster_of(lasting: Lasting, k: int) -> int:
+    """Label of the cluster that contact k belongs to."""
+    return int(first_of(lasting.label, lasting.body[k, 0 if moves(lasting, k, 0) else 1]))
+
+
+@inner_kernel
+def join_bodies(lasting: Lasting) -> None:
+    """Label bodies that contacts hold together alike."""
+    label = lasting.label
+    for i in range(lasting.size[BODIES]):
+        label[i] = i
+    for k in range(lasting.size[CONTACTS]):
+        if lasting.mode[k] != OPEN and moves(lasting, k, 0) and moves(lasting, k, 1):
+            a, b = first_of(label, lasting.body[k, 0]), first_of(label, lasting.body[k, 1])
+            label[max(a, b)] = min(a, b)
+
+
+@inner_kernel
+def gather_cluster(lasting: Lasting, first: int, count: int) -> int:
+    """Put equalities of the cluster of number ``first`` before those of others, in their order; where it ends."""
+    unknown, right, last = lasting.unknown, lasting.right, first
+    cluster = cluster_of(lasting, unknown[first, 0])
+    for i in range(first, count):
+        k, row, value = unknown[i, 0], unknown[i, 1], right[i]
+        if cluster_of(lasting, k) != cluster:
+            continue
+        for j in range(i, last, -1):
+            unknown[j, 0], unknown[j, 1], right[j] = unknown[j - 1, 0], unknown[j - 1, 1], right[j - 1]
+        unknown[last, 0], unknown[last, 1], right[last] = k, row, value
+        last += 1
+    return last
 
 
 @inner_kernel
@@ -335,11 +391,10 @@ def force_contacts(lasting: Lasting) -> int:
         return CONTRADICTORY
     found = INDEPENDENT
     if count > 0:
-        assemble(lasting, count, True)
         for i in range(count):
             k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
             lasting.right[i] = -(row_value(lasting, k, row, lasting.free) + lasting.gamma[k, row])
-        found = solve_rows(lasting, count, 1.0)
+        found = solve_rows(lasting, count, True, 1.0)
     for k in range(lasting.size[CONTACTS]):
         for row in range(1 + lasting.size[TANGENTS]):
             lasting.force[k, row] = 0.0

@@ -88,6 +88,7 @@ class Lasting(NamedTuple):
     order: Indices  # (R,)
     filled: Indices  # (R,): columns of a row that are not zero
     change: Array  # (V,): of the velocities of a body by a unit of force
+    label: Indices  # (n,): lowest body of the cluster that contacts hold together
     unknown: Indices  # (R, 2): contact and row (0 normal, 1.. tangents) of each equality
     monitor: Array  # (PLACES_WATCHED, k, FEATURE + LIMITS): what must not fall below zero while modes are held
     length: Array  # (1,): of the step being made [s]
@@ -149,6 +150,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         order=np.zeros(r, np.int64),
         filled=np.zeros(r, np.int64),
         change=np.zeros(v),
+        label=np.zeros(n, np.int64),
         unknown=np.zeros((r, 2), np.int64),
         monitor=np.zeros((PLACES_WATCHED, k, FEATURE + LIMITS[dimension])),
         length=np.zeros(1),

@@ -13,6 +13,10 @@ from reference_solver.structures import structure
 
 #: Coefficients of a polynomial of degree five.
 COEFFICIENTS = 6
+#: Factors of derivatives by order and power: j (j - 1) .. of as many terms as the order has.
+FALLING = np.array(
+    [[math.prod(range(j - m + 1, j + 1)) for j in range(COEFFICIENTS)] for m in range(COEFFICIENTS)], float
+)
 #: By how much bounds are widened: they are sums of at most a dozen rounded terms.
 ROUNDED_UP = 1.0 + 1e-14
 
@@ -45,23 +49,31 @@ def derivative(paths: Paths, i: int, k: int, order: int, t: float) -> float:
     s = t - paths.begin[i]
     value = 0.0
     for j in range(COEFFICIENTS - 1, order - 1, -1):
-        factor = 1.0
-        for m in range(order):
-            factor *= j - m
-        value = value * s + factor * paths.coefficient[i, k, j]
+        value = value * s + FALLING[order, j] * paths.coefficient[i, k, j]
     return value
+
+
+@inner_kernel
+def degree(paths: Paths, i: int, first: int, last: int) -> int:
+    """Highest power of the time in displacements ``first`` to before ``last`` of body i."""
+    for j in range(COEFFICIENTS - 1, 0, -1):
+        for k in range(first, last):
+            if paths.coefficient[i, k, j] != 0.0:
+                return j
+    return 0
 
 
 @inner_kernel
 def derivative_bound(paths: Paths, i: int, turning: bool, order: int, t: float, later: float) -> float:
     """Bound of the length of a derivative of the displacement, or of the turn, of body i over [t, later].
 
-    Taylor's series about t ends with the fifth derivative: ``|p^(m)(t + s)| <= sum_j |p^(m+j)(t)| s^j / j!``.
+    Taylor's series about t ends with the fifth derivative: ``|p^(m)(t + s)| <= sum_j |p^(m+j)(t)| s^j / j!``, or
+    with the highest power that the displacement has.
     """
     axes = paths.coefficient.shape[1] // 2 + (0 if turning else paths.coefficient.shape[1] % 2)
     first = paths.coefficient.shape[1] - axes if turning else 0
     bound, factor = 0.0, 1.0
-    for j in range(COEFFICIENTS - order):
+    for j in range(degree(paths, i, first, first + axes) + 1 - order):
         square = 0.0
         for k in range(first, first + axes):
             square += derivative(paths, i, k, order + j, t) ** 2

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.stepping.clean_up import clean_up, give
@@ -50,17 +52,19 @@ from reference_solver.stepping.turning_slips import follow_slip, steady_slip, st
 #: Times of the stages, as shares of the step.
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 #: Row by row: weights of the slopes of earlier stages; the last row is the step itself.
-COUPLINGS = (
-    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
-    (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
-    (44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0),
-    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0),
-    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0),
-    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+COUPLINGS = np.array(
+    (
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
+        (44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0),
+        (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0),
+        (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0),
+        (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+    )
 )
 #: Fifth order less embedded fourth order.
-ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+ERRORS = np.array((71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40))
 
 #: Share of the translations that rotations are measured against at least, and the other way round.
 NEXT_TO_NOTHING = 1e-4
@@ -174,8 +178,8 @@ def go_to_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
         for d in range(lasting.size[VELOCITIES]):
             way, gain = 0.0, 0.0
             for s in range(stage):
-                way += COUPLINGS[stage][s] * lasting.rate[s, i, d]
-                gain += COUPLINGS[stage][s] * lasting.slope[s, i, d]
+                way += COUPLINGS[stage, s] * lasting.rate[s, i, d]
+                gain += COUPLINGS[stage, s] * lasting.slope[s, i, d]
             lasting.displacement[i, d] = length * way
             bodies.twist[i, d] = lasting.before[i, d] + length * gain
             moves = moves or way != 0.0
@@ -227,7 +231,7 @@ def weigh_stage(bodies: Bodies, lasting: Lasting, stage: int, length: float) -> 
     if stage == 0:
         go_back(bodies, lasting)
         evaluate_forces(bodies, lasting)
-    weight = length * COUPLINGS[STAGES - 1][stage]
+    weight = length * COUPLINGS[STAGES - 1, stage]
     for k in range(lasting.size[CONTACTS]):
         for row in range(1 + lasting.size[TANGENTS]):
             give(bodies, lasting, k, row, weight * lasting.force[k, row])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.stepping.equalities import assemble, effect, list_rows, row_value, solve_rows
+from reference_solver.stepping.equalities import effect, list_rows, row_value, solve_rows
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 
@@ -137,8 +137,7 @@ def without_friction(lasting: Lasting, k: int) -> None:
         lasting.right[kept] = -removed(lasting, k, other, row)
         kept += 1
     if kept > 0:
-        assemble(lasting, kept, True)
-        solve_rows(lasting, kept, 0.0)
+        solve_rows(lasting, kept, True, 0.0)
     for t in range(lasting.size[TANGENTS]):
         total = slip_gain(lasting, k, t) + removed(lasting, k, k, 1 + t)
         for i in range(kept):

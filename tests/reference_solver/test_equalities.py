@@ -5,7 +5,7 @@ import pytest
 
 from reference_solver.compilation import from_python
 from reference_solver.stepping import equalities
-from reference_solver.stepping.equalities import CONTRADICTORY, REDUNDANT
+from reference_solver.stepping.equalities import CONTRADICTORY, INDEPENDENT, REDUNDANT
 from reference_solver.stepping.lasting import CONTACTS, OPEN, SLIP, STICK, allocate_lasting
 
 assemble, eliminate, force_contacts, list_rows, solve_rows = (
@@ -72,12 +72,12 @@ def test_matrix_and_solution_are_those_of_dense_algebra(dimension, seed):
     count = list_rows(lasting)
     assert count == sum({OPEN: 0, SLIP: 1, STICK: dimension}[mode] for mode in lasting.mode)
     lasting.matrix[:] = 7.0  # of the phase before
-    assemble(lasting, count, True)
+    assemble(lasting, 0, count, True)
     expected = dense(lasting, count)
     assert np.allclose(lasting.matrix[:count, :count], expected, rtol=0.0, atol=1e-14 * np.abs(expected).max())
     assert (expected == 0.0).sum() > 0.3 * expected.size  # or nothing that is left out would be noticed
     lasting.right[:count] = rng.normal(size=count)
-    assert eliminate(lasting, count)
+    assert eliminate(lasting, 0, count)
     solution = np.linalg.solve(expected, lasting.right[:count])
     # round-off of either, magnified by the condition at most
     limit = 1e-15 * count * np.linalg.cond(expected) * np.abs(solution).max()
@@ -95,20 +95,40 @@ def test_redundant_rows_get_the_forces_nearest_to_the_usual_ones(dimension, seed
         lasting.body[twin] = lasting.body[of]
         lasting.jacobian[twin], lasting.response[twin] = lasting.jacobian[of], lasting.response[of]
     count = list_rows(lasting)
-    assemble(lasting, count, False)
-    matrix = lasting.matrix[:count, :count].copy()
-    lasting.right[:count] = matrix @ rng.normal(size=count)
-    assert solve_rows(lasting, count, told) == REDUNDANT
+    right = dense(lasting, count) @ rng.normal(size=count)
+    lasting.right[:count] = right
+    assert solve_rows(lasting, count, False, told) == REDUNDANT
+    matrix, right = dense(lasting, count), lasting.right[:count].copy()  # in the order of clusters by now
     usual = told * np.array([lasting.usual[tuple(unknown)] for unknown in lasting.unknown[:count]])
     carried = [(lasting.usual[k, 0], lasting.friction[k] if row else 1.0) for k, row in lasting.unknown[:count]]
     weight = np.abs(carried).prod(axis=1)
     root = np.sqrt(weight)
-    change = root * (np.linalg.pinv(matrix * root, rcond=1e-9) @ (lasting.right[:count] - matrix @ usual))
+    change = root * (np.linalg.pinv(matrix * root, rcond=1e-9) @ (right - matrix @ usual))
     sizes = np.linalg.svd(matrix * root, compute_uv=False)
     sizes = sizes[sizes > 1e-9 * sizes[0]]  # others are round-off: conditions here are below 1e4
     # round-off of either, magnified by the condition: corrections gain back what squaring the matrix costs
     limit = 1e-15 * count * sizes[0] / sizes[-1] * np.abs(usual + change).max()
     assert np.abs(lasting.answer[:count] - usual - change).max() <= limit
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_one_cluster_says_twice_changes_no_bit_of_another(dimension):
+    """Two pairs of bodies, each on the ground: the second pair's forces are what they are without the first pair."""
+    lasting, rng = drawn(dimension, 1)
+    lasting.mode[:] = OPEN
+    lasting.mode[[0, 1, 2, 3, 4]] = STICK
+    for k, pair in enumerate([(1, 2), (3, 4), (0, 1), (0, 3), (1, 2)]):
+        lasting.body[k] = pair
+        free = np.array([body != 0 for body in pair], float)
+        lasting.response[k] = lasting.jacobian[k] * free[:, None, None]
+    lasting.jacobian[4], lasting.response[4] = lasting.jacobian[0], lasting.response[0]
+    lasting.gamma[:] = rng.normal(size=lasting.gamma.shape)
+    lasting.gamma[4] = lasting.gamma[0]
+    assert force_contacts(lasting) == REDUNDANT
+    together = lasting.force[[1, 3]].copy()
+    lasting.mode[[0, 2, 4]] = OPEN
+    assert force_contacts(lasting) == INDEPENDENT
+    assert (lasting.force[[1, 3]] == together).all() and (together != 0.0).all()
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -121,11 +141,12 @@ def test_rows_that_say_otherwise_of_the_same_contradict_each_other(dimension):
         lasting.response[0],
     )
     count = list_rows(lasting)
-    assemble(lasting, count, False)
     lasting.right[:count] = 1.0
-    assert solve_rows(lasting, count, 1.0) == REDUNDANT
+    assert solve_rows(lasting, count, False, 1.0) == REDUNDANT
+    count = list_rows(lasting)
+    lasting.right[:count] = 1.0
     lasting.right[3 * dimension] = 2.0
-    assert solve_rows(lasting, count, 1.0) == CONTRADICTORY
+    assert solve_rows(lasting, count, False, 1.0) == CONTRADICTORY
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -140,8 +161,7 @@ def test_forces_that_hold_what_is_held_stay_what_they_are(dimension, seed):
     lasting.gamma[:] = rng.normal(size=lasting.gamma.shape)
     lasting.gamma[[3, 7]] = lasting.gamma[[0, 2]]
     count = list_rows(lasting)
-    assemble(lasting, count, False)
-    matrix, held = lasting.matrix[:count, :count].copy(), [tuple(unknown) for unknown in lasting.unknown[:count]]
+    matrix, held = dense(lasting, count), [tuple(unknown) for unknown in lasting.unknown[:count]]
     needed = np.linalg.pinv(matrix, rcond=1e-9) @ -np.array([lasting.gamma[row] for row in held])
     for size, row in zip(needed, held, strict=True):
         lasting.usual[row] = size

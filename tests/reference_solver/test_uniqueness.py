@@ -59,3 +59,13 @@ def test_separate_round_bodies_and_smooth_boxes_have_one_answer(dimension, profi
 def test_a_box_on_several_rough_points_is_not_proven(dimension):
     found = certificate(dimension, [box(dimension, 0.0)], 0.4, Settings.reference)
     assert found["unique"] == 0 < found["solves"]
+
+
+@pytest.mark.parametrize("profile", [Settings.fixed_step, Settings.reference])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_ball_in_a_rough_corner_is_not_proven_in_a_smooth_one_it_is(dimension, profile):
+    """It is body B of both contacts: friction of one presses it into the other."""
+    wall = Body(HalfSpace((-1.0,) + (0.0,) * (dimension - 1), -0.5), motion="fixed", pose=floor(dimension).pose)
+    for friction, share in ((0.4, 0.0), (0.0, 1.0)):
+        found = certificate(dimension, [wall, round_body(dimension, 0.0)], friction, profile)
+        assert found["unique"] == share * found["solves"] and found["solves"] > 0

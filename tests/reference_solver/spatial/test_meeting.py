@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Sphere
+from reference_solver.compilation import from_python
 from reference_solver.needs import EVERYTHING
-from reference_solver.spatial.meeting import allocate_meeting
+from reference_solver.spatial.meeting import allocate_meeting, spin_on
 from reference_solver.spatial.motion import initialise
+from reference_solver.spatial.separation import separation as separation_and_normal
 from reference_solver.spatial.state import allocate_bodies
 from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
 
@@ -100,6 +102,46 @@ def test_the_first_contact_with_a_wall_is_found_however_fast_a_body_turns(name, 
         assert abs(gap(np.array([t]))[0]) <= TOUCHING
         assert len(through) == 0 or t <= times[through[0]]
     assert met >= 4
+
+
+@pytest.mark.parametrize("size", [1e-6, 9e-3, 1.1e-2, 0.5, 3.0])
+def test_the_spin_of_a_turn_is_the_integral_that_it_is_said_to_be(size):
+    """exp(u psi) psi' over u by Gauss's rule, which is exact to round-off here; by its series below 1e-2 rad."""
+    random, at = np.random.default_rng(int(1e6 * size)), from_python(spin_on)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    for _ in range(5):
+        psi, rate = size * unit(random, 3), unit(random, 3)
+        path = np.zeros((6, 1))
+        path[3:, 0] = rate
+        ball = Body(Sphere(0.5), 1.0, (1.0,) * 3, (0.0, 0.0, 0.0, *STANDING))
+        meeting = meeting_of([ball], [path])
+        meeting.paths.coefficient[0, 3:, 0] = psi  # the turn so far
+        turn, spin = at(meeting.paths, 0, 0.0)
+        assert turn == pytest.approx(tuple(psi), rel=1e-15)
+        whole = 0.5 * sum(
+            w * rotation(0.5 * (u + 1.0) * psi[None])[0] @ rate for u, w in zip(nodes, weights, strict=True)
+        )
+        assert np.abs(np.array(spin) - whole).max() <= 4e-15  # some units in the last place of a rate of 1
+
+
+def test_the_direction_that_separates_two_boxes_is_a_unit_vector_along_which_their_corners_keep_the_gap():
+    """Either box may be the first, so that half of the normals of faces are turned round."""
+    measured, random, parted = from_python(separation_and_normal), np.random.default_rng(3), 0
+    for _ in range(60):
+        shapes = [Box(tuple(random.uniform(0.1, 1.0, 3))) for _ in range(2)]
+        poses = [(*random.uniform(-1.5, 1.5, 3), *unit(random, 4)) for _ in range(2)]
+        bodies = [Body(shape, 1.0, (1.0,) * 3, pose) for shape, pose in zip(shapes, poses, strict=True)]
+        state = allocate_bodies(Model(3, bodies, (0.0,) * 3, 0.0, 0.0), EVERYTHING)
+        initialise(state)
+        gap, normal = measured(state, 0, 1)
+        assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-15 * 4)
+        first, second = (
+            (np.array(pose[:3]) + corners_of(shape)[0] @ matrix(pose[3:]).T) @ np.array(normal)
+            for shape, pose in zip(shapes, poses, strict=True)
+        )
+        assert second.min() - first.max() == pytest.approx(gap, abs=TOUCHING)
+        parted += gap > 0.0
+    assert 20 <= parted <= 58  # both are met
 
 
 @pytest.mark.parametrize("turn", [4.0, 20.0])
