@@ -7,8 +7,8 @@
           +------ x                +------ x  is a right-handed turn about -Y.
 
 Inertia is stated, not derived from the 3-D shape: a disc becomes a sphere that keeps the disc's own moment.
-What leaves the plane afterwards is measured (`Trajectory.out_of_plane`) and kept with the observation; no check judges
-it yet, so that a planar scene can pass on an engine that tips bodies out of its plane.
+What leaves the plane afterwards is measured (`Trajectory.out_of_plane`), kept with the observation and its rows, and
+told below every matrix; no check judges it, so that a planar scene can pass on an engine that tips bodies out of it.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pandas as pd
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from reports.findings import ALARMING, finding_line, grouped
-from reports.matrix import legend, matrix_of, unranked, versions_of
+from reports.matrix import leaving, legend, matrix_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, rows_of
 from validation.questions.nulls import null_rows, with_skill
@@ -96,7 +96,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
         fields = [matrix.fields.get((line, column)) for column in matrix.columns]
         out.append(f"| {markdown(line[0])} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
     out += ["", legend().replace("|", "\\|"), ""]
-    out += [f"{markdown(line)}\n" for line in unranked(matrix.columns)]
+    out += [f"{markdown(line)}\n" for line in (*unranked(matrix.columns), *leaving(rows))]
     for mark, group in grouped(rows):
         out.append(f"**{LABELS[mark]}**: {plural(len(group), 'row')}")
         if mark in ALARMING:

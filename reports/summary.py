@@ -21,7 +21,7 @@ from rich.text import Text
 from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
-from reports.matrix import ROOMY, legend, matrix_of, sweeps_of, tables_of, unranked, versions_of
+from reports.matrix import ROOMY, leaving, legend, matrix_of, sweeps_of, tables_of, unranked, versions_of
 from reports.wording import plural
 
 Plain = Mapping[str, Any]
@@ -49,7 +49,7 @@ def show(
         console.print(table)
     if any(row["outcome"] not in REFUSED for row in rows):
         console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
-    for line in (*sweeps_of(matrix), *unranked(matrix.columns)):
+    for line in (*sweeps_of(matrix), *unranked(matrix.columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
@@ -65,7 +65,7 @@ def _show_families(
     """The same by family of scenes."""
     console.print(table)
     console.print(_folded(overview.legend(overview.by_family(rows, families)), console, ""), style="dim")
-    for line in unranked(matrix_of(rows).columns):
+    for line in (*unranked(matrix_of(rows).columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
     console.print(_folded(ran, console, ""), style="dim")

@@ -20,7 +20,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, how_measured, pasteable, told_cures
 from reports.findings import ALARMING, Family, families, grouped, severity
-from reports.matrix import matrix_of
+from reports.matrix import OUTSIDE, matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
 from reports.wording import (
@@ -318,6 +318,9 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("skill", skill_text(row)),
         ("standing", row["reason"] or "-"),
     ]
+    if row.get("out_of_plane", 0.0) > OUTSIDE:
+        text = f"{number(row['out_of_plane'], 3)} (m, rad, or either per second) at most: all else is seen in the plane"
+        lines.append(("off plane", text))
     if better:
         lines.append(("cure", f"profile {better} passes this row. It differs in:"))
         lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing]

@@ -21,7 +21,7 @@ import jinja2
 from markupsafe import Markup
 
 from reports.answers import Answer, answers
-from reports.matrix import unranked
+from reports.matrix import leaving, unranked
 from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.families import families
@@ -84,7 +84,7 @@ def render(source: Source) -> str:
             grounds=verdicts.GROUNDS,
             meanings=verdicts.MEANINGS,
             marks_used=_marks_used(source),
-            unranked=unranked(source.columns),
+            beside=[*unranked(source.columns), *leaving(source.rows)],
         )
     )
 

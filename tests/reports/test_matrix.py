@@ -6,7 +6,19 @@ from collections import Counter
 import pytest
 from rich.console import Console
 
-from reports.matrix import ALARM, STYLES, Field, Matrix, legend, matrix_of, sweeps_of, tables_of, versions_of
+from reports.matrix import (
+    ALARM,
+    OUTSIDE,
+    STYLES,
+    Field,
+    Matrix,
+    leaving,
+    legend,
+    matrix_of,
+    sweeps_of,
+    tables_of,
+    versions_of,
+)
 
 
 def row(scene, dimension, engine, profile, mark="pass", iterations=None):
@@ -169,3 +181,20 @@ def test_a_cell_that_is_missing_counts_among_what_does_not_pass():
     """Who leaves cells out must not look better by it."""
     field = Field(Counter({"pass": 6, "missing": 2, "unsupported": 5}))
     assert (field.judged, field.missed, field.mark) == (8, 2, "missing")
+
+
+def test_what_leaves_the_plane_is_told_by_cells_at_the_profiles_own_iterations():
+    """A cell counts once, however many rows it has; in space, and without an answer, there is no plane to leave."""
+
+    def cell(name, engine, out_of_plane, scene="stack", rows=2, dimension=2, **more):
+        return [{**row(scene, dimension, engine, "soft", **more), "cells": [name], "out_of_plane": out_of_plane}] * rows
+
+    flat = [*cell("a", "flat", 0.0), *cell("b", "flat", OUTSIDE), *cell("c", "flat", 9.0, dimension=3)]
+    swept, lost = cell("d", "flat", 9.0, iterations=4), cell("e", "flat", 9.0, mark="crashed")
+    assert leaving([*flat, *swept, *lost]) == []
+    tipping = [*cell("f", "deep", 0.25, "pinch", 5), *cell("g", "deep", 0.004), *cell("h", "deep", 1e-9)]
+    assert leaving([*flat, *swept, *lost, *tipping]) == [
+        "Planar cells that leave their plane by more than 0.001 (m, rad, or either per second), which no check judges: "
+        "deep/soft 2 of 3 (most of all pinch, by 0.25)"
+    ]
+    assert leaving([row("stack", 2, "deep", "soft")]) == []  # rows of an older file

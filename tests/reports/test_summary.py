@@ -10,10 +10,10 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from reports.answers import answers, choices
-from reports.command import main
+from reports.command import main, showing
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
-from reports.wording import measured, quantity
+from reports.wording import measured, number, quantity
 from validation.cells import Slot
 from validation.records.store import Store
 from validation.running.execution import execute
@@ -304,6 +304,15 @@ def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_e
     assert plain["cure"]["profile"] == "tuned" and {c["name"] for c in plain["cure"]["changes"]} >= {"solref"}
     again = json.loads(call("explain", plain["id"], "--json", "--out", out).stdout)
     assert again["id"] == plain["id"] and again["value"] == plain["value"]
+
+
+def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeypatch):
+    out, _ = two_engines
+    row = ("explain", "mujoco/default/bounce/apex", "--out", out)
+    far = json.loads(call(*row, "--json").stdout)["out_of_plane"]
+    for limit, said in ((far + 1e-12, False), (-1.0, True)):
+        monkeypatch.setattr(showing, "OUTSIDE", limit)
+        assert (f"off plane {number(far, 3)} (m, rad" in " ".join(call(*row).stdout.split())) is said
 
 
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])

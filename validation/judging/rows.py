@@ -77,6 +77,8 @@ class Row:
     #: 1 - error/error of the best null, and which null that is; see `validation.questions.nulls`, which fills them in.
     skill: float | None = None
     null: str = ""
+    #: Largest departure of a planar scene from its plane where an engine lives in space [m, rad, or either per second].
+    out_of_plane: float = 0.0
 
     @property
     def alarming(self) -> bool:
@@ -282,6 +284,7 @@ def _assemble(
         initial_change=list(observation.initial_change),
         slot=slot.as_dict(),
         cells=[observation.cell],
+        out_of_plane=observation.out_of_plane,
         certificate=_certificate(observation, check),
     )
 
