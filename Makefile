@@ -6,9 +6,10 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 SUITE ?= quick
+comma := ,
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-long recipe extras soak lint setup publish releases tune cures mutants mutants-check mutants-sample detection tables clean
+.PHONY: run test test-long recipe extras soak lint setup publish apart releases tune cures mutants mutants-check mutants-sample detection tables clean
 
 setup: $(STAMP)
 
@@ -70,6 +71,15 @@ publish: $(STAMP)
 	mkdir -p reports/published
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
+
+# Engines that are set apart, in a matrix of their own: their quick suite takes some 25 min of CPU.
+apart: extras
+	@test -z "$$(git status --porcelain)" || { echo "commit first: the matrix names the commit"; exit 2; }
+	$(BIN)/crosscheck run --quick $(foreach name,$(subst $(comma), ,$(EXTRAS)),--engine $(name)) --out $(OUT) \
+		--markdown $(OUT)/engines.md
+	@{ echo "# Engines that are set apart"; echo; \
+	echo "Rows of the quick suite at $$(git rev-parse --short HEAD), by \`make apart\`; what the marks mean stands below the table."; echo; \
+	cat $(OUT)/engines.md; } > reports/published/engines.md
 
 # History over releases of the engines, with times: environments are built once, what is stored is not run again; about
 # an hour at first.
