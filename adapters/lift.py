@@ -7,8 +7,8 @@
           +------ x                +------ x  is a right-handed turn about -Y.
 
 Inertia is stated, not derived from the 3-D shape: a disc becomes a sphere that keeps the disc's own moment.
-What leaves the plane afterwards is measured (`Trajectory.out_of_plane`), kept with the observation and its rows, and
-told below every matrix; no check judges it, so that a planar scene can pass on an engine that tips bodies out of it.
+What leaves the plane afterwards is measured (`Trajectory.out_of_plane`) and judged: the lifted scene is its own mirror
+image in the plane, so that no law of contact moves anything out of it.
 """
 
 from __future__ import annotations
@@ -115,24 +115,35 @@ def _ends(shape: Shape) -> tuple[float, float]:
     return shape.half_extents[0], shape.half_extents[2]
 
 
-def lower_pose(pose: Array) -> tuple[Array, float]:
-    """Planar poses (n, 3) of spatial ones (n, 7), and how far they left the plane [m, rad]."""
-    w, qx, qy, qz = pose[:, 3:].T
+def lower_pose(pose: Array) -> Array:
+    """Planar poses (n, 3) of spatial ones (n, 7)."""
+    w, qy = pose[:, 3], pose[:, 5]
     theta = -2.0 * np.arctan2(qy, w)
     theta = np.arctan2(np.sin(theta), np.cos(theta))
-    outside = max(_largest(pose[:, 1]), 2.0 * _largest(np.hypot(qx, qz)))
-    return np.column_stack([pose[:, 0], pose[:, 2], theta]), outside
+    return np.column_stack([pose[:, 0], pose[:, 2], theta])
 
 
-def lower_twist(twist: Array) -> tuple[Array, float]:
-    """Planar twists (n, 3) of spatial ones (n, 6), and the largest component out of the plane [m/s, rad/s]."""
-    outside = _largest(twist[:, [1, 3, 5]])
-    return np.column_stack([twist[:, 0], twist[:, 2], -twist[:, 4]]), outside
+def lower_twist(twist: Array) -> Array:
+    """Planar twists (n, 3) of spatial ones (n, 6)."""
+    return np.column_stack([twist[:, 0], twist[:, 2], -twist[:, 4]])
 
 
-def _largest(values: Array) -> float:
-    """Largest size of those that are numbers: what a run has left the plane by is told also where it ends in NaN."""
-    return float(np.fmax.reduce(np.abs(values), axis=None, initial=0.0))
+def out_of_plane(pose: Array, reach: Array) -> float:
+    """Farthest that any point of a lifted scene has left its plane [m].
+
+    A tilt by an angle a moves what lies ``reach`` from the centre by the chord 2 sin(a/2) reach at most, and sin(a/2)
+    is the length of the quaternion's part across the plane.
+
+    Parameters
+    ----------
+    pose
+        Spatial poses (samples, n, 7). Of those that are no numbers nothing is told, so that a run which ends in NaN
+        tells what it had left the plane by before.
+    reach
+        Distance of each body's outermost point from its centre (n,) [m].
+    """
+    away = np.abs(pose[..., 1]) + 2.0 * np.hypot(pose[..., 4], pose[..., 6]) * reach
+    return float(np.fmax.reduce(away, axis=None, initial=0.0))
 
 
 def lower_contacts(contacts: Contacts) -> Contacts:

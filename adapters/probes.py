@@ -375,7 +375,7 @@ def read_corner(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
     """+1 for each box that turns towards its face, in angle and in spin."""
     poses, twists = [trajectory.pose[0], trajectory.pose[-1]], trajectory.twist[-1]
     if case.dimension == 3:
-        poses, twists = [lower_pose(pose)[0] for pose in poses], lower_twist(twists)[0]
+        poses, twists = [lower_pose(pose) for pose in poses], lower_twist(twists)
     (first, last), turn = (pose[1:, 2] for pose in poses), []
     tilt = np.array([0.3, -0.3])
     turn += list(np.sign((first - last) * tilt)) + list(-np.sign(twists[1:, 2] * tilt))

@@ -218,7 +218,7 @@ def _sampled(
     contacts = Contacts.from_rows(rows, 3)
     if scene.dimension == 2:
         flat = np.array([body.pose for body in scene.bodies])
-        contacts, twist = lower_contacts(contacts), np.array([lower_twist(each)[0] for each in twist])
+        contacts, twist = lower_contacts(contacts), np.array([lower_twist(each) for each in twist])
         places = pose[:, :, [0, 2]]
         pose = np.concatenate([places, np.broadcast_to(flat[:, 2:], (*places.shape[:2], 1))], axis=2)
     record = ContactRecord(np.arange(1, steps + 1), np.array(offset, np.int64), contacts)

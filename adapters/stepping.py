@@ -19,7 +19,7 @@ import numpy as np
 
 from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
 from adapters.scene import Body, Scene
 from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
@@ -57,6 +57,7 @@ class _Seen:
         self.poses: list[Array] = []
         self.twists: list[Array] = []
         self.read: list[tuple[Array, Array]] = []
+        self.reach = np.array([reach(body.shape) for body in scene.bodies])
         self.outside, self.unturned = 0.0, False
 
     def look(self, simulation: Simulation) -> None:
@@ -89,15 +90,15 @@ class _Seen:
             return ""
         if not (np.isfinite(pose).all() and np.isfinite(twist).all()):  # across the plane of a lifted scene as well
             return "the state is not finite"
-        (pose,), (twist,), _ = self._lowered(pose[None], twist[None])
+        _, (twist,) = self._lowered(pose[None], twist[None])
         fastest = float(np.abs(twist[:, : self.dimension]).max())
         return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it" if fastest > self.limit else ""
 
-    def states(self) -> tuple[Array, Array, float]:
-        """Poses and twists of all instants, and the largest departure from the plane of a lifted scene."""
+    def states(self) -> tuple[Array, Array, float | None]:
+        """Poses and twists of all instants, and how far a lifted scene has left its plane [m]."""
         self._read_all()
         pose, twist = (np.concatenate(parts) for parts in zip(*self.read, strict=True))
-        return pose, twist, self.outside
+        return pose, twist, self.outside if self.flat else None
 
     def _read_all(self) -> None:
         if self.poses:
@@ -107,22 +108,19 @@ class _Seen:
     def _read(self, pose: Array, twist: Array) -> None:
         if pose.shape[2] == 7 and (np.linalg.norm(pose[..., 3:], axis=2) < SHORTEST_TURN).any():
             self.unturned = True
-        pose, twist, outside = self._lowered(pose, twist)
-        self.read.append((pose, twist))
-        self.outside = max(self.outside, outside)
+        if self.flat:
+            self.outside = max(self.outside, out_of_plane(pose, self.reach))
+        self.read.append(self._lowered(pose, twist))
 
-    def _lowered(self, pose: Array, twist: Array) -> tuple[Array, Array, float]:
-        outside = 0.0
+    def _lowered(self, pose: Array, twist: Array) -> tuple[Array, Array]:
         if self.flat:
             samples = pose.shape[:2]
-            flat_pose, off_place = lower_pose(pose.reshape(-1, 7))
-            flat_twist, off_speed = lower_twist(twist.reshape(-1, 6))
-            outside = max(outside, off_place, off_speed)
-            pose, twist = flat_pose.reshape(*samples, 3), flat_twist.reshape(*samples, 3)
+            pose = lower_pose(pose.reshape(-1, 7)).reshape(*samples, 3)
+            twist = lower_twist(twist.reshape(-1, 6)).reshape(*samples, 3)
         if self.standing:
             pose[:, self.standing] = self.places
             twist[:, self.standing] = 0.0
-        return pose, twist, outside
+        return pose, twist
 
 
 def posed_for(engine: Engine, scene: Scene) -> Scene:

@@ -89,7 +89,7 @@ class Trajectory:
     finish, reason
         ``diverged`` and why, if the state stopped being finite or exploded; samples end there.
     out_of_plane
-        Largest departure from the plane of a lifted planar scene [m or m/s or rad or rad/s].
+        Farthest that any point of a lifted planar scene has left its plane at a sample [m]; None where none is lifted.
     """
 
     t: Array
@@ -102,7 +102,7 @@ class Trajectory:
     initial_change: tuple[str, ...] = ()
     readback: dict[str, Any] = field(default_factory=dict)
     certificate: dict[str, Any] = field(default_factory=dict)
-    out_of_plane: float = 0.0
+    out_of_plane: float | None = None
     wall_time: float = 0.0
 
     @property

@@ -12,8 +12,9 @@ from typing import Any
 from adapters import engine_folder, registry
 from adapters.needs import needs
 from adapters.plain import one_line
-from adapters.scene import SceneError
-from validation.canonical import SUITES, Variation
+from adapters.scene import Scene, SceneError
+from validation.bounds import planar
+from validation.canonical import SUITES, CanonicalScene, Check, Variation
 from validation.catalogue import CATALOGUE, broken
 from validation.field.measured import facts_of
 from validation.identity import commit, machine
@@ -70,11 +71,16 @@ def checks() -> list[dict[str, Any]]:
         seen: dict[str, dict[str, Any]] = {}
         for variation in canonical.variations("standard"):
             scene = canonical.scene(canonical.dimensions[0], variation.params)
-            for check in canonical.checks(scene, QUICK_DT):
+            for check in _stated(canonical, scene):
                 name = f"{canonical.name}/{check.metric.partition('[')[0]}"
                 seen.setdefault(name, {"name": name, **asdict(check)})
         out += seen.values()
     return out
+
+
+def _stated(canonical: CanonicalScene, scene: Scene) -> list[Check]:
+    """All checks of a scene, and that of its plane, which engines that live in space owe."""
+    return [*canonical.checks(scene, QUICK_DT), *([planar(scene, QUICK_DT)] if scene.dimension == 2 else [])]
 
 
 def describe(name: str) -> dict[str, Any]:
@@ -108,7 +114,7 @@ def _describe_scene(name: str) -> dict[str, Any]:
         "dimensions": list(canonical.dimensions),
         "parameters": [asdict(parameter) for parameter in canonical.parameters],
         "needs": asdict(needs(scene)),
-        "checks_at_defaults": [asdict(check) for check in canonical.checks(scene, QUICK_DT)],
+        "checks_at_defaults": [asdict(check) for check in _stated(canonical, scene)],
     }
 
 

@@ -19,6 +19,7 @@ from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
 from reports.wording import LABELS, MARKS, SHORT, mark_of
+from validation.metrics import OUT_OF_PLANE
 
 #: Colours support the words, they never replace them.
 STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
@@ -27,9 +28,6 @@ ALARM = "bold white on red"
 ROOMY = 100
 #: Space before a scene [columns]: one of padding, and one that the box draws as its divider.
 GAP = 2
-#: A planar scene has left its plane [m, rad, or either per second]: what is turned out of it by less looks shorter by
-#: 5e-7 of itself (1 - cos) in it.
-OUTSIDE = 1e-3
 #: Marks of rows that have no verdict.
 UNJUDGED = ("unsupported", "none", "not_installed")
 
@@ -120,24 +118,20 @@ def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
 def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     """Which profiles' planar scenes leave their plane, in how many cells, the worst; one line, or none.
 
-    No check judges it: what a row says is seen in the plane.
+    All other rows of such a cell are what is seen of it in the plane: one that passes is not the whole motion.
     """
-    cells: dict[tuple[str, str], dict[str, tuple[float, str]]] = defaultdict(dict)
+    cells: dict[tuple[str, str], list[tuple[bool, float, str]]] = defaultdict(list)
     for row in rows:
-        if row["dimension"] == 2 and row["iterations"] is None and row["outcome"] == "ok" and "out_of_plane" in row:
-            found = row["out_of_plane"], row["scene"]  # rows of an older file know fewer fields
-            for cell in row["cells"][:1]:
-                cells[row["engine"], row["profile"]][cell] = found
+        if row["metric"] == OUT_OF_PLANE and row["iterations"] is None and row["value"] is not None:
+            found = row["physics"] == "fail", row["value"], row["scene"]
+            cells[row["engine"], row["profile"]].append(found)
     told = []
     for (engine, profile), of_it in cells.items():
-        outside = [each for each in of_it.values() if each[0] > OUTSIDE]
+        outside = sorted(each for each in of_it if each[0])
         if outside:
-            most, scene = max(outside)
-            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (most of all {scene}, by {most:.2g})")
-    if not told:
-        return []
-    head = f"Planar cells that leave their plane by more than {OUTSIDE:g} (m, rad, or either per second)"
-    return [f"{head}, which no check judges: {', '.join(told)}"]
+            _, most, scene = outside[-1]
+            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (most of all {scene}, by {most:.2g} m)")
+    return [f"Planar cells that leave their plane in space: {', '.join(told)}"] if told else []
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:

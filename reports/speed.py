@@ -17,9 +17,9 @@ from rich.text import Text
 from adapters import registry
 from reports.wording import cell, number
 from validation.bench import agreement, reading, work
-from validation.cells import Observation, Outcome, format_dt
+from validation.cells import Observation, Outcome, checks_of, format_dt
 from validation.judging.verdicts import judge_physics
-from validation.posed import primary_of, resolve
+from validation.posed import primary_of
 from validation.records.store import Run, Store
 
 Tables = dict[str, pd.DataFrame]
@@ -105,11 +105,9 @@ def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], 
 def physics(observation: Observation) -> list[dict[str, Any]]:
     """Rows of a bench's cell that say PASS or FAIL and nothing else: standings belong to the run, and cost time."""
     slot = observation.slot
-    canonical = resolve(slot.scene)
-    scene = canonical.scene(slot.dimension, dict(slot.params))
     same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
     rows: list[dict[str, Any]] = []
-    for check in canonical.checks(scene, slot.dt):
+    for check in checks_of(observation)[1]:
         value = observation.metrics.get(check.metric, (None, ""))[0]
         said = judge_physics(value, check) if observation.outcome is Outcome.OK else None
         error = None if value is None or check.truth is None else value - check.truth

@@ -19,6 +19,7 @@ from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
 from reports.wording import measured, plural, quantity, reproduce
+from validation.bounds import planar
 from validation.catalogue import matching
 from validation.cells import Slot, slot_from_dict
 from validation.judging.rows import Row, rows_of
@@ -92,12 +93,15 @@ class _Cells(pytest.Collector):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Checks that have a tolerance, cell by cell."""
+        engine = registry.find(self.plugin.engine).engine
+        dimensions = engine.facts.dimensions if engine else frozenset((2, 3))
         for slot in self.plugin.slots:
             canonical = resolve(slot.scene)
             scene = canonical.scene(slot.dimension, dict(slot.params))
             asked = slot.params_text() + (f" iterations={slot.iterations}" if slot.iterations else "")
             cell = f"{slot.engine}/{slot.profile}/{slot.scene} {slot.dimension}-D {asked}".rstrip()
-            for check in canonical.checks(scene, slot.dt):
+            lifted = slot.dimension == 2 and 2 not in dimensions
+            for check in [*canonical.checks(scene, slot.dt), *([planar(scene, slot.dt)] if lifted else [])]:
                 if check.bound is not None:
                     yield _Check.from_parent(self, name=f"{cell}::{check.metric}", plugin=self.plugin, slot=slot,
                                              metric=check.metric)  # fmt: skip

@@ -12,14 +12,21 @@ A fixed-step method that locates contact within a step cannot be asked for less 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from adapters.scene import Scene
+from adapters.shapes import reach
 from validation.canonical import Check
+from validation.metrics import OUT_OF_PLANE
 
 #: A thousand velocity updates of one unit of round-off (2.2e-16) each, and a factor of five for the order of
 #: additions: what is left of an answer that has an exact law at every step length.
 ROUND_OFF = 1e-12
+#: Growth of a disturbance up to which a motion can be told in doubles: the horizon of the reference's certificate
+#: (`reference_solver.certification.truth.GROWTH`).
+GROWTH = 1e3
 #: A body slower than this share of v1 does not move: in a hundred steps it gains less than one step of free fall.
 STILL = 0.01
 #: Impacts that follow each other within this many steps are one to a method of fixed steps: one step finds the first,
@@ -57,6 +64,24 @@ def exact_laws(scales: Mapping[str, tuple[str, float]], truth: Mapping[str, floa
 def bookkeeping(scale: float = 1.0) -> Bound:
     """Sums that a conservation law ties to each other, whatever the contact law."""
     return Bound(ROUND_OFF * scale, "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law")
+
+
+def planar(scene: Scene, dt: float) -> Check:
+    """How far a planar scene may leave its plane [m] on an engine that lives in space.
+
+    What is lifted is its own mirror image in the plane y = 0, and so are gravity and loads. A law of contact that does
+    not tell left from right keeps a motion mirrored that begins so, at every step: every y stays 0. What remains is
+    round-off of the numbers that are added, places and ways of free flight, which a motion may multiply (up to `GROWTH`
+    times it has an answer at all), and that of two contacts which mirror each other round-off lets one be found a step
+    before the other: one step of a force across the plane, as in `straight`.
+    """
+    place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
+    way = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
+    size = max(place, way * scene.duration)
+    step = math.hypot(*scene.gravity) * (dt * dt)
+    because = f"mirror symmetry: one step of a force across the plane, g dt^2, and round-off grown {GROWTH:g} times"
+    source = "what is lifted is its own mirror image in its plane"
+    return Check(OUT_OF_PLANE, "m", 0.0, step + ROUND_OFF * GROWTH * size, because, source)
 
 
 # ---- what stands ----

@@ -22,8 +22,10 @@ from adapters.needs import needs
 from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
-from validation.canonical import CanonicalScene, Measured
+from validation.bounds import planar
+from validation.canonical import CanonicalScene, Check, Measured
 from validation.identity import adapter_hash, scene_code
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_known, resolve
 
 #: Most iterations and units in the last place that can be asked for: C integers hold the first, and the second are
@@ -213,7 +215,6 @@ class Observation:
     readback: Mapping[str, Any] = field(default_factory=dict)
     certificate: Mapping[str, Any] = field(default_factory=dict)
     initial_change: tuple[str, ...] = ()
-    out_of_plane: float = 0.0
     log: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -252,6 +253,21 @@ def _measured(value: Any, reason: Any) -> Measured:
     if value is None or math.isfinite(value):
         return (None if value is None else float(value)), one_line(reason)
     return None, one_line(f"{reason}; the value is {float(value)}, not a finite number".removeprefix("; "))
+
+
+def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
+    """Scene of an observation, and all checks that it owes: the scene's own, and its plane where it has been lifted.
+
+    Raises
+    ------
+    SceneError
+        As `CanonicalScene.checks` does.
+    """
+    slot = observation.slot
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    lifted = [planar(scene, slot.dt)] if OUT_OF_PLANE in observation.metrics else []
+    return scene, [*canonical.checks(scene, slot.dt), *lifted]
 
 
 @dataclass(frozen=True)

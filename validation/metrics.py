@@ -18,6 +18,8 @@ from validation.geometry import deepest, overlap
 UNAVAILABLE = "the engine does not report contact impulses"
 #: Said of a rebound that is none.
 SILENT = "does not rebound"
+#: Farthest that a planar scene has left its plane on an engine that lives in space [m]; measured as it is sampled.
+OUT_OF_PLANE = "out_of_plane"
 #: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing,
 #: ``name<0`` with the size of one that is negative: what creeps down at -0.003 m/s creeps up. A
 #: scene has words of its own for metrics that are not here (`CanonicalScene.words`).
@@ -38,6 +40,7 @@ WORDS = {
     "rest_time": "rests after {value}",
     "hop": "leaves the floor, up or down, by {value}",
     "astray": "strays sideways by {value}",
+    OUT_OF_PLANE: "leaves its plane by {value}",
 }
 #: Said of a time at which a value that was waited for did not come.
 NOT_PASSED = "it never gets there"

@@ -143,8 +143,8 @@ def _swapped(scene: Scene) -> Scene:
 
 
 def _lowered(found: Trajectory) -> Trajectory:
-    pose = np.array([lower_pose(each)[0] for each in found.pose])
-    return replace(found, pose=pose, twist=np.array([lower_twist(each)[0] for each in found.twist]))
+    pose = np.array([lower_pose(each) for each in found.pose])
+    return replace(found, pose=pose, twist=np.array([lower_twist(each) for each in found.twist]))
 
 
 # ---- contacts ------------------------------------------------------------------------------------------------------

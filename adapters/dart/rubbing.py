@@ -131,5 +131,5 @@ def _told(scene: Scene, after: Array, dt: float) -> Trajectory:
     """Start and end of the run: places are not asked for."""
     pose = np.array([[body.pose for body in scene.bodies]] * 2)
     twist = np.array([[body.twist for body in scene.bodies]] * 2)
-    twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0][0]
+    twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0]
     return Trajectory(np.array([0.0, scene.duration]), pose, twist, None, dt, "completed")

@@ -44,8 +44,8 @@ def told_trajectory(
     poses[1:, moving], twists[1:, moving] = pose, twist
     if flat:
         samples = poses.shape[:2]
-        poses = lower_pose(poses.reshape(-1, 7))[0].reshape(*samples, 3)
-        twists = lower_twist(twists.reshape(-1, 6))[0].reshape(*samples, 3)
+        poses = lower_pose(poses.reshape(-1, 7)).reshape(*samples, 3)
+        twists = lower_twist(twists.reshape(-1, 6)).reshape(*samples, 3)
     return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, poses, twists, contacts, dt, "completed")
 
 

@@ -20,7 +20,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, how_measured, pasteable, told_cures
 from reports.findings import ALARMING, Family, families, grouped, severity
-from reports.matrix import OUTSIDE, matrix_of
+from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
 from reports.wording import (
@@ -38,6 +38,7 @@ from reports.wording import (
 from validation.bench import reading
 from validation.cells import Observation
 from validation.judging.rows import rows_of
+from validation.metrics import OUT_OF_PLANE
 from validation.questions.nulls import skill_of
 from validation.records.store import Store
 
@@ -243,7 +244,7 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
             )
         )
         return
-    _print_explanation(found, better, paste, differing, terminal())
+    _print_explanation(found, _beside_the_plane(rows, found), better, paste, differing, terminal())
 
 
 def find_row(rows: Sequence[Plain], name: str) -> Plain:
@@ -297,7 +298,18 @@ def _why(change: Change) -> str:
     return f"{change.because}; {change.role}" if change.role else change.because
 
 
-def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[Change], console: Console) -> None:
+def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
+    """How far the cell of a row has left its plane, if it has: what the row says is what is seen in the plane."""
+    same = (other for other in rows if other["cells"] == row["cells"] and other["metric"] == OUT_OF_PLANE)
+    left = next((other for other in same if other["physics"] == "fail"), None)
+    if left is None or left["metric"] == row["metric"]:
+        return ""
+    return f"the scene leaves its plane by {measured(left, 3)}: this row is what is seen of it in the plane"
+
+
+def _print_explanation(
+    row: Plain, beside: str, better: str, paste: str, differing: Sequence[Change], console: Console
+) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
     asked = ", ".join(filter(None, (f"{row['scene']} {row['dimension']}-D", params_text(row["params"]))))
     table = _grid("", "")
@@ -317,10 +329,8 @@ def _print_explanation(row: Plain, better: str, paste: str, differing: Sequence[
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
         ("skill", skill_text(row)),
         ("standing", row["reason"] or "-"),
+        *([("off plane", beside)] if beside else []),
     ]
-    if row.get("out_of_plane", 0.0) > OUTSIDE:
-        text = f"{number(row['out_of_plane'], 3)} (m, rad, or either per second) at most: all else is seen in the plane"
-        lines.append(("off plane", text))
     if better:
         lines.append(("cure", f"profile {better} passes this row. It differs in:"))
         lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing]

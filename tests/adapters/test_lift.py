@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, lowered
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, lowered, out_of_plane
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Harmonic, Hull, Pair, Polygon, Scene, Sphere
 
 
@@ -35,12 +35,11 @@ def test_pose_and_twist_survive_the_round_trip() -> None:
         pose = (*rng.normal(size=2), rng.uniform(-math.pi, math.pi))
         twist = tuple(rng.normal(size=3))
         lifted = lift(planar_scene(pose, twist)).bodies[1]
-        back, outside = lower_pose(np.array([lifted.pose]))
-        speed, out = lower_twist(np.array([lifted.twist]))
+        back, speed = lower_pose(np.array([lifted.pose])), lower_twist(np.array([lifted.twist]))
         # Half-angle sine and cosine and one arctangent: a few units of round-off of an angle up to pi.
         assert np.allclose(back[0], pose, rtol=0.0, atol=2e-15)
         assert tuple(speed[0]) == twist
-        assert outside == out == 0.0
+        assert out_of_plane(np.array([[lifted.pose]]), np.array([1.0])) == 0.0
 
 
 def test_a_body_point_lands_where_the_plane_says() -> None:
@@ -79,39 +78,49 @@ def test_a_disc_keeps_its_own_moment_not_that_of_a_sphere() -> None:
     assert lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))).bodies[2].inertia == (0.12, 0.12, 0.12)
 
 
-@pytest.mark.parametrize(("entry", "value"), [(1, 1e-3), (4, 1e-3), (6, 1e-3)])
-def test_a_pose_that_leaves_the_plane_is_seen(entry: int, value: float) -> None:
-    pose = np.array([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]])
-    pose[0, entry] = value
-    pose[0, 3:] /= np.linalg.norm(pose[0, 3:])
-    # A tilt is twice the quaternion's component; 1e-3 relative covers sine against angle.
-    assert lower_pose(pose)[1] == pytest.approx(value if entry == 1 else 2.0 * value, rel=1e-3)
+@pytest.mark.parametrize("axis", [0, 2], ids=["about x", "about z"])
+@pytest.mark.parametrize("angle", [1e-9, 0.3, 3.0])
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+def test_a_tilt_takes_the_outermost_point_out_of_the_plane_by_its_chord(axis: int, angle: float, turned: float) -> None:
+    """Whatever the body's own turn in the plane: the axis that stood across the plane is tilted by the angle."""
+    half = np.zeros(3)
+    half[axis] = math.sin(0.5 * angle)
+    w, c, s = math.cos(0.5 * angle), math.cos(0.5 * turned), -math.sin(0.5 * turned)
+    own = np.array([0.0, s, 0.0])
+    q = np.array([w * c - half @ own, *(w * own + c * half + np.cross(half, own))])  # tilted after it was turned
+    across = turn(q, np.array([0.0, 1.0, 0.0]))
+    pose = np.array([[[5.0, 0.0, 5.0, *q]]])
+    assert np.linalg.norm(across - [0.0, 1.0, 0.0]) == pytest.approx(2.0 * math.sin(0.5 * angle), rel=1e-6)
+    assert out_of_plane(pose, np.array([0.5])) == pytest.approx(math.sin(0.5 * angle), rel=1e-12)
 
 
-@pytest.mark.parametrize("entry", [1, 3, 5])
-def test_a_twist_that_leaves_the_plane_is_seen(entry: int) -> None:
-    twist = np.zeros((2, 6))
-    twist[1, entry] = -0.25
-    assert lower_twist(twist)[1] == 0.25
+def test_the_farthest_body_and_sample_tell_how_far_a_scene_has_left_its_plane() -> None:
+    pose = np.zeros((3, 2, 7))
+    pose[..., 3] = 1.0
+    reach = np.array([1.0, 0.25])
+    assert out_of_plane(pose, reach) == 0.0
+    pose[1, 1, 1], pose[2, 0, 1] = -0.5, 0.375
+    assert out_of_plane(pose, reach) == 0.5
+    pose[1, 1, 3:] = (0.0, 1.0, 0.0, 0.0)  # head over heels beside the plane: 0.5 and a chord of twice its reach
+    assert out_of_plane(pose, reach) == 1.0
 
 
 def test_what_is_no_number_hides_nothing_of_what_left_the_plane() -> None:
     """A run that ends in NaN says how far it was out of the plane before; one of nothing else was never seen to be."""
-    pose, twist = np.zeros((3, 7)), np.zeros((3, 6))
-    pose[:, 3] = 1.0
-    pose[1, 1], twist[1, 3] = -0.5, -0.25
+    pose = np.zeros((3, 1, 7))
+    pose[..., 3] = 1.0
+    pose[1, 0, 1] = -0.5
     for lost in (0, 2):
-        pose[lost], twist[lost] = math.nan, math.nan
-        assert (lower_pose(pose)[1], lower_twist(twist)[1]) == (0.5, 0.25)
-    nothing = np.full((2, 7), math.nan)
-    assert (lower_pose(nothing)[1], lower_twist(nothing[:, 1:])[1]) == (0.0, 0.0)
-    assert (lower_pose(nothing[:0])[1], lower_twist(nothing[:0, 1:])[1]) == (0.0, 0.0)
+        pose[lost] = math.nan
+        assert out_of_plane(pose, np.array([1.0])) == 0.5
+    nothing = np.full((2, 1, 7), math.nan)
+    assert out_of_plane(nothing, np.array([1.0])) == out_of_plane(nothing[:0], np.array([1.0])) == 0.0
 
 
 def test_an_angle_does_not_depend_on_the_sign_of_the_quaternion() -> None:
     q = np.array([math.cos(1.2), 0.0, -math.sin(1.2), 0.0])
     pose = np.array([[0.0, 0.0, 0.0, *q], [0.0, 0.0, 0.0, *-q]])
-    assert np.allclose(lower_pose(pose)[0][:, 2], 2.4, atol=1e-15)
+    assert np.allclose(lower_pose(pose)[:, 2], 2.4, atol=1e-15)
 
 
 def test_contacts_lose_only_what_is_out_of_the_plane() -> None:

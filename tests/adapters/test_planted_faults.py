@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from adapters.conformance import CHECKS, self_test
 from adapters.conformance.faults import FAULTS
 from adapters.conformance.spoilt import Spoilt
-from adapters.lift import lower_pose
+from adapters.lift import lower_pose, out_of_plane
 from adapters.needs import Needs
 from adapters.planted_faults import _turned
 from adapters.receipts import QUANTITIES, receipts
@@ -114,8 +114,10 @@ def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
     """A turn from x towards the vertical, whatever the pose was before."""
     half = 0.3
     pose = np.array([[1.0, 0.0, 2.0, math.cos(half), 0.0, -math.sin(half), 0.0]])
-    lowered, outside = lower_pose(_turned(pose, 0.25))
-    assert lowered[0] == pytest.approx([1.0, 2.0, 2.0 * half + 0.25], abs=1e-15) and outside == 0.0
+    turned = _turned(pose, 0.25)
+    lowered = lower_pose(turned)
+    assert lowered[0] == pytest.approx([1.0, 2.0, 2.0 * half + 0.25], abs=1e-15)
+    assert out_of_plane(turned[None], np.array([1.0])) == 0.0
     assert _turned(lowered, -0.25)[0, 2] == pytest.approx(2.0 * half, abs=1e-15)
 
 

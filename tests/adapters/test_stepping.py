@@ -260,22 +260,22 @@ def test_a_planar_scene_is_lifted_for_a_spatial_engine_and_read_back_planar() ->
     assert lifted.contacts is not None and lifted.contacts.rows.impulse.shape[1] == 2
 
 
-# A place is told as it is, a tilt as twice the quaternion's component, a speed and a turn as they are.
-@pytest.mark.parametrize(
-    ("name", "entry", "told"),
-    [("_pose", 1, 0.125), ("_pose", 4, 0.25), ("_twist", 1, 0.125), ("_twist", 3, 0.125)],
-    ids=["place", "tilt", "speed", "turn"],
-)
-def test_what_leaves_the_plane_at_any_sample_is_kept(name: str, entry: int, told: float) -> None:
+# A place is told as it is, a tilt by how far it takes the outermost point, 2 x 0.125 of the disc's radius of 0.5.
+@pytest.mark.parametrize(("entry", "told"), [(1, 0.125), (4, 0.125), (6, 0.125)], ids=["place", "tilt", "roll"])
+def test_what_leaves_the_plane_at_any_sample_is_kept(entry: int, told: float) -> None:
     def sideways(flight: Flight) -> None:
-        getattr(flight, name)[0, entry] = 0.125 if flight.steps == 3 else 0.0
+        flight._pose[0, entry] = 0.125 if flight.steps == 3 else 0.0
 
     assert run(Toy({3}, sideways), scene(), 0.1, {}).out_of_plane == told
 
 
+def test_only_what_is_lifted_has_a_plane_to_leave() -> None:
+    assert run(Toy({2}), scene(), 0.1, {}).out_of_plane is None
+
+
 def test_what_has_left_the_plane_is_kept_where_a_run_ends_in_what_is_no_number() -> None:
     def sideways(flight: Flight) -> None:
-        flight._twist[0, 1] = 0.125 if flight.steps == 3 else 0.0
+        flight._pose[0, 1] = 0.125 if flight.steps == 3 else 0.0
         if flight.steps == 5:
             flight._twist[0] = math.nan
 
@@ -310,7 +310,7 @@ def test_a_quaternion_without_length_is_no_orientation(planar: bool) -> None:
 
 def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def sideways(flight: Flight) -> None:
-        flight._twist[0, 1] = 0.125 if flight.steps == 2 else 0.0
+        flight._pose[0, 1] = 0.125 if flight.steps == 2 else 0.0
 
     whole = run(Toy({3}, sideways), scene(), 0.1, {})
     for at_once in (1, 3, 11):
@@ -439,7 +439,7 @@ def test_what_a_simulation_gives_may_be_its_own(monkeypatch: pytest.MonkeyPatch,
 
 def test_an_engine_of_both_dimensions_gets_the_scene_as_it_is() -> None:
     assert posed_for(Toy({2, 3}), scene()).dimension == 2
-    assert run(Toy({2, 3}), scene(), 0.1, {}).out_of_plane == 0.0
+    assert run(Toy({2, 3}), scene(), 0.1, {}).out_of_plane is None
     alone = Scene("s", 1, 3, (Body("a", Sphere(0.5), 1.0, (0.1,) * 3),), (), (0.0, 0.0, -9.81), 1.0)
     assert posed_for(Toy({2, 3}), alone) == alone
 

@@ -65,7 +65,6 @@ def test_csv_holds_all_fields_but_slot_and_log():
         "tolerance": "1e-12", "because": "exact | law", "outcome": "ok", "physics": "fail", "standing": "new",
         "reason": "nobody knew", "state_hash": "ab", "steps": "120", "wall_time_s": "0.1", "source": "Newton",
         "initial_change": "moved;turned", "cells": "c1;c2", "floor": "0.5", "certificate": "", "skill": "", "null": "",
-        "out_of_plane": "0.0",
     }  # fmt: skip
     assert (second["initial_change"], second["reason"], second["cells"]) == ("", '\'=cmd|"x"', "c1")
 

@@ -8,7 +8,6 @@ from rich.console import Console
 
 from reports.matrix import (
     ALARM,
-    OUTSIDE,
     STYLES,
     Field,
     Matrix,
@@ -27,6 +26,7 @@ def row(scene, dimension, engine, profile, mark="pass", iterations=None):
     physics = None if outcome != "ok" else "pass" if mark == "pass" else "fail"
     standing = None if mark == "pass" or outcome == "crashed" else "known" if outcome == "unsupported" else mark
     return {"scene": scene, "dimension": dimension, "engine": engine, "profile": profile, "iterations": iterations,
+            "metric": "drift",
             "outcome": outcome, "physics": physics, "standing": standing, "engine_version": "1.0+5f3a"}  # fmt: skip
 
 
@@ -184,17 +184,16 @@ def test_a_cell_that_is_missing_counts_among_what_does_not_pass():
 
 
 def test_what_leaves_the_plane_is_told_by_cells_at_the_profiles_own_iterations():
-    """A cell counts once, however many rows it has; in space, and without an answer, there is no plane to leave."""
+    """Those that fail are told of all that were judged; without an answer there is no plane to leave."""
 
-    def cell(name, engine, out_of_plane, scene="stack", rows=2, dimension=2, **more):
-        return [{**row(scene, dimension, engine, "soft", **more), "cells": [name], "out_of_plane": out_of_plane}] * rows
+    def cell(engine, value, mark="known", scene="stack", metric="out_of_plane", **more):
+        judged = row(scene, 2, engine, "soft", mark, **more)
+        return {**judged, "metric": metric, "value": None if mark == "crashed" else value}
 
-    flat = [*cell("a", "flat", 0.0), *cell("b", "flat", OUTSIDE), *cell("c", "flat", 9.0, dimension=3)]
-    swept, lost = cell("d", "flat", 9.0, iterations=4), cell("e", "flat", 9.0, mark="crashed")
-    assert leaving([*flat, *swept, *lost]) == []
-    tipping = [*cell("f", "deep", 0.25, "pinch", 5), *cell("g", "deep", 0.004), *cell("h", "deep", 1e-9)]
-    assert leaving([*flat, *swept, *lost, *tipping]) == [
-        "Planar cells that leave their plane by more than 0.001 (m, rad, or either per second), which no check judges: "
-        "deep/soft 2 of 3 (most of all pinch, by 0.25)"
+    flat = [cell("flat", 0.0, "pass"), cell("flat", 9.0, metric="drift"), cell("flat", 9.0, iterations=4)]
+    lost = cell("flat", 9.0, "crashed")
+    assert leaving([*flat, lost]) == []
+    tipping = [cell("deep", 0.25, scene="pinch"), cell("deep", 0.5, "pass"), cell("deep", 0.004, "new")]
+    assert leaving([*flat, lost, *tipping]) == [
+        "Planar cells that leave their plane in space: deep/soft 2 of 3 (most of all pinch, by 0.25 m)"
     ]
-    assert leaving([row("stack", 2, "deep", "soft")]) == []  # rows of an older file

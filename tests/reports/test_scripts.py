@@ -79,7 +79,7 @@ def printed(slot, tmp_path, allowed=()):
     bodies = [last["bodies"][body.name] for body in prepared.scene.bodies]
     pose, twist = (np.array([body[key] for body in bodies]) for key in ("pose", "twist"))
     if pose.shape[1] == 7 and slot.dimension == 2:
-        pose, twist = lower_pose(pose)[0], lower_twist(twist)[0]
+        pose, twist = lower_pose(pose), lower_twist(twist)
     return pose, twist
 
 
@@ -222,7 +222,7 @@ def test_so_does_one_of_other_shapes(engine, values, tmp_path):
         mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
         mujoco.mj_step(model, data, nstep=24)
         pose = data.qpos.reshape(-1, 7)
-        assert np.array_equal(lower_pose(pose)[0] if values["d"] == 2 else pose, ended(slot)[0][1:])
+        assert np.array_equal(lower_pose(pose) if values["d"] == 2 else pose, ended(slot)[0][1:])
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -240,7 +240,7 @@ def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimensio
         mujoco.mj_step(model, data)
     pose = data.qpos.reshape(-1, 7)
     if dimension == 2:
-        pose = lower_pose(pose)[0]
+        pose = lower_pose(pose)
     moving = [i for i, body in enumerate(scene.bodies) if body.motion != "fixed"]
     assert np.array_equal(pose, ended(slot)[0][moving])
 

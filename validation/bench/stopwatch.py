@@ -66,11 +66,11 @@ class _Lowered:
 
     def pose(self) -> Array:
         """Planar poses (n, 3)."""
-        return lower_pose(self.inner.pose())[0]
+        return lower_pose(self.inner.pose())
 
     def twist(self) -> Array:
         """Planar twists (n, 3)."""
-        return lower_twist(self.inner.twist())[0]
+        return lower_twist(self.inner.twist())
 
 
 def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:

@@ -14,7 +14,7 @@ from adapters.engine import EngineError
 from adapters.engine_folder import covering
 from adapters.scene import Scene
 from validation.canonical import Check
-from validation.cells import Observation, Outcome, Slot, slot_from_dict
+from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
 from validation.findings import Findings, FindingsError, Known, known_of, solutions_of
 from validation.findings.files import brought_by_ours, findings_of
 from validation.judging.studies import StudyResult, results, study_of
@@ -77,8 +77,6 @@ class Row:
     #: 1 - error/error of the best null, and which null that is; see `validation.questions.nulls`, which fills them in.
     skill: float | None = None
     null: str = ""
-    #: Largest departure of a planar scene from its plane where an engine lives in space [m, rad, or either per second].
-    out_of_plane: float = 0.0
 
     @property
     def alarming(self) -> bool:
@@ -139,9 +137,7 @@ def _difference(value: float | None, other: float | None) -> float | None:
 
 
 def _cell_rows(run: str, observation: Observation) -> list[Row]:
-    canonical = resolve(observation.slot.scene)
-    scene = canonical.scene(observation.slot.dimension, dict(observation.slot.params))
-    checks = canonical.checks(scene, observation.slot.dt)
+    scene, checks = checks_of(observation)
     return [_row(run, observation, scene, check) for check in checks]
 
 
@@ -284,7 +280,6 @@ def _assemble(
         initial_change=list(observation.initial_change),
         slot=slot.as_dict(),
         cells=[observation.cell],
-        out_of_plane=observation.out_of_plane,
         certificate=_certificate(observation, check),
     )
 

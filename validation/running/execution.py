@@ -22,6 +22,7 @@ from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
 from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 from validation.running.certification import fully_certified
 from validation.running.tracks import Recording, record
@@ -107,7 +108,9 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
     if trajectory.finish == "diverged":  # an engine that certifies says why it ended the run
         said = [trajectory.reason, *map(str, trajectory.certificate.get("reasons", ()))]
         return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
-    metrics = prepared.canonical.measure(prepared.scene, trajectory)
+    metrics = dict(prepared.canonical.measure(prepared.scene, trajectory))
+    if trajectory.out_of_plane is not None:
+        metrics[OUT_OF_PLANE] = trajectory.out_of_plane, ""
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
     if trajectory.certificate.get("certified") is False:
         reasons = one_line("; ".join(map(str, trajectory.certificate.get("reasons", ()))))
@@ -149,5 +152,4 @@ def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observ
         readback=_table("readback", trajectory.readback),
         certificate=_table("certificate", trajectory.certificate),
         initial_change=tuple(one_line(change) for change in trajectory.initial_change),
-        out_of_plane=trajectory.out_of_plane if math.isfinite(trajectory.out_of_plane) else 0.0,
     )

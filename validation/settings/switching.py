@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from validation.canonical import Check
-from validation.cells import Observation, Outcome, Slot
-from validation.posed import resolve
+from validation.cells import Observation, Outcome, Slot, checks_of
 from validation.workers import run_cells
 
 
@@ -69,10 +68,8 @@ def observe(slots: Iterable[Slot], jobs: int = 1) -> dict[Slot, Observation]:
 def readings(observation: Observation) -> list[Reading]:
     """All judged checks of an observation; a cell without an answer has readings without values."""
     slot = observation.slot
-    canonical = resolve(slot.scene)
-    scene = canonical.scene(slot.dimension, dict(slot.params))
     found = []
-    for check in canonical.checks(scene, slot.dt):
+    for check in checks_of(observation)[1]:
         if check.truth is None or check.bound is None:
             continue
         value, reason = observation.metrics.get(check.metric, (None, "was not measured"))
