@@ -151,6 +151,10 @@ class BulletEngine(Engine):
             lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})")
         if "useMaximalCoordinates" in names:
             lines.append(f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})")
+        if settings.get("enableSAT") and "enableSAT" in names:
+            lines.append(
+                "p.loadURDF(..., flags=p.URDF_INITIALIZE_SAT_FEATURES)  # each box and hull"
+            )
         body = [f"{n}={settings[n]!r}" for n in names if n in BODY]
         if body:
             lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})")

@@ -22,7 +22,7 @@ from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
-from adapters.scene import Hull
+from adapters.scene import Hull, Polygon
 from validation.catalogue import CATALOGUE
 
 ENGINE = BulletEngine()
@@ -612,9 +612,39 @@ def test_a_hull_from_a_file_is_the_hull_of_its_vertices():
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), -0.1), motion="fixed")
     gaps = {}
     for name, changes in {"vertices": {}, "file": {"enableSAT": 0}, "faces": {"enableSAT": 1}}.items():
-        rows = drive(scene_of(floor, hull, above, duration=DT), **changes).contacts.rows
+        rows = drive(scene_of(floor, hull, above, duration=DT), "one", **changes).contacts.rows
         gaps[name] = [rows.gap[(rows.a == a) & (rows.b == b)].min() for a, b in ((0, 1), (1, 2))]
     # A hull keeps a margin of 1 mm, but where faces are clipped; vertices of a file are rounded to 24 bits.
     assert gaps["vertices"] == pytest.approx([-1e-3, -2e-3], abs=1e-12)
     assert gaps["file"] == pytest.approx([-1e-3, -2e-3], abs=1e-7)
     assert gaps["faces"] == pytest.approx([0.0, -2e-3], abs=1e-7)
+
+
+def test_tuned_clips_faces_where_there_are_hulls_and_boxes_do_not_need_it():
+    """Columns, slopes and blows of boxes alone have the same bits either way: theirs is another detector."""
+    wedge = CATALOGUE["wedge"].scene(2, {})
+    assert {s.name: s.value for s in ENGINE.settings("tuned", needs(wedge), DT)}["enableSAT"] == 1
+    for name, params in (("incline", {}), ("pinch", {"margin": 100.0}), ("flat_box", {})):
+        scene = replace(CATALOGUE[name].scene(2, params), duration=0.25)
+        assert "enableSAT" not in {s.name for s in ENGINE.settings("tuned", needs(scene), DT)}
+        plain, clipped = drive(scene), drive(scene, enableSAT=1)
+        assert np.array_equal(plain.pose, clipped.pose) and np.array_equal(plain.twist, clipped.twist)
+
+
+@pytest.mark.parametrize(("e", "mu"), [(1.0, 0.0), (0.5, 0.3)])
+@pytest.mark.parametrize("corners", [3, 4, 6])
+def test_a_hull_that_slips_as_it_lands_flat_does_not_turn_where_its_faces_are_known(corners, e, mu):
+    """It leaves with (v - mu (1 + e) w, e w) and no spin: corners ahead are loaded more, and undo what friction turns.
+
+    From vertices the blow is one corner's after another's, and turns it.
+    """
+    start = -0.5 * math.pi + math.pi / corners
+    angles = [start + 2.0 * math.pi * k / corners for k in range(corners)]
+    shape = Polygon(tuple((0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles))
+    body = Body("hull", shape, 1.0, 0.1, (0.0, 0.7, 0.0), (0.5, -1.0, 0.0))
+    floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
+    scene = planar(floor, body, e=e, mu=mu, duration=0.75)
+    found = {changed: drive(scene, enableSAT=changed).twist[-1, 1] for changed in (0, 1)}
+    assert found[1] == pytest.approx((0.5 - mu * (1.0 + e), e, 0.0), abs=1e-9)
+    assert abs(found[0][2]) > 1e-3
+    assert "enableSAT" in {s.name for s in ENGINE.settings("tuned", needs(scene), DT)}
