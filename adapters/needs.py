@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from adapters.drives import top_speed
-from adapters.scene import Box, HalfSpace, Scene
+from adapters.scene import Box, HalfSpace, Hull, Polygon, Scene
 from adapters.shapes import ROUND
 
 Regime = Literal["free", "impact", "rest"]
@@ -46,6 +46,9 @@ class Needs:
         Magnitude [m/s^2].
     pull
         What presses bodies together [m/s^2]: gravity; without it the largest force over the mass it acts on.
+    hulls
+        A body is a convex polygon or hull: engines know balls, capsules and boxes by name, and find contacts of other
+        convex bodies by another way.
     """
 
     dimension: int
@@ -59,6 +62,7 @@ class Needs:
     mass_ratio: float
     gravity: float
     pull: float
+    hulls: bool = False
 
 
 def needs(scene: Scene) -> Needs:
@@ -84,6 +88,7 @@ def needs(scene: Scene) -> Needs:
         mass_ratio=max(masses) / min(masses),
         gravity=gravity,
         pull=gravity or max((math.hypot(*body.force) / body.mass for body in free), default=0.0),
+        hulls=any(isinstance(body.shape, Polygon | Hull) for body in scene.bodies),
     )
 
 

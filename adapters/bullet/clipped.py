@@ -25,18 +25,18 @@ _BODY = """<robot name="body"><link name="body">
 """
 
 
-def box(half_extents: Iterable[float]) -> str:
-    """A box of these half extents [m] in URDF."""
-    return '<box size="{!r} {!r} {!r}"/>'.format(*(2.0 * float(half) for half in half_extents))
+def files(shape: Shape, half_extents: Iterable[float], mass: float) -> dict[str, str]:
+    """Files, by name, of a body of a hull, or of a box of ``half_extents`` [m] that stands for any other shape.
 
-
-def hull(vertices: Iterable[Iterable[float]], folder: Path) -> str:
-    """The hull of vertices [m] in URDF, beside a file in ``folder``; Bullet reads them in single precision."""
-    lines = ["v {!r} {!r} {!r}".format(*map(float, vertex)) for vertex in vertices]
+    ``body.urdf`` is what is loaded; a hull's vertices stand beside it, and Bullet reads them in single precision.
+    """
+    if not isinstance(shape, Hull):
+        stated = '<box size="{!r} {!r} {!r}"/>'.format(*(2.0 * float(half) for half in half_extents))
+        return {"body.urdf": _BODY.format(mass=float(mass), shape=stated)}
+    lines = ["v {!r} {!r} {!r}".format(*map(float, vertex)) for vertex in shape.vertices]
     lines += [f"f 1 {k} {k + 1}" for k in range(2, len(lines))]  # any faces that name all vertices: it makes its own
-    path = folder / "hull.obj"
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-    return f'<mesh filename="{path}"/>'
+    text = "\n".join(lines) + "\n"
+    return {"hull.obj": text, "body.urdf": _BODY.format(mass=float(mass), shape='<mesh filename="hull.obj"/>')}
 
 
 def made(
@@ -49,9 +49,7 @@ def made(
     turn: Iterable[float],
     **how: int,
 ) -> int:
-    """Make a body of a hull, or of a box of ``half_extents`` [m] that stands for any other shape.
-
-    Moments are set afterwards, as for bodies that are made otherwise.
+    """Make the body of `files`. Moments are set afterwards, as for bodies that are made otherwise.
 
     Parameters
     ----------
@@ -67,11 +65,9 @@ def made(
     int
         The body's number in Bullet.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        stated = hull(shape.vertices, folder) if isinstance(shape, Hull) else box(half_extents)
-        path = folder / "body.urdf"
-        path.write_text(_BODY.format(mass=float(mass), shape=stated), encoding="ascii")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in files(shape, half_extents, mass).items():
+            Path(folder, name).write_text(text, encoding="ascii")
         flags = p.URDF_USE_INERTIA_FROM_FILE | (p.URDF_INITIALIZE_SAT_FEATURES if known else 0)
-        fixed = int(mass == 0.0)
-        return int(p.loadURDF(str(path), list(place), list(turn), useFixedBase=fixed, flags=flags, **how))
+        fixed, path = int(mass == 0.0), str(Path(folder, "body.urdf"))
+        return int(p.loadURDF(path, list(place), list(turn), useFixedBase=fixed, flags=flags, **how))

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
+from adapters.bullet import clipped
 from adapters.bullet.profiles import checked
 from adapters.bullet.simulation import HEAVY, WAITING_ROOM
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.drives import velocity_over
 from adapters.engine import EngineError
-from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 from adapters.script import constants, imports, keywords, literal, stepped, text, velocity
 
 
@@ -23,14 +24,18 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
         raise EngineError("pairs: no product of two bodies' values gives this table of materials")
     heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
     masses = [{"free": b.mass, "fixed": 0.0, "prescribed": HEAVY * heaviest}[b.motion] for b in scene.bodies]
-    lines = [*imports(scene, "import pybullet as p"), *constants(dt, steps), "", "p.connect(p.DIRECT)"]
+    filed = settings.get("enableSAT")
+    own = "import pathlib\nimport tempfile\n\nimport pybullet as p" if filed is not None else "import pybullet as p"
+    lines = [*imports(scene, own), *constants(dt, steps), "", "p.connect(p.DIRECT)"]
     lines += [f"p.setPhysicsEngineParameter(fixedTimeStep=DT, {keywords(world)})", "p.setGravity(0.0, 0.0, 0.0)"]
     lines += ["bodies = {}", ""]
+    if filed is not None:
+        lines += _loader(bool(filed), int(settings.get("useMaximalCoordinates", 0)))
     lines.append("# A new inertia or orientation acts a step late: bodies wait far away, already turned, for one step.")
     maximal = int(settings.get("useMaximalCoordinates", 0))
     for i, body in enumerate(scene.bodies):
         values = {"restitution": restitution[i], "lateralFriction": friction[i], **material}
-        lines += _made(i, body, scene, masses[i], maximal, values)
+        lines += _made(i, body, scene, masses[i], maximal, values, filed is not None)
     for a, b in combinations([body.name for body in scene.bodies if body.motion != "free"], 2):
         lines.append(f"p.setCollisionFilterPair(bodies[{a!r}], bodies[{b!r}], -1, -1, 0)")
     lines += ["p.stepSimulation()", "", "# Now to their places."]
@@ -40,8 +45,27 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     return text(lines + stepped([*_loads(scene, masses), "p.stepSimulation()"]))
 
 
-def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any]) -> list[str]:
-    """Lines that make a body in its place in the waiting room."""
+def _loader(known: bool, maximal: int) -> list[str]:
+    """Lines of a function that makes a body from files, the only ones whose faces Bullet knows."""
+    flags = "p.URDF_USE_INERTIA_FROM_FILE" + (" | p.URDF_INITIALIZE_SAT_FEATURES" if known else "")
+    return [
+        "",
+        "def loaded(files, place, turn, fixed):",
+        "    with tempfile.TemporaryDirectory() as folder:",
+        "        for name, text in files.items():",
+        '            pathlib.Path(folder, name).write_text(text, encoding="ascii")',
+        '        path = str(pathlib.Path(folder, "body.urdf"))',
+        f"        how = dict(useFixedBase=fixed, flags={flags}, useMaximalCoordinates={maximal})",
+        "        return p.loadURDF(path, place, turn, **how)",
+        "",
+        "",
+    ]
+
+
+def _made(
+    index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any], filed: bool
+) -> list[str]:
+    """Lines that make a body in its place in the waiting room; boxes and hulls from files, where they have to be."""
     sizes, _, quaternion = placement(body, scene)
     shape = f"p.GEOM_BOX, halfExtents={literal(sizes)}"
     if isinstance(body.shape, Sphere):
@@ -53,12 +77,13 @@ def _made(index: int, body: Body, scene: Scene, mass: float, maximal: int, mater
         lying = f"collisionFrameOrientation={literal(Z_TO_X)}"
         shape = f"{kind}, radius={sizes[0]!r}, height={sizes[1]!r}, {lying}"
     waiting = (WAITING_ROOM * (index + 1), WAITING_ROOM, WAITING_ROOM)
-    given = f"{mass!r}, shape, -1, {literal(waiting)}, {literal(quaternion)}, useMaximalCoordinates={maximal}"
-    lines = [
-        f"shape = p.createCollisionShape({shape})",
-        f"body = bodies[{body.name!r}] = p.createMultiBody({given})",
-        f"p.changeDynamics(body, -1, {keywords(material)})",
-    ]
+    place = f"{literal(waiting)}, {literal(quaternion)}"
+    made = f"p.createMultiBody({mass!r}, shape, -1, {place}, useMaximalCoordinates={maximal})"
+    lines = [f"shape = p.createCollisionShape({shape})"]
+    if filed and isinstance(body.shape, Box | HalfSpace | Hull):
+        lines = [f"files = {clipped.files(body.shape, sizes, mass)!r}"]
+        made = f"loaded(files, {place}, {int(mass == 0.0)})"
+    lines += [f"body = bodies[{body.name!r}] = {made}", f"p.changeDynamics(body, -1, {keywords(material)})"]
     if body.motion != "fixed":
         lines.append(f"p.changeDynamics(body, -1, mass={mass!r}, localInertiaDiagonal={literal(moments(body, mass))})")
     if body.motion == "prescribed":

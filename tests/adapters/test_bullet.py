@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 
 
 from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, needs, run
-from adapters.bullet import BulletEngine
+from adapters.bullet import BulletEngine, clipped
 from adapters.bullet.contact_law import ContactLaw, fall
 from adapters.bullet.profiles import law_of
 from adapters.bullet.shipped import WARM_STARTING
@@ -22,7 +22,7 @@ from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
-from adapters.scene import Hull
+from adapters.scene import Hull, Polygon
 from validation.catalogue import CATALOGUE
 
 ENGINE = BulletEngine()
@@ -612,9 +612,91 @@ def test_a_hull_from_a_file_is_the_hull_of_its_vertices():
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), -0.1), motion="fixed")
     gaps = {}
     for name, changes in {"vertices": {}, "file": {"enableSAT": 0}, "faces": {"enableSAT": 1}}.items():
-        rows = drive(scene_of(floor, hull, above, duration=DT), **changes).contacts.rows
+        rows = drive(scene_of(floor, hull, above, duration=DT), "one", **changes).contacts.rows
         gaps[name] = [rows.gap[(rows.a == a) & (rows.b == b)].min() for a, b in ((0, 1), (1, 2))]
     # A hull keeps a margin of 1 mm, but where faces are clipped; vertices of a file are rounded to 24 bits.
     assert gaps["vertices"] == pytest.approx([-1e-3, -2e-3], abs=1e-12)
     assert gaps["file"] == pytest.approx([-1e-3, -2e-3], abs=1e-7)
     assert gaps["faces"] == pytest.approx([0.0, -2e-3], abs=1e-7)
+
+
+def test_tuned_clips_faces_where_there_are_hulls_and_boxes_do_not_need_it():
+    """Columns, slopes and blows of boxes alone have the same bits either way: theirs is another detector."""
+    wedge = CATALOGUE["wedge"].scene(2, {})
+    assert {s.name: s.value for s in ENGINE.settings("tuned", needs(wedge), DT)}["enableSAT"] == 1
+    for name, params in (("incline", {}), ("pinch", {"margin": 100.0}), ("flat_box", {})):
+        scene = replace(CATALOGUE[name].scene(2, params), duration=0.25)
+        assert "enableSAT" not in {s.name for s in ENGINE.settings("tuned", needs(scene), DT)}
+        plain, other = drive(scene), drive(scene, enableSAT=1)
+        assert np.array_equal(plain.pose, other.pose) and np.array_equal(plain.twist, other.twist)
+
+
+@pytest.mark.parametrize(("e", "mu"), [(1.0, 0.0), (0.5, 0.3)])
+@pytest.mark.parametrize("corners", [3, 4, 6])
+def test_a_hull_that_slips_as_it_lands_flat_does_not_turn_where_its_faces_are_known(corners, e, mu):
+    """It leaves with (v - mu (1 + e) w, e w) and no spin: corners ahead are loaded more, and undo what friction turns.
+
+    From vertices the blow is one corner's after another's, and turns it.
+    """
+    start = -0.5 * math.pi + math.pi / corners
+    angles = [start + 2.0 * math.pi * k / corners for k in range(corners)]
+    shape = Polygon(tuple((0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles))
+    body = Body("hull", shape, 1.0, 0.1, (0.0, 0.7, 0.0), (0.5, -1.0, 0.0))
+    floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
+    scene = planar(floor, body, e=e, mu=mu, duration=0.75)
+    found = {changed: drive(scene, enableSAT=changed).twist[-1, 1] for changed in (0, 1)}
+    assert found[1] == pytest.approx((0.5 - mu * (1.0 + e), e, 0.0), abs=1e-9)
+    assert abs(found[0][2]) > 1e-3
+    assert "enableSAT" in {s.name for s in ENGINE.settings("tuned", needs(scene), DT)}
+
+
+#: Cells in which Bullet keeps the vertices of a hull, along each axis of its extents (btConvexHullComputer.cpp).
+CELLS = 10216
+
+
+def on_the_grid(vertices):
+    """The grid points next to vertices, a thousandth of a cell outwards: what is cut off there is nothing."""
+    corners = np.array(vertices)
+    centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    cell = (corners.max(axis=0) - corners.min(axis=0)) / CELLS
+    steps = np.round((corners - centre) / cell)
+    return Hull(tuple(map(tuple, (centre + cell * (steps + 1e-3 * np.sign(steps))).tolist())))
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "metric"),
+    [("arch", {}, "moved"), ("arch", {"ratio": 1.02}, "moved"), ("arch", {"ratio": 0.8}, "off_the_faces"),
+     ("wedge", {"ratio": 100.0}, "acceleration")],
+)  # fmt: skip
+def test_what_clipped_hulls_get_wrong_is_the_grid_of_their_vertices(name, params, metric, monkeypatch):
+    """Families `arch-hull-grid` and `wedge-hull-grid`: where vertices lie on the grid already, the check passes."""
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(2, params)
+    check = next(check for check in canonical.checks(scene, DT) if check.metric == metric)
+
+    def error():
+        value, _ = canonical.measure(scene, drive(scene, sampling=canonical.sampling(scene)))[metric]
+        return abs(value - check.truth)
+
+    cut = error()
+    as_stated = clipped.files
+
+    def rounded(shape, *rest):
+        return as_stated(on_the_grid(shape.vertices) if isinstance(shape, Hull) else shape, *rest)
+
+    monkeypatch.setattr(clipped, "files", rounded)
+    assert error() < check.bound < cut
+
+
+def test_a_hull_is_cut_to_its_grid_by_a_whole_cell_or_not_at_all():
+    """A hull hovers where its lowest vertices are cut: round-off decides for each whether they are."""
+    rng, cells = np.random.default_rng(1), []
+    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed")
+    for half in rng.uniform(0.2, 1.5, (12, 3)):
+        corners = tuple(product(*((-h, h) for h in half)))
+        hull = Body("hull", Hull(corners), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, half[2] - 1e-3, *UPRIGHT))
+        gap = drive(scene_of(floor, hull, duration=DT)).contacts.rows.gap.min()
+        cells.append((gap + 1e-3) / (2.0 * half[2] / CELLS))
+    # 1e-3 cells: the 24 bits of a vertex in a file are 6e-8 of it, and it is 5108 cells from the middle.
+    assert np.abs(np.array(cells) - np.round(cells)).max() < 1e-3
+    assert set(np.round(cells)) == {0.0, 1.0}

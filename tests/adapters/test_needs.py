@@ -9,7 +9,7 @@ import pytest
 
 from adapters.materials import Materials, Pair
 from adapters.needs import Needs, needs
-from adapters.scene import Body, Box, Disc, HalfSpace, Harmonic, Scene, SceneError
+from adapters.scene import Body, Box, Disc, HalfSpace, Harmonic, Polygon, Scene, SceneError
 
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
 
@@ -200,3 +200,10 @@ def test_entries_of_both_one_and_none_are_asked_in_that_order():
     assert said("a", "c") == said("c", "b") == {(0.25, 0.0)}
     assert said("c", "d") == {(0.125, 0.0)}
     assert Materials(()).said("a", "b") == frozenset()
+
+
+def test_polygons_and_hulls_are_hulls_wherever_they_stand_and_boxes_are_none():
+    corners = ((-0.5, -0.5), (0.5, -0.5), (0.0, 1.0))
+    assert not needs(scene(FLOOR, ball(shape=Box((0.25, 0.25))))).hulls
+    assert needs(scene(FLOOR, ball(shape=Polygon(corners)))).hulls
+    assert needs(scene(ball(), Body("step", Polygon(corners), pose=(0.0, 0.0, 0.0), motion="fixed"))).hulls

@@ -98,6 +98,12 @@ def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
 
+def test_so_does_one_whose_bodies_come_from_files(tmp_path):
+    """Tuned Bullet clips faces of hulls, and knows those of bodies from URDF alone."""
+    pytest.importorskip("pybullet")
+    assert_same_bits(slot_of("bullet", "wedge", {}, "tuned", 2), tmp_path)
+
+
 @pytest.mark.parametrize(("scene", "params"), [("oblique", {"e": 0.5}), ("pinch", {}), ("tumble", {})])
 def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, tmp_path):
     pytest.importorskip("mujoco")
