@@ -104,5 +104,5 @@ def matching(pattern: str) -> list[CanonicalScene]:
     if pattern in _entries() and isinstance(reason := _loaded(pattern), SceneError):
         raise reason
     close = difflib.get_close_matches(pattern, CATALOGUE, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(CATALOGUE)}"
+    hint = f"did you mean {close[0]!r}?" if close else f"there are {len(CATALOGUE)}: crosscheck list scenes"
     raise SceneError(f"scene: there is no scene called {pattern!r}, {hint}")

@@ -68,7 +68,10 @@ def pinned(argument: str, drop: bool = False) -> str:
     if Path(path).suffix.lower() not in _OWN:
         from validation.files import model_files
 
-        text = model_files.text_of(text, Path(path).suffix, drop)
+        try:
+            text = model_files.text_of(text, Path(path).suffix, drop)
+        except SceneError as error:  # who reads a text does not know the name of its file
+            raise SceneError(f"{path}: {str(error).removeprefix('model: ')}") from None
     digest = _digest(text)
     if wanted and wanted.lower() != digest:
         raise SceneError(f"scene: {path} has changed since it was {wanted}; it is {digest} now")

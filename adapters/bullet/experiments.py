@@ -8,6 +8,7 @@ from adapters.bullet.experiments_elsewhere import ELSEWHERE
 from adapters.bullet.experiments_on_blows import on_blows
 from adapters.bullet.experiments_on_loads import ON_LOADS
 from adapters.bullet.experiments_on_rods import ON_RODS
+from adapters.bullet.experiments_out_of_plane import OUT_OF_PLANE
 from adapters.experiment import Cured, Experiment
 
 #: Iterations are left alone: they cost time, and any count is better than a lower one.
@@ -418,3 +419,5 @@ EXPERIMENTS += on_blows(_BARE)
 EXPERIMENTS += ON_RODS
 
 EXPERIMENTS += ELSEWHERE
+
+EXPERIMENTS += OUT_OF_PLANE

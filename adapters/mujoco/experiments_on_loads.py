@@ -271,6 +271,32 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
         ),
         *(
             Experiment(
+                f"{scene.replace('_', '-')}-plane-tolerance",
+                "solved on to round-off the bodies stay in their plane; stiffer friction does not do it",
+                "default",
+                scene,
+                "out_of_plane",
+                {"tolerance": 0.0, "iterations": 1000},
+                params,
+                idle=idle,
+            )
+            for scene, params, idle in (
+                ("arch", dict[str, float](), ({"impratio": 1e4},)),
+                ("edge_drop", {"e": 1.0, "tilt": 30.0}, ({"impratio": 1e4},)),
+            )
+        ),
+        Experiment(
+            "arch-plane-margin",
+            "without a margin the stones stay in their plane; more steps of Newton or stiffer friction do not keep "
+            "them there",
+            "tuned",
+            "arch",
+            "out_of_plane",
+            {"margin": 0.0},
+            idle=({"tolerance": 0.0, "iterations": 1000}, {"impratio": 1e4}),
+        ),
+        *(
+            Experiment(
                 "starved-first-newton-step",
                 "with a hundred iterations the row rests and carries; contacts seen from 1 mm do not make it",
                 "default",
