@@ -19,7 +19,7 @@ import numpy as np
 
 from adapters.engine import Setting
 from adapters.markup import Element, parsed, text_of
-from adapters.model import ALIGNED, ALONG, DURATION, Model, pairs_of, unique, unit
+from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, unique, unit
 from adapters.mujoco.combination import Contact, contact_of
 from adapters.mujoco.markup import cleaned
 from adapters.mujoco.options import option_settings
@@ -207,7 +207,9 @@ class _Reading:
                 raise Refused("geom", self._name("geom", g), "a plane cannot move")
             normal = unit(turn[:, 2])
             return Body(name, HalfSpace(normal, float(np.dot(normal, d.geom_xpos[g])) + 0.0), motion="fixed")
+        rod = isinstance(shape, Capsule | Cylinder)
         if not weld:
+            turn = _in_plane(turn) if rod else turn
             return Body(name, shape, pose=(*place, *_quaternion(self.mujoco, turn)), motion="fixed")
         size = shape.smallest_size
         centre = np.array(d.xipos[weld])
@@ -230,6 +232,8 @@ class _Reading:
                     "its principal axes are not its geom's; a scene's body has both in one direction",
                 )
             moments = np.diag(own)
+            if rod and abs(moments[1] - moments[2]) <= ALIGNED * moments.max():
+                turn = _in_plane(turn)
         velocity = np.zeros(6)
         self.mujoco.mj_objectVelocity(m, d, int(self.mujoco.mjtObj.mjOBJ_BODY), weld, velocity, 0)
         return Body(
@@ -324,6 +328,17 @@ class _Reading:
         if apart:
             settings.append(Setting("apart", apart, "pairs of bodies that are softer or harder than the rest", source))
         return settings
+
+
+def _in_plane(turn: Any) -> Any:
+    """A turn of what is round about its first axis, about which it may lie anyhow: y stays y where that axis has none.
+
+    MuJoCo's ``fromto`` turns a rod over that points down.
+    """
+    axis = np.where(np.abs(turn[:, 0]) < ROUNDING, 0.0, turn[:, 0])
+    if axis[1] != 0.0:
+        return turn
+    return np.column_stack([axis, (0.0, 1.0, 0.0), np.cross(axis, (0.0, 1.0, 0.0))])
 
 
 def _quaternion(mujoco: Any, turn: Any) -> tuple[float, ...]:

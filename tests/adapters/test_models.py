@@ -203,6 +203,19 @@ def test_rods_lie_along_their_bodies_first_axis():
         text.replace("cylinder", "capsule"), False).scene) is not None  # fmt: skip
 
 
+@pytest.mark.parametrize(("moments", "planar"), [(".05 .05 .01", True), (".05 .04 .01", False)])
+def test_only_a_rod_that_is_round_in_its_moments_may_lie_anyhow_about_its_axis(moments, planar):
+    rod = (
+        '<body pos="0 0 1" zaxis="1 0 0"><freejoint/><geom type="capsule" fromto="0 0 .2 0 0 -.2" size=".1"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="{moments}" euler="0 0 20"/></body>'
+    )
+    if planar:
+        assert lowered(reading.read(model_of(rod), False).scene) is not None
+    else:
+        with pytest.raises(SceneError, match="its principal axes are not its geom's"):
+            reading.read(model_of(rod), False)
+
+
 MESH = '<asset><mesh name="m" vertex="{}"{}/></asset>'
 TETRAHEDRON = "0 0 0  1 0 0  0 1 0  0 0 1"
 SOLID = '<body name="solid" pos="0 0 2"><freejoint/><geom type="mesh" mesh="m"/></body>'
@@ -272,6 +285,7 @@ def test_contacts_combine_as_mujoco_combines_them(first, second):
 
 def test_a_model_that_lies_in_the_plane_is_a_planar_scene_and_lifts_back():
     found = {path.stem: lowered(reading.read(path.read_text(), False).scene) for path in READ}
+    assert found["capsules"] is not None  # MuJoCo's `fromto` turns the rail about its axis, out of the plane
     assert found["box_tilted"] is not None and found["ball_in_tray"] is None and found["box_spinning"] is None
     for path in READ:
         flat, scene = found[path.stem], reading.read(path.read_text(), False).scene
