@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import traceback
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -35,20 +36,22 @@ from adapters.engine import (
 )
 from adapters.isolation import Child, IsolationError, Lost
 from adapters.needs import Needs
-from adapters.plain import NAME, one_line, plain
+from adapters.plain import NAME, lines, one_line, plain
 from adapters.scene import Scene
 
 #: Seconds for an import: the largest engines with Python bindings take about ten on a cold disk.
 PATIENCE = 30.0
 #: Seconds for a question to an engine that is loaded.
 ANSWER = 10.0
+#: Lines of a traceback that are kept: ten calls deep.
+TRACE = 30
 
 
 @dataclass(frozen=True)
 class Found:
     """An engine that was looked for: loaded (or described by its process), or the reason why not.
 
-    ``fatal``: the plugin ends or hangs the process that imports it.
+    ``fatal``: the plugin ends or hangs the process that imports it. ``trace``: where it raised what is the reason.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Found:
     reason: str = ""
     facts: EngineFacts | None = None
     fatal: bool = False
+    trace: str = ""
 
 
 class ForeignEngine(Engine):
@@ -107,7 +111,7 @@ def probe(entry: EntryPoint) -> Found:
     facts = facts_from(told["facts"]) if told.get("facts") else None
     if told.get("reason"):
         child.stop()
-        return Found(entry.name, None, "", told["reason"], facts, bool(told.get("fatal")))
+        return Found(entry.name, None, "", told["reason"], facts, bool(told.get("fatal")), told.get("trace", ""))
     return Found(entry.name, ForeignEngine(entry, child, told), told["version"], "", facts)
 
 
@@ -122,7 +126,7 @@ def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
         child.stop()
         said = one_line(child.tail().rpartition("\n")[2])
         reason = f"{lost} while it was imported" + (f": {said}" if said else "")
-        return child, {"reason": reason, "fatal": True}
+        return child, {"reason": reason, "fatal": True, "trace": lines(child.tail(), TRACE)}
     return child, told
 
 
@@ -132,7 +136,7 @@ def serve(connection: Connection) -> None:
 
     name, value, group, distribution = json.loads(connection.recv_bytes())
     found = loaded(EntryPoint(name, value, group), distribution)
-    told: dict[str, Any] = {"version": found.version, "reason": found.reason}
+    told: dict[str, Any] = {"version": found.version, "reason": found.reason, "trace": found.trace}
     if found.facts is not None:
         told["facts"] = plain_facts(found.facts)
     if found.engine is not None:
@@ -177,6 +181,11 @@ def _settings(engine: Engine, asked: Mapping[str, Any]) -> dict[str, Any]:
         return {"settings": [plain(asdict(setting)) for setting in checked_settings(given)]}
     except BaseException as error:  # whatever a plugin raises is its own error
         return {"error": said_by(error)}
+
+
+def trace_of(error: BaseException) -> str:
+    """Last lines of the traceback of what was raised, each cleaned."""
+    return lines("".join(traceback.format_exception(error)), TRACE)
 
 
 def said_by(error: BaseException) -> str:

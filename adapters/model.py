@@ -33,6 +33,8 @@ DURATION = 2.0
 ROUNDING = 1e-14
 #: A centre of mass or an axis this far from its shape's, relative to its size, is its shape's.
 ALIGNED = 1e-9
+#: Rods lie along z in models and along x here: turned by -90 degrees about y, which keeps their plane.
+ALONG = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class ReaderMissing(EngineError):

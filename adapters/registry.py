@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
-from adapters.foreign import Found, checked_facts, probe, said_by
+from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
 from adapters.plain import NAME, is_visible, one_line
 
 GROUP = "contact_crosscheck.engines"
@@ -123,9 +123,13 @@ def loaded(entry: EntryPoint, distribution: str = "") -> Found:
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
         return Found(name, engine, one_line(engine.version(), NAME), "", facts)
     except ImportError as error:
-        return Found(name, None, "", f"{one_line(error)}; {_remedy(entry, facts, distribution)}", facts)
+        reason, trace = (
+            f"{one_line(error)}; {_remedy(entry, facts, distribution)}",
+            "" if is_ours(entry) else trace_of(error),
+        )
+        return Found(name, None, "", reason, facts, trace=trace)
     except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
-        return Found(name, None, "", said_by(error), facts)
+        return Found(name, None, "", said_by(error), facts, trace=trace_of(error))
 
 
 def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:

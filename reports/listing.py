@@ -158,7 +158,10 @@ def doctor() -> dict[str, Any]:
             problems.append(f"the package {name!r} on this path is not ours: {path.parent}")
     problems += broken() + engine_folder.problems()
     found = engines()
+    traces: dict[str, list[str]] = {}
     for engine in found:
+        trace = registry.find(engine["name"]).trace
+        traces |= {engine["name"]: trace.splitlines()} if trace else {}
         if engine["reason"] and engine["name"] in registry.usual():
             problems.append(f"{engine['name']}: {engine['reason']}")
         loaded = registry.find(engine["name"]).engine
@@ -183,4 +186,5 @@ def doctor() -> dict[str, Any]:
             "compiled": os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"),
         },
         "problems": problems,
+        "traces": traces,
     }

@@ -209,6 +209,10 @@ def health(data: Plain, console: Console) -> None:
     console.print(Text("no problem found" if not problems else f"{len(problems)} problem(s)", style="bold"))
     for problem in problems:
         console.print(Text(f"  {problem}"))
+    for name, trace in data["traces"].items():
+        console.print(Text(f"\nwhere {name} raised it", style="bold"))
+        for line in trace:
+            console.print(Text(f"  {line}"))
 
 
 def sensitivity(

@@ -24,14 +24,12 @@ from adapters.drake.profiles import OWN, rule
 from adapters.drake.translation import pair_of
 from adapters.engine import Setting
 from adapters.markup import Element, parsed, text_of
-from adapters.model import ALIGNED, DURATION, ROUNDING, Model, pairs_of, unique, unit
+from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, unique, unit
 from adapters.plain import one_line
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, SceneError, Shape, Sphere
 
 #: Where Drake's parser says that something is wrong: the text that it is handed keeps its lines.
 _WHERE = re.compile(r"^(?:<[\w-]+>(?:\.sdf)?:(?P<line>\d+): )?(?:error: )?(?:Error: )?")
-#: Cylinders and capsules lie along z there and along x here: turned by -90 degrees about y, which keeps their plane.
-_ALONG = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class _Refused(Exception):
@@ -250,7 +248,7 @@ class _Reading:
         shape = self._shape(part.geometry)
         held = self.plant.EvalBodyPoseInWorld(self.context, part.body)
         own = self.inspector.GetPoseInFrame(part.geometry)
-        along = _ALONG if isinstance(shape, Cylinder | Capsule) else np.eye(3)
+        along = ALONG if isinstance(shape, Cylinder | Capsule) else np.eye(3)
         inside = own.rotation().matrix() @ along
         turn = held.rotation().matrix() @ inside
         place = np.array(held.multiply(own.translation()))

@@ -37,9 +37,11 @@ NO_PLACE = {
     "flexcomp": "bodies of a scene are rigid",
     "composite": "bodies of a scene are rigid and free",
     "skin": "bodies of a scene are rigid",
-    "mesh": "a scene has no meshes",
+    "mesh": "a scene has no meshes but hulls of vertices",
     "hfield": "a scene has no height fields",
 }
+#: What a mesh may state that is the hull of its vertices, a solid of one density.
+HULL = frozenset(["name", "class", "vertex", "scale"])
 
 
 def cleaned(root: Element, drop: bool) -> list[str]:
@@ -108,6 +110,8 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
         if child.tag in SILENT:
             continue
         why = NO_PLACE.get(child.tag) if element.tag != "default" else None
+        if child.tag == "mesh":
+            why = _no_hull(child) or ("" if element.tag == "default" or "vertex" in child.attributes else why)
         if "file" in child.attributes:
             why = "other files are not read"
         elif child.tag not in KEPT and child.tag not in NO_PLACE and element.tag != "default":
@@ -122,11 +126,17 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
             raise SceneError(f"model: line {child.line}: {one_line(name, 40)!r} cannot be a name")
         for attribute in ("material", "rgba", "user", "group"):
             child.attributes.pop(attribute, None)
-        if element.tag == "default" and child.tag not in ("geom", "default", "pair", "joint"):
+        if element.tag == "default" and child.tag not in ("geom", "default", "pair", "joint", "mesh"):
             continue
         _clean(child, drop, dropped)
         kept.append(child)
     element.children = kept
+
+
+def _no_hull(mesh: Element) -> str | None:
+    """What a mesh, or a default of meshes, states that the hull of its vertices does not have."""
+    other = sorted(set(mesh.attributes) - HULL - {"file"})
+    return f"{other[0]}: {NO_PLACE['mesh']}" if other else None
 
 
 def _made(element: Element) -> float:

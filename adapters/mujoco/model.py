@@ -19,13 +19,14 @@ import numpy as np
 
 from adapters.engine import Setting
 from adapters.markup import Element, parsed, text_of
-from adapters.model import ALIGNED, DURATION, Model, pairs_of, unique, unit
+from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, unique, unit
 from adapters.mujoco.combination import Contact, contact_of
 from adapters.mujoco.markup import cleaned
 from adapters.mujoco.options import option_settings
 from adapters.mujoco.refusal import Refused
 from adapters.plain import one_line
-from adapters.scene import Body, Box, HalfSpace, Scene, SceneError, Shape, Sphere
+from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, SceneError, Shape, Sphere
+from adapters.shapes import MOST_VERTICES
 
 
 def read(text: str, drop: bool) -> Model:
@@ -127,6 +128,13 @@ class _Reading:
         gravity = tuple(float(g) + 0.0 for g in m.opt.gravity)
         if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
             gravity = (0.0, 0.0, 0.0)
+        beside = [name for g, name in zip(shaped, self._names(shaped), strict=True) if self._turns_beside_centre(g)]
+        if beside:
+            which = one_line(", ".join(beside), 120)
+            self.notes.append(
+                f"{which}: MuJoCo moves a body's origin, which is not its centre of mass; profile model moves the "
+                "centre: a step of a body that turns ends otherwise by |w|^2 dt^2/2 of the way between them"
+            )
         pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
         self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
@@ -190,6 +198,8 @@ class _Reading:
         m, d = self.compiled, self.data
         shape = self._shape(g)
         turn = np.array(d.geom_xmat[g]).reshape(3, 3)
+        if isinstance(shape, Capsule | Cylinder):
+            turn = turn @ ALONG
         place = tuple(float(x) + 0.0 for x in d.geom_xpos[g])
         weld = int(m.body_weldid[m.geom_bodyid[g]])
         if isinstance(shape, HalfSpace):
@@ -197,7 +207,9 @@ class _Reading:
                 raise Refused("geom", self._name("geom", g), "a plane cannot move")
             normal = unit(turn[:, 2])
             return Body(name, HalfSpace(normal, float(np.dot(normal, d.geom_xpos[g])) + 0.0), motion="fixed")
+        rod = isinstance(shape, Capsule | Cylinder)
         if not weld:
+            turn = _in_plane(turn) if rod else turn
             return Body(name, shape, pose=(*place, *_quaternion(self.mujoco, turn)), motion="fixed")
         size = shape.smallest_size
         centre = np.array(d.xipos[weld])
@@ -220,6 +232,8 @@ class _Reading:
                     "its principal axes are not its geom's; a scene's body has both in one direction",
                 )
             moments = np.diag(own)
+            if rod and abs(moments[1] - moments[2]) <= ALIGNED * moments.max():
+                turn = _in_plane(turn)
         velocity = np.zeros(6)
         self.mujoco.mj_objectVelocity(m, d, int(self.mujoco.mjtObj.mjOBJ_BODY), weld, velocity, 0)
         return Body(
@@ -231,6 +245,12 @@ class _Reading:
             tuple(float(x) + 0.0 for x in (*velocity[3:], *velocity[:3])),
         )
 
+    def _turns_beside_centre(self, g: int) -> bool:
+        """Whether a geom's body is free, and may turn about another point than its joint moves."""
+        weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
+        apart = np.abs(self.data.xipos[weld] - self.data.xpos[weld]).max()
+        return bool(weld) and float(apart) > ALIGNED * self._shape(g).smallest_size
+
     def _shape(self, g: int) -> Shape:
         kinds, size = self.mujoco.mjtGeom, self.compiled.geom_size[g]
         kind = kinds(int(self.compiled.geom_type[g]))
@@ -240,12 +260,30 @@ class _Reading:
             return Sphere(float(size[0]))
         if kind == kinds.mjGEOM_BOX:
             return Box(tuple(float(s) for s in size))
+        if kind in (kinds.mjGEOM_CAPSULE, kinds.mjGEOM_CYLINDER):
+            return (Capsule if kind == kinds.mjGEOM_CAPSULE else Cylinder)(float(size[1]), float(size[0]))
+        if kind == kinds.mjGEOM_MESH:
+            return self._hull(g)
         named = kind.name.removeprefix("mjGEOM_").lower()
         weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
-        why = f"{'an' if named[0] in 'aeiou' else 'a'} {named}; a scene has spheres, boxes and planes"
+        why = f"{'an' if named[0] in 'aeiou' else 'a'} {named}; a scene has spheres, boxes, rods, hulls and planes"
         if weld and self.drop:  # a body without its shape is none
             raise Refused("body", self._name("body", weld), f"its geom is {why}")
         raise Refused("geom", self._name("geom", g), why)
+
+    def _hull(self, g: int) -> Shape:
+        """Corners of a mesh that states vertices alone: those of its hull, in the compiler's singles."""
+        m, mesh = self.compiled, int(self.compiled.geom_dataid[g])
+        first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
+        graph = m.mesh_graph[int(m.mesh_graphadr[mesh]) :]
+        corners = int(graph[0])
+        if not 4 <= corners <= MOST_VERTICES:
+            raise Refused(
+                "geom", self._name("geom", g), f"its hull has {corners} corners, a scene's 4 to {MOST_VERTICES}"
+            )
+        of = sorted(int(k) for k in graph[2 + corners : 2 + 2 * corners])
+        vertices = np.array(m.mesh_vert[first : first + count], float)[of]
+        return Hull(tuple((float(x), float(y), float(z)) for x, y, z in vertices))
 
     # ---- contacts ----
 
@@ -290,6 +328,17 @@ class _Reading:
         if apart:
             settings.append(Setting("apart", apart, "pairs of bodies that are softer or harder than the rest", source))
         return settings
+
+
+def _in_plane(turn: Any) -> Any:
+    """A turn of what is round about its first axis, about which it may lie anyhow: y stays y where that axis has none.
+
+    MuJoCo's ``fromto`` turns a rod over that points down.
+    """
+    axis = np.where(np.abs(turn[:, 0]) < ROUNDING, 0.0, turn[:, 0])
+    if axis[1] != 0.0:
+        return turn
+    return np.column_stack([axis, (0.0, 1.0, 0.0), np.cross(axis, (0.0, 1.0, 0.0))])
 
 
 def _quaternion(mujoco: Any, turn: Any) -> tuple[float, ...]:

@@ -4,7 +4,7 @@
 
 URDF does not say whether a robot is held: as in Bullet and Gazebo its root is free, unless it is called ``world`` or
 has no mass. It states neither friction, nor softness, nor a floor: what MuJoCo takes for them is said. Joints that are
-neither fixed nor floating, meshes and cylinders have no place in a scene.
+neither fixed nor floating, and meshes, have no place in a scene.
 """
 
 from __future__ import annotations

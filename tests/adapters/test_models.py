@@ -9,6 +9,7 @@ from adapters import registry
 from adapters.lift import lift, lowered
 from adapters.model import Model, model_from_dict, read, reader_of
 from adapters.scene import Box, HalfSpace, SceneError, Sphere
+from adapters.shapes import Capsule, Cylinder, Hull
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 
@@ -19,7 +20,7 @@ MODELS = Path(__file__).parents[1] / "models"
 READ = sorted(path for path in MODELS.glob("*.xml") if not path.name.startswith("refused"))
 #: What each refused model has that no scene has a place for: the line, the element, its name.
 REFUSED = {
-    "refused_capsule": "line 6: <geom>: a capsule",
+    "refused_ellipsoid": "line 6: <geom>: an ellipsoid",
     "refused_hinge": "line 4: <body> 'door': a hinge joint",
     "refused_mesh_file": "line 3: <mesh> 'bunny': other files are not read",
     "refused_off_centre": "line 4: <body> 'weeble': its centre of mass",
@@ -177,9 +178,76 @@ def test_a_keyframe_s_speed_is_that_of_the_centre_of_mass():
         '<body name="ball"><freejoint/><geom type="sphere" size=".1" pos="0 0 .5"/></body>',
         after='<keyframe><key qpos="0 0 0 1 0 0 0" qvel="1 0 0 2 0 0"/></keyframe>',
     )
-    body = reading.read(text, False).scene.bodies[0]
+    found = reading.read(text, False)
+    body = found.scene.bodies[0]
+    assert any(note.startswith("ball: MuJoCo moves a body's origin") for note in found.notes)
+    assert not any("origin" in note for note in reading.read(model_of(BALL), False).notes)
     assert body.pose[:3] == pytest.approx((0.0, 0.0, 0.5))
     assert body.twist == pytest.approx((1.0, -1.0, 0.0, 2.0, 0.0, 0.0))
+
+
+def test_rods_lie_along_their_bodies_first_axis():
+    text = model_of(
+        '<body name="pill" pos="0 0 1" euler="0 60 0"><freejoint/><geom type="capsule" size=".1 .2"/></body>'
+        '<body name="can" pos="2 0 1"><freejoint/><geom type="cylinder" size=".1 .2" mass="3"/></body>'
+    )
+    pill, can = reading.read(text, False).scene.bodies
+    assert pill.shape == Capsule(0.2, 0.1) and can.shape == Cylinder(0.2, 0.1)
+    for body, lean in ((pill, np.radians(60.0)), (can, 0.0)):
+        w, x, y, z = body.pose[3:]
+        axis = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
+        assert axis == pytest.approx((np.sin(lean), 0.0, np.cos(lean)), abs=1e-15)
+    across = 3.0 * (0.1**2 / 4.0 + 0.4**2 / 12.0)
+    assert can.inertia == pytest.approx((3.0 * 0.1**2 / 2.0, across, across))
+    assert lowered(reading.read(text, False).scene) is None and lowered(reading.read(
+        text.replace("cylinder", "capsule"), False).scene) is not None  # fmt: skip
+
+
+@pytest.mark.parametrize(("moments", "planar"), [(".05 .05 .01", True), (".05 .04 .01", False)])
+def test_only_a_rod_that_is_round_in_its_moments_may_lie_anyhow_about_its_axis(moments, planar):
+    rod = (
+        '<body pos="0 0 1" zaxis="1 0 0"><freejoint/><geom type="capsule" fromto="0 0 .2 0 0 -.2" size=".1"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="{moments}" euler="0 0 20"/></body>'
+    )
+    if planar:
+        assert lowered(reading.read(model_of(rod), False).scene) is not None
+    else:
+        with pytest.raises(SceneError, match="its principal axes are not its geom's"):
+            reading.read(model_of(rod), False)
+
+
+MESH = '<asset><mesh name="m" vertex="{}"{}/></asset>'
+TETRAHEDRON = "0 0 0  1 0 0  0 1 0  0 0 1"
+SOLID = '<body name="solid" pos="0 0 2"><freejoint/><geom type="mesh" mesh="m"/></body>'
+
+
+def test_a_mesh_of_vertices_alone_is_their_hull_about_its_centroid():
+    """Of a tetrahedron with a vertex within it: a sixth of a cube's volume, a quarter from each face."""
+    (body,) = reading.read(model_of(SOLID, head=MESH.format(TETRAHEDRON + "  .1 .1 .1", "")), False).scene.bodies
+    assert isinstance(body.shape, Hull) and len(body.shape.vertices) == 4
+    assert body.mass == pytest.approx(1000.0 / 6.0, rel=1e-6)
+    assert np.mean(body.shape.vertices, axis=0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-7)
+    assert body.pose[:3] == pytest.approx((0.25, 0.25, 2.25), abs=1e-7)
+    assert sorted(np.linalg.norm(body.shape.vertices, axis=1)) == pytest.approx(
+        [np.sqrt(3.0 / 16.0), *[np.sqrt(11.0 / 16.0)] * 3], rel=1e-6
+    )
+
+
+ROUND = " ".join(f"{np.cos(k)} {np.sin(k)} {z}" for k in range(33) for z in (0, 1))
+
+
+@pytest.mark.parametrize(("vertices", "more", "head", "said"), [
+    (TETRAHEDRON, ' face="0 2 1  0 1 3  0 3 2  1 2 3"', "", "<mesh> 'm': face: a scene has no meshes but hulls"),
+    (TETRAHEDRON, ' file="m.stl"', "", "<mesh> 'm': other files are not read"),
+    (TETRAHEDRON, ' inertia="shell"', "", "<mesh> 'm': inertia: a scene has no meshes but hulls"),
+    (TETRAHEDRON, "", '<default><mesh inertia="shell"/></default>', "<mesh>: inertia: a scene has no meshes"),
+    (ROUND, "", "", "<geom>: its hull has 66 corners, a scene's 4 to 64"),
+    ("0 0 0  1 0 0  0 1 0  1 1 0", "", "", "MuJoCo does not compile it"),
+])  # fmt: skip
+def test_a_mesh_that_is_no_hull_of_its_vertices_is_refused(vertices, more, head, said):
+    with pytest.raises(SceneError) as refused:
+        reading.read(model_of(SOLID, head=head + MESH.format(vertices, more)), False)
+    assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
 GEOMS = [
@@ -217,6 +285,7 @@ def test_contacts_combine_as_mujoco_combines_them(first, second):
 
 def test_a_model_that_lies_in_the_plane_is_a_planar_scene_and_lifts_back():
     found = {path.stem: lowered(reading.read(path.read_text(), False).scene) for path in READ}
+    assert found["capsules"] is not None  # MuJoCo's `fromto` turns the rail about its axis, out of the plane
     assert found["box_tilted"] is not None and found["ball_in_tray"] is None and found["box_spinning"] is None
     for path in READ:
         flat, scene = found[path.stem], reading.read(path.read_text(), False).scene

@@ -129,6 +129,21 @@ def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_p
     assert done.exit_code == 0 and ",known," in rows
 
 
+def test_where_a_plugin_raised_what_is_wrong_is_kept_and_told_by_the_doctor(site):
+    (site / "numbers.py").write_text("def colour():\n    raise LookupError('no\x1b[31m colour')\nCOLOUR = colour()\n")
+    registry.find.cache_clear()
+    found = registry.find("toy")
+    assert found.reason == r"LookupError: no\u{1b}[31m colour"
+    told = doctor()["traces"]["toy"]
+    assert told[0] == "Traceback (most recent call last):" and any("in colour" in line for line in told)
+    assert told[-1] == found.reason and "\x1b" not in str(told) and set(doctor()["traces"]) == {"toy"}
+    said = CliRunner().invoke(main, ["doctor"]).output
+    assert "where toy raised it" in said and "in colour" in said
+    (site / "numbers.py").write_text('COLOUR = "#102030"\n')
+    registry.find.cache_clear()
+    assert registry.find("toy").trace == "" and doctor()["traces"] == {}
+
+
 BROKEN_LAWS = [
     ("raise RuntimeError('torn')", "RuntimeError: torn"),
     ("raise SystemExit(3)", "SystemExit: 3"),

@@ -68,15 +68,14 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: Limits of an engine that no setting takes out: their reasons give the figures that settings change them by. Open: a
 #: prediction of their size.
 #: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`, those of PhysX in
-#: `tests/adapters/test_findings_of_physx.py`, that of Drake is in `tests/adapters/test_drake.py`, those of Newton but
-#: `card-tent-creep`, which is unexplained, in `tests/adapters/test_newton.py`, that of Bullet in
-#: `tests/adapters/test_bullet.py`.
+#: `tests/adapters/test_findings_of_physx.py`, that of Drake is in `tests/adapters/test_drake.py`, those of Newton in
+#: `tests/adapters/test_newton.py`, that of Bullet in `tests/adapters/test_bullet.py`.
 MEASURED_ONLY = {
     "bullet": {"arch-hull-grid"},
     "drake": {"shove-slanted-edge"},
     "newton": {
         "bounce-late-blows",
-        "card-tent-creep",
+        "card-tent-friction-of-a-sweep",
         "heavy-on-light-settles-late",
         "heavy-on-light-sinks-through",
         "incline-friction-of-a-sweep",
