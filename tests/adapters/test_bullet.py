@@ -14,7 +14,7 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 
 
 from adapters import Body, Box, Disc, HalfSpace, Pair, Sampling, Scene, Sphere, needs, run
-from adapters.bullet import BulletEngine, clipped
+from adapters.bullet import BulletEngine, clipped, laws
 from adapters.bullet.contact_law import ContactLaw, fall
 from adapters.bullet.profiles import law_of
 from adapters.bullet.shipped import WARM_STARTING
@@ -700,3 +700,21 @@ def test_a_hull_is_cut_to_its_grid_by_a_whole_cell_or_not_at_all():
     # 1e-3 cells: the 24 bits of a vertex in a file are 6e-8 of it, and it is 5108 cells from the middle.
     assert np.abs(np.array(cells) - np.round(cells)).max() < 1e-3
     assert set(np.round(cells)) == {0.0, 1.0}
+
+
+@pytest.mark.parametrize("params", [{"height": 1.09}, {"e": 0.95, "height": 1.03}], ids=str)
+def test_when_a_ball_rests_as_shipped_round_off_decides_in_the_law_as_in_bullet(params):
+    """Family `bounce-interval-blurred`: the law's own recurrence, started within round-off, spreads over many steps.
+
+    Bullet's answer lies in that spread, which is wide enough for the law to be silent; tuned has none of it.
+    """
+    canonical, dt = CATALOGUE["bounce"], 1.0 / 120.0
+    scene = canonical.scene(2, params)
+    moved = [k * laws.GAP_ROUND_OFF for k in range(-20, 21)]
+    shipped, better = (law_of(profile, needs(scene), dt) for profile in ("default", "tuned"))
+    times = [laws._measured(scene, dt, canonical.measure, shipped, by)["rest_time"][0] for by in moved]
+    found = canonical.measure(scene, drive(scene, "default", dt, canonical.sampling(scene)))["rest_time"][0]
+    assert max(times) - min(times) > 10.0 * dt
+    assert min(times) - dt <= found <= max(times) + dt
+    steady = {laws._measured(scene, dt, canonical.measure, better, by)["rest_time"][0] for by in moved[::8]}
+    assert max(steady) - min(steady) <= dt

@@ -12,6 +12,9 @@ from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.audit.turning import turned_contacts
 from reference_solver.model import Array
 
+#: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.
+ACROSS = 1e-9
+
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of the energy."""
@@ -21,10 +24,30 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
     gained, exempt, unseen, scale = _gains(run)
     without = np.where(exempt, 0.0, np.sign(gained) * np.maximum(np.abs(gained) - unseen, 0.0))
     yield "gained", float(max(np.cumsum(without).max(initial=0.0), without.max(initial=0.0)) / scale)
-    # In a force phase friction takes energy where something slips, and nothing else does. What goes at fixed steps or
-    # at impulse level loses more.
+    # In a force phase friction takes energy where something slips, loads that press a gap shut lose what they do there,
+    # and nothing else does. What goes at fixed steps or at impulse level loses more.
     asked = run.is_forces & (run.pieces.length > 0.0) & ~run.is_fixed & ~run.is_impulse_level
-    yield "lost", float(np.where(asked, -without - _friction(run), 0.0).max(initial=0.0) / scale)
+    yield "lost", float(np.where(asked, -without - _friction(run) - _shut(run), 0.0).max(initial=0.0) / scale)
+
+
+def _shut(run: Run) -> Array:
+    """Energy (p,) that contacts take by closing gaps which count as none, at most [J]: impulse times closing speed.
+
+    What carries acts at such a gap, and gravity's work on the way is taken by it: of a weight at rest a share of
+    gap/(g h^2), whatever the weight. The gap itself is judged as ``apart``.
+    """
+    pieces, over = run.pieces, turned_contacts(run)
+    (row_a, row_b), (a, b) = run.side, (pieces.body_a, pieces.body_b)
+    closing = np.zeros(len(a))
+    for late, point, normal in ((False, pieces.point, pieces.normal), (True, over.last_point, over.last_normal)):
+        moving = run.velocity_at(row_b, b, point, late, late) - run.velocity_at(row_a, a, point, late, late)
+        closing -= 0.5 * (moving * normal).sum(axis=1)
+    gap = ACROSS * np.minimum(run.extent[a], run.extent[b])
+    length = pieces.length[run.contact_owner]
+    speed = np.minimum(np.maximum(closing, 0.0), gap / np.where(length > 0.0, length, np.inf))
+    taken = np.zeros(len(pieces))
+    np.add.at(taken, run.contact_owner, np.linalg.norm(pieces.impulse, axis=1) * speed)
+    return taken
 
 
 def _friction(run: Run) -> Array:

@@ -333,3 +333,24 @@ def test_energy_from_nowhere_is_seen_without_loads_however_light_bodies_are(size
     faster = replace(record.pieces, twist_after=record.pieces.twist_after * (1.0 + 1e-3))
     found = {finding.name for finding in audit(model, replace(record, pieces=faster), DT) if not finding.holds}
     assert "gained" in found
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e5])
+@pytest.mark.parametrize(("gap", "lost"), [(2.5e-13, False), (1e-11, False), (1e-9, True)])
+def test_a_load_that_shuts_a_gap_which_counts_as_none_loses_its_work_there_and_no_more(gap, lost, mass):
+    """Of a step's energy a share gap/(g h^2), 1.5e-9 at 2.5e-13 m; as `apart`, up to 1e-9 of a body, 5e-10 m here.
+
+    A disc that rests is lowered by ``gap`` in one step, as its velocity at the end of it says, under its load.
+    """
+    model = planar(floor(), Body(Disc(0.5), mass, 0.125 * mass, (0.0, 0.5, 0.0)), friction=0.0)
+    record = Simulation(model, Settings.reference(DT)).record(5, pieces=True)
+    pieces = record.pieces
+    rows = np.flatnonzero(pieces.body == 1)
+    pose, last, first = pieces.pose_after.copy(), pieces.twist_after.copy(), pieces.twist_before.copy()
+    pose[rows[2:], 1] -= gap
+    before = pieces.pose_before.copy()
+    before[rows[3:], 1] -= gap
+    last[rows[2], 1] = first[rows[3], 1] = -2.0 * gap / DT
+    moved = replace(pieces, pose_after=pose, pose_before=before, twist_after=last, twist_before=first)
+    found = {finding.name for finding in audit(model, replace(record, pieces=moved), DT) if not finding.holds}
+    assert ("lost" in found) is lost
