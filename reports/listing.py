@@ -80,7 +80,10 @@ def checks() -> list[dict[str, Any]]:
 
 def _stated(canonical: CanonicalScene, scene: Scene) -> list[Check]:
     """All checks of a scene, and that of its plane, which engines that live in space owe."""
-    return [*canonical.checks(scene, QUICK_DT), *([planar(scene, QUICK_DT)] if scene.dimension == 2 else [])]
+    return [
+        *canonical.checks(scene, QUICK_DT),
+        *([planar(scene, QUICK_DT, canonical.growth(scene))] if scene.dimension == 2 else []),
+    ]
 
 
 def describe(name: str) -> dict[str, Any]:

@@ -101,7 +101,10 @@ class _Cells(pytest.Collector):
             asked = slot.params_text() + (f" iterations={slot.iterations}" if slot.iterations else "")
             cell = f"{slot.engine}/{slot.profile}/{slot.scene} {slot.dimension}-D {asked}".rstrip()
             lifted = slot.dimension == 2 and 2 not in dimensions
-            for check in [*canonical.checks(scene, slot.dt), *([planar(scene, slot.dt)] if lifted else [])]:
+            for check in [
+                *canonical.checks(scene, slot.dt),
+                *([planar(scene, slot.dt, canonical.growth(scene))] if lifted else []),
+            ]:
                 if check.bound is not None:
                     yield _Check.from_parent(self, name=f"{cell}::{check.metric}", plugin=self.plugin, slot=slot,
                                              metric=check.metric)  # fmt: skip

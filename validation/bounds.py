@@ -66,22 +66,26 @@ def bookkeeping(scale: float = 1.0) -> Bound:
     return Bound(ROUND_OFF * scale, "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law")
 
 
-def planar(scene: Scene, dt: float) -> Check:
+def planar(scene: Scene, dt: float, growth: float = 1.0) -> Check:
     """How far a planar scene may leave its plane [m] on an engine that lives in space.
 
     What is lifted is its own mirror image in the plane y = 0, and so are gravity and loads. A law of contact that does
     not tell left from right keeps a motion mirrored that begins so, at every step: every y stays 0. What remains is
-    round-off of the numbers that are added, places and ways of free flight, which a motion may multiply (up to `GROWTH`
-    times it has an answer at all), and that of two contacts which mirror each other round-off lets one be found a step
-    before the other: one step of a force across the plane, as in `straight`.
+    round-off of the numbers that are added, places and ways of free flight, which a motion may multiply: up to `GROWTH`
+    times, or by ``growth`` where the scene knows that its own motion multiplies it by more. And of two contacts which
+    mirror each other round-off lets one be found a step before the other: one step of a force across the plane, as in
+    `straight`. Where round-off may grow to a thousandth of the scene nothing is judged.
     """
     place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
     way = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
     size = max(place, way * scene.duration)
+    most = max(growth, GROWTH)
+    if not ROUND_OFF * most <= 1e-3:
+        return Check(OUT_OF_PLANE, "m", None, None, f"not judged: the motion multiplies round-off {most:.2g} times", "")
     step = math.hypot(*scene.gravity) * (dt * dt)
-    because = f"mirror symmetry: one step of a force across the plane, g dt^2, and round-off grown {GROWTH:g} times"
+    because = f"mirror symmetry: one step of a force across the plane, g dt^2, and round-off grown {most:.2g} times"
     source = "what is lifted is its own mirror image in its plane"
-    return Check(OUT_OF_PLANE, "m", 0.0, step + ROUND_OFF * GROWTH * size, because, source)
+    return Check(OUT_OF_PLANE, "m", 0.0, step + ROUND_OFF * most * size, because, source)
 
 
 # ---- what stands ----

@@ -358,6 +358,9 @@ class CanonicalScene:
         The error by which a bench compares engines, and what it runs for it.
     size
         Parameter that is the number of its bodies, where a bench may scale it up.
+    growth
+        By how much the scene's own motion multiplies what is off its line or out of its plane, where it is unstable:
+        what round-off may grow to (`bounds.planar`).
     smooth
         Metrics that depend smoothly on the step, without an impact: a single cell per step has an order.
     studies
@@ -401,6 +404,7 @@ class CanonicalScene:
     primary: Primary | None = None
     steps: Steps = Steps()
     size: str | None = None
+    growth: Callable[[Scene], float] = lambda scene: 1.0
     smooth: tuple[str, ...] = ()
     studies: tuple[Study, ...] = ()
     searched: Searched | None = None

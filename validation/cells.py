@@ -266,8 +266,13 @@ def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
     slot = observation.slot
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
-    lifted = [planar(scene, slot.dt)] if OUT_OF_PLANE in observation.metrics else []
-    return scene, [*canonical.checks(scene, slot.dt), *lifted]
+    lifted = OUT_OF_PLANE in observation.metrics
+    return scene, [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]
+
+
+def plane_of(canonical: CanonicalScene, scene: Scene, dt: float) -> list[Check]:
+    """Check of the plane that a planar scene owes where it is lifted; none in space."""
+    return [planar(scene, dt, canonical.growth(scene))] if scene.dimension == 2 else []
 
 
 @dataclass(frozen=True)

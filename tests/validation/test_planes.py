@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adapters.needs import needs
 from adapters.planted_faults import Planted
 from adapters.registry import find
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.stepping import run
 from validation import bounds
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot, checks_of
@@ -42,6 +44,27 @@ def test_the_growth_that_a_plane_is_owed_is_the_horizon_of_the_certificate():
     from reference_solver.certification import truth
 
     assert bounds.GROWTH == truth.GROWTH
+
+
+def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_thousandth_is_not_judged():
+    scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
+    assert bounds.planar(scene, DT, 0.5).bound == bounds.planar(scene, DT).bound == pytest.approx(1e-9 * 5.5)
+    assert bounds.planar(scene, DT, 1e8).bound == pytest.approx(1e-4 * 5.5)
+    beyond = bounds.planar(scene, DT, 4e10)
+    assert (beyond.truth, beyond.bound) == (None, None) and "4e+10 times" in beyond.because
+
+
+@pytest.mark.parametrize(("ratio", "gap"), [(1.0, 2.0), (3.0, 2.0), (16.0, 1.0)])
+def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio, gap):
+    """By the reference, in the plane: the small ball begins off the line by 1e-11 m, and ends that many times as far."""
+    canonical = CATALOGUE["galperin"]
+    scene = canonical.scene(2, {"ratio": ratio, "gap": gap})
+    engine, off = find("reference").engine, 1e-11
+    bodies = [replace(b, pose=(b.pose[0], off, 0.0)) if b.name == "small" else b for b in scene.bodies]
+    settings = {each.name: each.value for each in engine.settings("reference", needs(scene), DT)}
+    found = run(engine, replace(scene, bodies=tuple(bodies)), DT, settings)
+    apart = abs(found.pose[-1, 1, 1] - found.pose[-1, 2, 1])
+    assert apart / off == pytest.approx(canonical.growth(scene), rel=0.02)
 
 
 def test_half_spaces_count_by_where_they_stand():
