@@ -13,9 +13,9 @@ from adapters import engine_folder, registry
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
-from validation.bounds import planar
 from validation.canonical import SUITES, CanonicalScene, Check, Variation
 from validation.catalogue import CATALOGUE, broken
+from validation.cells import plane_of
 from validation.field.measured import facts_of
 from validation.identity import commit, machine
 from validation.posed import resolve
@@ -80,10 +80,7 @@ def checks() -> list[dict[str, Any]]:
 
 def _stated(canonical: CanonicalScene, scene: Scene) -> list[Check]:
     """All checks of a scene, and that of its plane, which engines that live in space owe."""
-    return [
-        *canonical.checks(scene, QUICK_DT),
-        *([planar(scene, QUICK_DT, canonical.growth(scene))] if scene.dimension == 2 else []),
-    ]
+    return [*canonical.checks(scene, QUICK_DT), *plane_of(canonical, scene, QUICK_DT)]
 
 
 def describe(name: str) -> dict[str, Any]:

@@ -19,9 +19,8 @@ from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
 from reports.wording import measured, plural, quantity, reproduce
-from validation.bounds import planar
 from validation.catalogue import matching
-from validation.cells import Slot, slot_from_dict
+from validation.cells import Slot, plane_of, slot_from_dict
 from validation.judging.rows import Row, rows_of
 from validation.judging.verdicts import Physics, Standing
 from validation.posed import resolve
@@ -100,11 +99,8 @@ class _Cells(pytest.Collector):
             scene = canonical.scene(slot.dimension, dict(slot.params))
             asked = slot.params_text() + (f" iterations={slot.iterations}" if slot.iterations else "")
             cell = f"{slot.engine}/{slot.profile}/{slot.scene} {slot.dimension}-D {asked}".rstrip()
-            lifted = slot.dimension == 2 and 2 not in dimensions
-            for check in [
-                *canonical.checks(scene, slot.dt),
-                *([planar(scene, slot.dt, canonical.growth(scene))] if lifted else []),
-            ]:
+            lifted = 2 not in dimensions
+            for check in [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]:
                 if check.bound is not None:
                     yield _Check.from_parent(self, name=f"{cell}::{check.metric}", plugin=self.plugin, slot=slot,
                                              metric=check.metric)  # fmt: skip

@@ -56,7 +56,7 @@ def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_th
 
 @pytest.mark.parametrize(("ratio", "gap"), [(1.0, 2.0), (3.0, 2.0), (16.0, 1.0)])
 def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio, gap):
-    """By the reference, in the plane: the small ball begins off the line by 1e-11 m, and ends that many times as far."""
+    """By the reference, in the plane: the small ball begins 1e-11 m off the line, and ends that many times as far."""
     canonical = CATALOGUE["galperin"]
     scene = canonical.scene(2, {"ratio": ratio, "gap": gap})
     engine, off = find("reference").engine, 1e-11
