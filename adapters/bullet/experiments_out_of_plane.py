@@ -9,9 +9,11 @@ from adapters.experiment import Experiment
 
 _TO_THE_END = {"solverResidualThreshold": 0.0}
 _SOLVED = _TO_THE_END | {"iterations": 1000}
+_COLD = {"warmStartingFactor": 0.0}
 #: Faces are clipped against each other, instead of one nearest point a step.
 _CLIPPED = {"enableSAT": 1}
 _PLAIN = dict[str, float]()
+_COARSE, _FINE = 1.0 / 60.0, 1.0 / 960.0
 
 _SWEPT: tuple[tuple[str, str, Mapping[str, float]], ...] = (
     *((profile, "stack", {"n": 10.0}) for profile in ("default", "tuned", "one")),
@@ -26,6 +28,20 @@ _SWEPT: tuple[tuple[str, str, Mapping[str, float]], ...] = (
     ("default", "long_rest", _PLAIN),
     ("default", "pressed_box", {"load": 9.0, "shear": 4.9}),
     ("default", "tilt_table", {"aspect": 1.0}),
+)
+#: Rows of the full suite, at other steps and near thresholds: profile, scene, parameters, step.
+_ELSEWHERE: tuple[tuple[str, str, Mapping[str, float], float | None], ...] = (
+    ("default", "conveyor", _PLAIN, _COARSE),
+    ("default", "domino", {"ratio": 0.9}, _FINE),
+    ("default", "ladder", {"ratio": 1.02, "lean": 75.0}, None),
+    *((profile, "painleve", _PLAIN, _FINE) for profile in ("default", "tuned", "one")),
+    ("default", "pivot", _PLAIN, _FINE),
+    ("default", "position_correction", _PLAIN, _FINE),
+    ("default", "rocking_block", _PLAIN, _FINE),
+    ("default", "seam", _PLAIN, _FINE),
+    ("default", "slide", {"mu": 0.8}, None),
+    *((profile, "kane", {"along": -0.727}, None) for profile in ("tuned", "one")),
+    ("one", "pyramid", {"rows": 10.0}, None),
 )
 
 
@@ -47,6 +63,48 @@ OUT_OF_PLANE: tuple[Experiment, ...] = (
             idle=(_CLIPPED,),
         )
         for profile, scene, params in (*_SWEPT, ("default", "heavy_on_light", _PLAIN))
+    ),
+    *(
+        Experiment(
+            f"{scene.replace('_', '-')}-plane-sweeps",
+            "solved to the end the bodies stay in their plane; clipped faces do not keep them there",
+            profile,
+            scene,
+            "out_of_plane",
+            _SOLVED,
+            params,
+            idle=(_CLIPPED,),
+            dt=dt,
+        )
+        for profile, scene, params, dt in _ELSEWHERE
+    ),
+    *(
+        Experiment(
+            "arch-plane-sweeps",
+            "solved to the end the stones stay in their plane; a cold start does not keep them there",
+            "tuned",
+            "arch",
+            "out_of_plane",
+            _SOLVED,
+            params,
+            idle=(_COLD,),
+            dt=dt,
+        )
+        for params, dt in (({"ratio": 0.95}, None), ({"ratio": 0.8}, _FINE))
+    ),
+    *(
+        Experiment(
+            "flat-box-plane-warm-start",
+            "from nothing and solved to the end the box stays in its plane; sweeps alone do not keep it there",
+            profile,
+            "flat_box",
+            "out_of_plane",
+            _COLD | _SOLVED,
+            params,
+            idle=(_SOLVED,),
+        )
+        for profile in ("tuned", "one")
+        for params in ({"aspect": 0.25, "e": 0.2}, {"aspect": 4.0, "e": 0.2})
     ),
     *(
         Experiment(

@@ -30,6 +30,7 @@ def elsewhere(reflect: Changes, hold: Changes, slide: Changes) -> tuple[Experime
         *_of_the_first_step(),
         *_soft(reflect, hold, slide),
         *_of_friction(),
+        *_out_of_plane(),
     )
 
 
@@ -234,5 +235,54 @@ def _of_friction() -> tuple[Experiment, ...]:
                 dt=dt,
             )
             for dt in (1.0 / 480.0, _FINE)
+        ),
+    )
+
+
+def _out_of_plane() -> tuple[Experiment, ...]:
+    tolerance: tuple[tuple[str, Mapping[str, float], float], ...] = (
+        ("shove", {}, 1.0 / 500.0),
+        ("shove", {"ratio": 20.0}, _FINE),
+        ("wedge", {"mu": 0.0}, 1.0 / 240.0),
+        ("wedge", {"mu": 0.7}, 1.0 / 500.0),
+    )
+    return (
+        *(
+            Experiment(
+                f"{scene}-plane-tolerance",
+                "solved on to round-off the bodies stay in their plane",
+                "default",
+                scene,
+                "out_of_plane",
+                _MUCH_FURTHER,
+                params,
+                dt=dt,
+            )
+            for scene, params, dt in tolerance
+        ),
+        Experiment(
+            "heavy-on-light-plane-pyramid",
+            "on a round cone the boxes stay in their plane; solving further does not keep them there",
+            "default",
+            "heavy_on_light",
+            "out_of_plane",
+            _ROUND,
+            {"ratio": 1e5},
+            idle=(_MUCH_FURTHER,),
+        ),
+        *(
+            Experiment(
+                "stack-plane-pyramid",
+                "on a round cone the boxes stay in their plane; a single row for smooth contacts does not do it",
+                "default",
+                "stack",
+                "out_of_plane",
+                _ROUND,
+                {"n": 10.0},
+                iterations=1,
+                idle=({"smooth_condim": 1},),
+                dt=dt,
+            )
+            for dt in (_SIXTY, 1.0 / 120.0)
         ),
     )
