@@ -8,7 +8,7 @@ from packaging.specifiers import SpecifierSet
 
 from adapters import registry
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Outcome, Slot, parse_dt
+from validation.cells import Observation, Outcome, Slot, parse_dt, plane_of
 from validation.findings import Family, Finding, FindingsError, Known, Unsupported, files, known_of, row_key
 from validation.judging.rows import rows_of
 from validation.running.plan import is_standard
@@ -91,7 +91,9 @@ def test_every_member_is_a_row_that_the_standard_suite_states(engine):
         )
         assert is_standard(slot), key
         canonical = CATALOGUE[scene]
-        stated = {check.metric for check in canonical.checks(canonical.scene(slot.dimension, dict(given)), slot.dt)}
+        made = canonical.scene(slot.dimension, dict(given))
+        checks = [*canonical.checks(made, slot.dt), *plane_of(canonical, made, slot.dt)]
+        stated = {check.metric for check in checks}
         assert metric in stated | {study.name for study in canonical.studies}, key
 
 
