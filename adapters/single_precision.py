@@ -1,4 +1,4 @@
-"""A law that engines share: blows in free space, computed in single precision.
+"""Laws that engines share: blows in free space, computed in single precision, and what roundings leave of a plane.
 
     o->   o      |        straight flight, blow, straight flight: nothing else changes a velocity, so that
           o  o-> |        what an engine makes of it follows from the scene in a few roundings
@@ -25,6 +25,7 @@ from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
 from adapters.lift import lift, lower_contacts, lower_twist
 from adapters.scene import Box, HalfSpace, Pair, Scene, Shape, Sphere
+from adapters.shapes import reach
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
@@ -35,6 +36,9 @@ UNIT = 2.0**-24
 ROUNDINGS = 48
 #: Steps between two blows that share a body, at least: a step finds a contact late, and the next one may still see it.
 APART = 4.0
+#: Roundings of a place across a plane: one in each of a thousand updates of a velocity, and five times that for the
+#: order of additions, as in what a scene allows doubles.
+UPDATES = 5.0 * 1000.0
 #: Gap that counts as touching [m], for places of order 1 in doubles.
 TOUCHING = 1e-9
 
@@ -116,6 +120,22 @@ def rounded_law(metric: str, method: Method) -> Law:
         return None if value is None else (value, _band(scene, motion, share, metric, value, measure))
 
     return law
+
+
+def plane_law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+    """How far singles let a planar scene leave its plane in space [m]: by mirror symmetry 0, but for roundings.
+
+    What mirrors each other across the plane is told by numbers as large as the scene, places of points and ways of
+    flight, of which each update of a velocity rounds one to `UNIT` of its size: what does not cancel between left and
+    right is a speed across the plane. A thousand updates, and a factor of five for the order of additions, leave
+    `UPDATES` such units. A motion that multiplies what it is given is not told: no growth is predicted, so that what
+    tips over or is thrown out of its plane has another cause.
+    """
+    if scene.dimension != 2:
+        return None
+    place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
+    speed = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
+    return 0.0, UPDATES * UNIT * max(place, speed * scene.duration)
 
 
 def _band(scene: Scene, motion: Trajectory, share: float, metric: str, value: float, measure: Measure) -> float:

@@ -166,4 +166,57 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ("fbf", "rack", 2, "asymmetry", {}),
     ),
     *_swept("stack-few-sweeps", 2000, ("pgs", "stack", 2, "kinetic_energy", {"n": 5.0})),
+    # What leaves its plane.
+    *(
+        experiment
+        for scene, rows in (("ladder", ({},)), ("pinch", ({}, {"margin": 100.0})))
+        for params in rows
+        for experiment in _each(
+            f"{scene}-second-choice",
+            "where the second choice sweeps to the end it stays in its plane; another tolerance alone does not help",
+            _TO_THE_END,
+            ({"second_tolerance": 1e-4},),
+            ("default", scene, 2, "out_of_plane", params),
+        )
+    ),
+    *_swept(
+        "flat-box-few-sweeps",
+        10**6,
+        ("pgs", "flat_box", 2, "out_of_plane", {}),
+        ("pgs", "flat_box", 2, "out_of_plane", {"e": 1.0}),
+    ),
+    *_swept("kane-few-sweeps", 10**6, ("pgs", "kane", 2, "out_of_plane", {})),
+    *(
+        experiment
+        for scene in ("flat_box", "kane")
+        for experiment in _each(
+            f"{scene.replace('_', '-')}-few-sweeps",
+            "by splitting, which sees all points at once, it stays in its plane; a finer tolerance does not help",
+            _CONE,
+            (_FINE, _OTHERS),
+            ("nsgs", scene, 2, "out_of_plane", {}),
+        )
+    ),
+    *_swept("heavy-on-light-few-sweeps", 10000, ("pgs", "heavy_on_light", 2, "out_of_plane", {})),
+    *_swept(
+        "overhang-few-sweeps",
+        1000,
+        ("pgs", "overhang", 2, "out_of_plane", {}),
+        ("pgs", "overhang", 2, "out_of_plane", {"margin": 0.02}),
+    ),
+    *_each(
+        "painleve-few-sweeps",
+        "with 100 000 sweeps, to the last digit, the rod stays in its plane; a tenth, or digits alone, do not do",
+        {"iterations": 10**5, **_FINE},
+        ({"iterations": 10**4}, _FINE, {"detector": "bullet"}),
+        ("pgs", "painleve", 2, "out_of_plane", {"ratio": 0.6}),
+    ),
+    *_swept(
+        "pinch-few-sweeps",
+        1000,
+        ("pgs", "pinch", 2, "out_of_plane", {}),
+        ("pgs", "pinch", 2, "out_of_plane", {"margin": 100.0}),
+    ),
+    *_swept("pyramid-few-sweeps", 600, ("pgs", "pyramid", 2, "out_of_plane", {"rows": 5.0})),
+    *_swept("stack-few-sweeps", 10000, ("pgs", "stack", 2, "out_of_plane", {"n": 10.0})),
 )

@@ -36,6 +36,8 @@ _BOUNDED: _Settings = {"approximation": "similar"}
 _HARD_AND_BOUNDED: _Settings = {**_BOUNDED, **_HARDEST}
 #: What sinks and relaxes: neither of the two does it alone, nor does what mends relaxing elsewhere.
 _EACH_ALONE: tuple[_Settings, ...] = (_BOUNDED, _HARDEST, _AT_ONCE)
+#: Friction by the load of the step, and a slower push.
+_SLOWLY_BY_LOAD: _Settings = {**_IMPLICIT, **_SLOWLY}
 #: Friction by the load of the step, and slower slips that are viscous.
 _STICKS_BY_LOAD: _Settings = {**_IMPLICIT, **_STICKS}
 
@@ -43,6 +45,7 @@ _SAYS = {
     "relaxes-and-sinks": "where Hunt and Crossley bound what parts, and a heavy box finds harder ones, it passes",
     "glides-and-creeps": "where friction goes by the load of the step, and only slower slips are viscous, it stays",
     "lands-on-a-face": "where boxes are harder, and friction goes by the load of the step, it passes",
+    "throws-and-glides": "where friction goes by the load of the step, and what overlaps parts more slowly, it stays",
     "glides": "where friction goes by the load of the step it passes",
     "friction-by-an-earlier-load": "where friction goes by the load of the step it passes",
     "viscous-friction": "where only slower slips are viscous it stays",
@@ -136,6 +139,43 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("tilt-table-glides", "sap", 2, "acceleration", _CUBE, _IMPLICIT, (_SOFT,)),
     ("tilt-table-glides", "sap", 2, "turned", _CUBE, _IMPLICIT, (_SOFT,)),
     ("tilt-table-glides", "similar", 2, "acceleration", _CUBE, _IMPLICIT, (_STICKS,)),
+    # What leaves its plane.
+    *(
+        (f"{scene}-glides", profile, 2, "out_of_plane", params, _IMPLICIT, (_SLOWLY, _HARDEST))
+        for scene, params in (
+            ("seam", {}),
+            ("slide", {}),
+            ("incline", {"ratio": 1.01}),
+            ("incline", {"ratio": 1.1}),
+            ("incline", {"ratio": 2.0}),
+            ("ladder", {"ratio": 0.8}),
+            ("pressed-box", {"load": 0.0}),
+            ("tilt-table", {}),
+            ("tilt-table", _CUBE),
+        )
+        for profile in ("sap", "similar")
+    ),
+    ("far-origin-glides", "sap", 2, "out_of_plane", {}, _IMPLICIT, (_SLOWLY, _HARDEST)),
+    ("far-origin-glides", "similar", 2, "out_of_plane", {}, _IMPLICIT, (_STICKS, _HARDEST)),
+    ("incline-glides", "sap", 2, "out_of_plane", {"ratio": 0.999}, _IMPLICIT, (_SLOWLY, _SOFT)),
+    ("incline-glides", "sap", 2, "out_of_plane", {"ratio": 1.001}, _IMPLICIT, (_SLOWLY, _SOFT)),
+    ("painleve-glides", "sap", 2, "out_of_plane", {"ratio": 0.6}, _IMPLICIT, (_SLOWLY, _HARDEST)),
+    ("pinch-glides", "similar", 2, "out_of_plane", {"margin": 1.05}, _IMPLICIT, (_STICKS, _HARDEST)),
+    ("position-correction-throws", "sap", 2, "out_of_plane", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE, _SOFT)),
+    ("heavy-on-light-sinks", "default", 2, "out_of_plane", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-sinks", "similar", 2, "out_of_plane", {"ratio": 1e4}, _HARDEST, (_STICKS,)),
+    ("heavy-on-light-relaxes-and-sinks", "sap", 2, "out_of_plane", {}, _BOUNDED, (_HARDEST, _STICKS)),
+    ("heavy-on-light-relaxes-and-sinks", "sap", 2, "out_of_plane", {"ratio": 1e4}, _HARD_AND_BOUNDED, _EACH_ALONE),
+    ("overhang-throws", "similar", 2, "out_of_plane", {}, _SLOWLY, (_STICKS,)),
+    ("overhang-throws", "similar", 2, "out_of_plane", {"margin": 0.02}, _SLOWLY, (_STICKS,)),
+    ("overhang-throws", "sap", 2, "out_of_plane", {}, {**_BOUNDED, **_SLOWLY}, (_BOUNDED, _STICKS)),
+    ("overhang-throws", "sap", 2, "out_of_plane", {"margin": 0.02}, {**_BOUNDED, **_SLOWLY}, (_BOUNDED, _STICKS)),
+    ("rocking-block-throws-and-glides", "tamsi", 2, "out_of_plane", {}, _SLOWLY, (_HARDEST,)),
+    ("rocking-block-throws-and-glides", "sap", 2, "out_of_plane", {}, _SLOWLY_BY_LOAD, (_IMPLICIT, _SLOWLY)),
+    ("rocking-block-throws-and-glides", "similar", 2, "out_of_plane", {}, _SLOWLY_BY_LOAD, (_IMPLICIT, _SLOWLY)),
+    ("rocking-block-throws-and-glides", "sap", 2, "out_of_plane", _SLIM, _IMPLICIT, (_SOFT, _SLOWLY)),
+    ("rocking-block-throws-and-glides", "similar", 2, "out_of_plane", _SLIM, _IMPLICIT, (_SOFT, _SLOWLY)),
+    ("shove-relaxes", "sap", 2, "out_of_plane", {}, _AT_ONCE, (_STICKS, _HARDEST)),
 )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from adapters.experiment import Experiment
+from adapters.physx.experiments_out_of_plane import OUT_OF_PLANE
 
 CANDIDATES: dict[str, tuple[Any, ...]] = {
     "solver": ("tgs", "pgs"),
@@ -711,3 +712,5 @@ EXPERIMENTS += (
         ("tuned", 2, "moved", {"aspect": 1.0}),
     ),
 )
+
+EXPERIMENTS += OUT_OF_PLANE

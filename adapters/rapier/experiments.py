@@ -47,9 +47,9 @@ def _each(
 
 
 _SCENES = (
-    "bounce", "far_origin", "flat_box", "heavy_on_light", "masse", "off_centre", "overhang", "overlap", "painleve",
-    "pivot", "position_correction", "pyramid", "rocker", "roll_incline", "rolling_spin", "scales", "seam", "stack",
-    "starved", "tilt_table",
+    "bounce", "domino", "far_origin", "flat_box", "heavy_on_light", "long_rest", "masse", "off_centre", "overhang",
+    "overlap", "painleve", "pinch", "pivot", "position_correction", "pyramid", "rocker", "rocking_block",
+    "roll_incline", "rolling_spin", "scales", "seam", "stack", "starved", "tilt_table",
 )  # fmt: skip
 
 EXPERIMENTS: tuple[Experiment, ...] = (
@@ -290,5 +290,93 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ({"recycling": False}, _UNSEEN),
         ("default", 2, "moved", {}),
         ("default", 2, "passing_time", {"ratio": 1.1}),
+    ),
+    # What leaves its plane.
+    *_each(
+        "domino-few-sweeps",
+        "with 30 sweeps in each of 64 small steps they stay; stiffer contacts, or seeing later, do not help",
+        {**_SWEPT, **_MORE_STEPS},
+        (_STIFF, _UNSEEN),
+        ("default", 2, "out_of_plane", {}),
+        ("tuned", 2, "out_of_plane", {}),
+    ),
+    *_each(
+        "heavy-on-light-soft-contact",
+        "stiffer and with 30 sweeps the boxes stay in their plane; neither alone keeps them there",
+        {**_STIFF, **_SWEPT},
+        (_STIFF, _SWEPT),
+        ("default", 2, "out_of_plane", {}),
+    ),
+    *_each(
+        "heavy-on-light-soft-contact",
+        "as stiff as 64 small steps resolve, and damped, it stays, to what singles leave of a plane; either alone not",
+        _HARD,
+        (_MORE_STEPS, _STIFF, _SWEPT),
+        ("default", 2, "out_of_plane", {"ratio": 1e4}),
+        ("tuned", 2, "out_of_plane", {"ratio": 1e4}),
+        within=6e-4,
+    ),
+    *_each(
+        "pinch-soft-contact",
+        "stiffer and with 30 sweeps the block stays in its plane; neither alone keeps it there",
+        {**_STIFF, **_SWEPT},
+        (_STIFF, _SWEPT),
+        ("default", 2, "out_of_plane", {"margin": 100.0}),
+    ),
+    *_each(
+        "long-rest-soft-contact",
+        "with stiff contacts the boxes stay in their plane; seen later, or swept on, they do not",
+        _STIFF,
+        (_UNSEEN, {"relaxations": 30}),
+        ("default", 2, "out_of_plane", {}),
+    ),
+    *_each(
+        "painleve-few-sweeps",
+        "with 30 sweeps the rod stays in its plane; stiffer contacts and seeing later do not keep it there",
+        _SWEPT,
+        (_UNSEEN, _STIFF),
+        ("default", 2, "out_of_plane", {}),
+        ("tuned", 2, "out_of_plane", {}),
+    ),
+    *_each(
+        "position-correction-few-sweeps",
+        "with 30 sweeps the box stays in its plane; stiffer contacts and small steps do not keep it there",
+        _SWEPT,
+        (_STIFF, _ONE_STEP),
+        *((profile, 2, "out_of_plane", params) for profile in ("default", "tuned") for params in ({}, {"depth": 0.01})),
+    ),
+    *_each(
+        "pyramid-soft-contact",
+        "with stiff contacts the boxes stay in their plane; seen later, or in more small steps, they do not",
+        _STIFF,
+        (_UNSEEN, _ONE_STEP),
+        ("default", 2, "out_of_plane", {"rows": 5.0}),
+    ),
+    *_each(
+        "stack-soft-contact",
+        "with stiff contacts, found anew, and more small steps and sweeps the boxes stay; sweeps alone do not help",
+        {**_STIFF, "substeps": 8, "iterations": 4, "recycling": False},
+        (_SWEPT, _UNSEEN),
+        ("default", 2, "out_of_plane", {"n": 10.0}),
+        ("default", 2, "out_of_plane", {"n": 20.0}),
+    ),
+    *_each(
+        "rocking-block-few-sweeps",
+        "with 30 sweeps the block stays in its plane; stiffer contacts, or seeing later, do not keep it there",
+        _SWEPT,
+        (_STIFF, _UNSEEN),
+        *(
+            (profile, 2, "out_of_plane", params)
+            for profile in ("default", "tuned")
+            for params in ({}, {"aspect": 0.5, "tilt": 0.7})
+        ),
+    ),
+    *_each(
+        "seam-seen-ahead",
+        "seen when they touch the box slides straight over the seam; stiffer, or swept on, it does not",
+        _UNSEEN,
+        (_STIFF, _SWEPT),
+        ("default", 2, "out_of_plane", {}),
+        ("tuned", 2, "out_of_plane", {}),
     ),
 )

@@ -14,6 +14,7 @@ from adapters.drake.laws import DEVIATIONS, FALLING
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
 from adapters.drake.translation import frictions, pair_of
 from adapters.engine import EngineError
+from adapters.lift import lift
 from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
@@ -200,3 +201,26 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}") as caught:
         ENGINE.build(resting(), DT, settings(resting(), **changes))
     assert "\n" not in str(caught.value)
+
+
+def test_the_facets_of_a_surface_do_not_mirror_each_other():
+    """Of a box that lies flat in the lift: the four large ones mirror each other, slivers between them do not."""
+    floor, box = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"), Body("box", Box((0.5, 0.25)), 1.0, 0.1)
+    scene = Scene(
+        "rest", 1, 2, (floor, replace(box, pose=(0.0, 0.2499, 0.0))), (Pair(friction=0.5),), (0.0, -9.81), 1.0
+    )
+    simulation = ENGINE.build(lift(scene), DT, settings(scene))
+    simulation.advance(1)
+    found = simulation.plant.get_contact_results_output_port().Eval(simulation.context)
+    surface = found.hydroelastic_contact_info(0).contact_surface()
+    facets = [(*surface.centroid(f), surface.area(f)) for f in range(surface.num_faces())]
+
+    def mirrored(within, least):
+        large = [facet for facet in facets if facet[3] >= least]
+        return all(
+            any(abs(x - u) + abs(y + v) < within and a == pytest.approx(b, rel=1e-2) for u, v, _, b in large)
+            for x, y, _, a in large
+        )
+
+    assert sum(facet[3] > 0.2 for facet in facets) == 4
+    assert mirrored(1e-3, 0.2) and not mirrored(1e-6, 0.2) and not mirrored(1e-3, 0.0)

@@ -5,10 +5,14 @@ from dataclasses import replace
 
 import pytest
 
+from adapters.law import Deviation
 from adapters.scene import Pair
 from adapters.single_motions import corner_law, standstill_law
-from adapters.single_precision import UNIT, Method, Threshold, rounded_law, without_a_place
+from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law, without_a_place
+from validation import bounds
 from validation.catalogue import CATALOGUE
+from validation.findings import Known
+from validation.judging.verdicts import judge
 
 DT = 1.0 / 240.0
 CORNER, FAR, SEAM = CATALOGUE["edge_drop"], CATALOGUE["far_origin"], CATALOGUE["seam"]
@@ -133,3 +137,26 @@ def test_a_mass_that_singles_cannot_hold_is_named():
             said = without_a_place(replace(scene, bodies=(floor, replace(ball, **{name: value}))))
             assert said == f"{ball.name}.{name}: {value:g} has no place in single precision"
     assert math.isclose(UNIT, 2.0**-24)
+
+
+def test_a_plane_is_kept_to_a_thousand_roundings_of_the_largest_numbers():
+    """Of the size that the check itself counts: of every planar scene the same multiple of the bound's round-off."""
+    for name, canonical in CATALOGUE.items():
+        if 2 not in canonical.dimensions:
+            continue
+        scene = replace(canonical.scene(2), gravity=(0.0, 0.0))
+        value, band = plane_law(scene, DT, canonical.measure)
+        assert value == 0.0
+        assert band == pytest.approx(5000.0 * 2.0**-24 * bounds.planar(scene, DT).bound / 1e-9, rel=1e-12), name
+    flat = CATALOGUE["flat_box"].scene(2)
+    assert plane_law(flat, DT, None) == plane_law(replace(flat, gravity=(0.0, -9.81)), 2.0 * DT, None)
+    assert plane_law(CATALOGUE["impact"].scene(3), DT, None) is None
+
+
+@pytest.mark.parametrize(("share", "standing"), [(0.99, "explained"), (1.01, "drifted"), (100.0, "drifted")])
+def test_what_leaves_its_plane_by_more_than_roundings_is_not_explained(share, standing):
+    scene = CATALOGUE["flat_box"].scene(2)
+    law = Deviation("toy", ("default",), "flat_box", "out_of_plane", plane_law, "numbers are singles", "source")
+    value, band = law.says(scene, DT, CATALOGUE["flat_box"].measure)
+    told = judge(share * band, bounds.planar(scene, DT), [(law, value, band)], Known(None, True))
+    assert (told.physics.value, told.standing.value) == ("fail", standing)
