@@ -42,6 +42,8 @@ APART = [
     ("drake", "pinch", {}, 2, "tamsi"), ("drake", "oblique", {"e": 0.0}, 3, "similar"),
     ("physx", "bounce", {}, 2, "default"), ("physx", "stack", {}, 3, "tuned"), ("physx", "incline", {}, 2, "pgs"),
     ("physx", "oblique", {}, 3, "tuned"), ("physx", "closing_wall", {}, 3, "default"),
+    ("newton", "impact", {}, 2, "default"), ("newton", "oblique", {}, 3, "default"),
+    ("newton", "impact", {}, 3, "tuned"),
 ]  # fmt: skip
 LOADED = """
 name = "loaded"
@@ -154,6 +156,7 @@ def test_so_does_one_for_an_engine_that_is_set_apart(engine, scene, params, dime
     ("dart", {"detector": "bullet"}), ("box2d", {"early_restitution": True, "units_per_metre": 4.0}),
     ("box2d3", {"continuous": False, "units_per_metre": 4.0}), ("drake", {"boxes": "point", "dissipation": 10.0}),
     ("physx", {"friction_every_iteration": False, "persistent_manifolds": False}),
+    ("newton", {"weighted": False, "rebound_iterations": 3}),
 ])  # fmt: skip
 def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
     found = installed(engine)
@@ -185,7 +188,7 @@ def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, t
 
 
 @pytest.mark.parametrize("engine", [
-    "chipmunk", "bullet", "mujoco", "reference", "rapier", "dart", "box2d", "box2d3", "drake", "physx",
+    "chipmunk", "bullet", "mujoco", "reference", "rapier", "dart", "box2d", "box2d3", "drake", "physx", "newton",
 ])  # fmt: skip
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
 def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
@@ -236,7 +239,7 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 @pytest.mark.parametrize(("engine", "runs", "shaken"), [
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
     ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
-    ("reference", True, False), ("physx", None, True),
+    ("reference", True, False), ("physx", None, True), ("newton", True, True), ("newton", False, True),
 ])  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
@@ -283,6 +286,7 @@ HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1,
 @pytest.mark.parametrize(("engine", "values"), [
     ("chipmunk", IN_THE_PLANE), ("reference", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
     ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL), ("physx", IN_THE_PLANE), ("physx", HULL),
+    ("newton", IN_THE_PLANE), ("newton", HULL),
 ])  # fmt: skip
 def test_so_does_one_of_other_shapes(engine, values, tmp_path):
     found = installed(engine)
