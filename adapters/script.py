@@ -10,6 +10,7 @@ Each engine's folder writes its own (`adapters.engine.Engine.exports`).
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -41,10 +42,10 @@ def constants(dt: float, steps: int) -> list[str]:
     return [f"DT, STEPS = {dt!r}, {steps}"]
 
 
-def imports(scene: Scene, *others: str) -> list[str]:
-    """First lines of a script: what it imports, with what the courses of a scene need."""
-    ours = ["import json", "import math"] if any(body.course for body in scene.bodies) else ["import json"]
-    return [*ours, "", *others, ""]
+def imports(scene: Scene, *others: str, angles: bool = False) -> list[str]:
+    """First lines of a script: what it imports, with what the courses of a scene or ``angles`` need."""
+    needed = angles or any(body.course for body in scene.bodies)
+    return ["import json", *(["import math"] if needed else []), "", *others, ""]
 
 
 def velocity(body: Body) -> str:
@@ -56,6 +57,39 @@ def velocity(body: Body) -> str:
     late, early = (f"math.sin({rate!r} * ({k} * DT) + {course.phase!r})" for k in ("done", "(done - 1)"))
     parts = (f"{v!r} + {a!r} * (({late} - {early}) / DT)" for v, a in zip(straight, course.amplitude, strict=True))
     return f"({', '.join(parts)})"
+
+
+def place(body: Body) -> str:
+    """Place of a prescribed body at ``time`` [s]: `adapters.drives.place_after`."""
+    course, size = body.course, len(body.force)
+    moving = zip(body.pose[:size], body.twist[:size], strict=True)
+    straight = [f"{literal(x)} + {literal(v)} * time" for x, v in moving]
+    if course is None:
+        return f"({', '.join(straight)})"
+    swung = f"(math.sin({2.0 * math.pi * course.frequency!r} * time + {course.phase!r}) - {math.sin(course.phase)!r})"
+    return f"({', '.join(f'{x} + {a!r} * {swung}' for x, a in zip(straight, course.amplitude, strict=True))})"
+
+
+def materials(scene: Scene) -> list[str]:
+    """Lines of ``material(i, j)``: restitution and friction of two bodies by their numbers, for what asks pair by pair.
+
+    The commonest material stands once. No lines of a scene without such pairs.
+    """
+    pairs = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
+    if not pairs:
+        return []
+    ((common, _),) = Counter(pairs.values()).most_common(1)
+    return [
+        "# Restitution and friction of pairs of bodies, by their numbers, and of all others.",
+        f"MATERIALS, COMMON = {{{', '.join(f'{k}: {literal(m)}' for k, m in pairs.items() if m != common)}}}, "
+        + literal(common),
+        "",
+        "",
+        "def material(i, j):",
+        "    return MATERIALS.get((min(i, j), max(i, j)), COMMON)",
+        "",
+        "",
+    ]
 
 
 def stepped(step: Iterable[str]) -> list[str]:

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.box2d.profiles import PROFILES, checked
+from adapters.box2d.script import python
 from adapters.box2d.simulation import Box2DSimulation
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
@@ -80,6 +81,7 @@ class Box2DEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed distribution."""

@@ -31,7 +31,7 @@ class Box2DSimulation(Simulation):
         self.world = Box2D.b2World(gravity=gravity)
         self.world.continuousPhysics = settings["continuous"]
         self.reach = reach(scene)
-        self.single = _single(scene)
+        self.single = single(scene)
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         early = (gravity[0] * dt, gravity[1] * dt) if settings["early_restitution"] else None
         materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
@@ -178,7 +178,7 @@ class Box2DSimulation(Simulation):
         return [float(shape.radius) / self.units]
 
 
-def _single(scene: Scene) -> tuple[float, float] | None:
+def single(scene: Scene) -> tuple[float, float] | None:
     """Restitution and friction, if they are the same for all pairs: what Box2D mixes of equal numbers is the number."""
     found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
     return found.pop() if len(found) == 1 else None

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.dart.profiles import CONES, MOST_BOXES, PROFILES, checked, solved
+from adapters.dart.script import python
 from adapters.dart.shipped import MIXING, PUSH_OUT, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
@@ -78,6 +79,7 @@ class DartEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed distribution."""

@@ -85,7 +85,7 @@ class DartSimulation(Simulation):
         if isinstance(shape, HalfSpace):
             # A plane meets a box at one point only: a slab, whose upper face is the surface.
             normal = np.array(shape.normal)
-            place.set_rotation(_turned(normal))
+            place.set_rotation(turned(normal))
             place.set_translation(list((shape.offset - self.reach) * normal))
             body = dartpy.dynamics.BoxShape([2.0 * self.reach] * 3)
         else:
@@ -178,7 +178,7 @@ class DartSimulation(Simulation):
         }
 
 
-def _turned(normal: Array) -> Array:
+def turned(normal: Array) -> Array:
     """Rotation that takes the z axis to ``normal``; exact along the axes."""
     helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
     x = np.cross(helper, normal)

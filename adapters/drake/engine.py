@@ -14,6 +14,7 @@ from typing import Any, final
 
 from adapters.drake.landing import slowest_rebound
 from adapters.drake.profiles import OWN, PROFILES, checked
+from adapters.drake.script import python
 from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
 from adapters.drake.translation import frictions
@@ -105,6 +106,7 @@ class DrakeEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
     reads = MappingProxyType({".sdf": read, ".world": read})
     expected = (
         Expected(

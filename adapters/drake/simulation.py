@@ -30,10 +30,7 @@ class DrakeSimulation(Simulation):
         plant.set_contact_model(drake.ContactModel.kHydroelasticWithFallback)
         plant.set_stiction_tolerance(settings["stiction_tolerance"])
         plant.mutable_gravity_field().set_gravity_vector(list(scene.gravity))
-        own = settings.get(OWN)
-        if own is not None and len(own) != len(scene.bodies):
-            raise EngineError(f"{OWN}: has {len(own)} rows, needs one for each of {len(scene.bodies)} bodies")
-        self.frictions = (frictions(scene) or []) if own is None else [row[0] for row in own]
+        self.materials = made_of(scene, settings)
         self.owner: dict[Any, int] = {}
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         plant.Finalize()
@@ -66,7 +63,7 @@ class DrakeSimulation(Simulation):
             place = drake.RigidTransform()
         else:
             body, place = self.plant.world_body(), self._place(asked)
-        held = self._held(index, shape, free)
+        held = self._held(index, shape)
         if isinstance(shape, HalfSpace):
             normal = np.array(shape.normal)
             place = drake.HalfSpace.MakePose(normal, shape.offset * normal)
@@ -85,19 +82,10 @@ class DrakeSimulation(Simulation):
         self.owner[geometry] = index
         return body
 
-    def _held(self, index: int, shape: Any, free: bool) -> Any:
-        """What a body's contacts are made of: what its model says, or the settings."""
-        drake, settings, held = self.drake, self.settings, self.drake.ProximityProperties()
-        friction = self.frictions[index]
-        if OWN in settings:
-            _, kind, resolution, modulus, stiffness, dissipation, relaxation = settings[OWN][index]
-        else:
-            surface = settings["boxes"] == "hydroelastic" and isinstance(shape, Box | HalfSpace)
-            kind = "none" if not surface else "compliant" if free else "rigid"
-            resolution, modulus = shape.smallest_size, settings["modulus"]
-            # Two in series: each has twice the pair's. Times of a pair add up.
-            stiffness, relaxation = 2.0 * settings["point_stiffness"], 0.5 * settings["relaxation_time"]
-            dissipation = settings["dissipation"]
+    def _held(self, index: int, shape: Any) -> Any:
+        """What a body's contacts are made of."""
+        drake, held = self.drake, self.drake.ProximityProperties()
+        friction, kind, resolution, modulus, stiffness, dissipation, relaxation = self.materials[index]
         drake.AddContactMaterial(
             dissipation=dissipation,
             point_stiffness=stiffness,
@@ -216,3 +204,27 @@ class DrakeSimulation(Simulation):
                 for i, j, _ in self.scene.contact_pairs()
             },
         }
+
+
+def made_of(scene: Scene, settings: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """What each body's contacts are made of, a row like those of `OWN`: what its model says, or the settings.
+
+    Raises
+    ------
+    EngineError
+        If a model's rows are not one for each body.
+    """
+    own = settings.get(OWN)
+    if own is not None and len(own) != len(scene.bodies):
+        raise EngineError(f"{OWN}: has {len(own)} rows, needs one for each of {len(scene.bodies)} bodies")
+    if own is not None:
+        return list(own)
+    # Two in series: each has twice the pair's. Times of a pair add up.
+    stiffness, relaxation = 2.0 * settings["point_stiffness"], 0.5 * settings["relaxation_time"]
+    modulus, dissipation = settings["modulus"], settings["dissipation"]
+    rows: list[tuple[Any, ...]] = []
+    for body, friction in zip(scene.bodies, frictions(scene) or [], strict=True):
+        surface = settings["boxes"] == "hydroelastic" and isinstance(body.shape, Box | HalfSpace)
+        kind = "none" if not surface else "compliant" if body.motion == "free" else "rigid"
+        rows.append((friction, kind, body.shape.smallest_size, modulus, stiffness, dissipation, relaxation))
+    return rows

@@ -17,6 +17,7 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.means import means
 from adapters.needs import Needs
 from adapters.newton.profiles import PROFILES, TUNED_ITERATIONS, checked
+from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
 from adapters.newton.simulation import NewtonSimulation, imported
 from adapters.probes import GRAVITY, SLIDE_TIME
@@ -93,6 +94,7 @@ class NewtonEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed distribution."""

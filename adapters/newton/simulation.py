@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.drives import place_after, velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
@@ -19,7 +20,7 @@ from adapters.means import means
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
 #: Turn that takes Newton's capsules, along z, to the scene's, along x (x, y, z, w).
-_ALONG_X = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)
+ALONG_X = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)
 
 
 @cache
@@ -95,13 +96,9 @@ class NewtonSimulation(Simulation):
         # Views on the engine's own numbers: on a CPU nothing is copied.
         self.place, self.speed = self.now.body_q.numpy(), self.now.body_qd.numpy()
         self._start()
-        self.driven = [k for k, body in enumerate(scene.bodies) if self._is_driven(body)]
+        self.driven = [k for k, body in enumerate(scene.bodies) if is_driven(body)]
         self.steps = 0
         self.graph: Any = None
-
-    @staticmethod
-    def _is_driven(body: Body) -> bool:
-        return body.motion == "prescribed" or any(body.surface_velocity)
 
     # ---- making ------------------------------------------------------------------------------------------------------
 
@@ -111,7 +108,7 @@ class NewtonSimulation(Simulation):
         if asked.motion == "free":
             inertia = self.warp.mat33(*np.diag(np.asarray(asked.inertia, float)).ravel())
             number = builder.add_body(xform=place, mass=asked.mass, inertia=inertia, lock_inertia=True)
-        elif self._is_driven(asked):
+        elif is_driven(asked):
             number = builder.add_body(xform=place, is_kinematic=True, lock_inertia=True)
         config = newton.ModelBuilder.ShapeConfig(
             density=0.0,
@@ -137,7 +134,7 @@ class NewtonSimulation(Simulation):
         elif isinstance(shape, Sphere):
             builder.add_shape_sphere(number, xform=place, radius=shape.radius, cfg=config)
         elif isinstance(shape, Capsule):
-            along = warp.transform((0.0, 0.0, 0.0), _ALONG_X)
+            along = warp.transform((0.0, 0.0, 0.0), ALONG_X)
             along = along if place is None else place * along
             builder.add_shape_capsule(
                 number, xform=along, radius=shape.radius, half_height=shape.half_length, cfg=config
@@ -299,17 +296,27 @@ class NewtonSimulation(Simulation):
         }
 
 
+def is_driven(body: Body) -> bool:
+    """Whether a body is moved, or its surface runs."""
+    return body.motion == "prescribed" or any(body.surface_velocity)
+
+
 def _mesh(newton: Any, shape: Hull) -> Any:
-    """Triangles around a hull, looking outwards."""
+    vertices = np.array(shape.vertices, np.float32)
+    mesh = newton.Mesh(vertices, triangles(shape).ravel(), compute_inertia=False)
+    if len(mesh.vertices) != len(vertices):
+        raise EngineError(f"shape: newton keeps {len(mesh.vertices)} of {len(vertices)} vertices")
+    return mesh
+
+
+def triangles(shape: Hull) -> NDArray[np.int32]:
+    """Triangles around a hull, looking outwards: numbers of their corners (n, 3)."""
     from scipy.spatial import ConvexHull
 
     vertices = np.array(shape.vertices, float)
     hull = ConvexHull(vertices)
-    triangles = []
+    found = []
     for (i, j, k), plane in zip(hull.simplices, hull.equations, strict=True):
         outwards = np.cross(vertices[j] - vertices[i], vertices[k] - vertices[i]) @ plane[:3] > 0.0
-        triangles.append((i, j, k) if outwards else (i, k, j))
-    mesh = newton.Mesh(vertices.astype(np.float32), np.array(triangles, np.int32).ravel(), compute_inertia=False)
-    if len(mesh.vertices) != len(vertices):
-        raise EngineError(f"shape: newton keeps {len(mesh.vertices)} of {len(vertices)} vertices")
-    return mesh
+        found.append((i, j, k) if outwards else (i, k, j))
+    return np.array(found, np.int32)

@@ -17,6 +17,7 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected
 from adapters.means import means
 from adapters.needs import Needs
 from adapters.physx.profiles import PROFILES, checked
+from adapters.physx.script import python
 from adapters.physx.shipped import ANGULAR_DAMPING, BOUNCE_THRESHOLD
 from adapters.physx.simulation import PhysxSimulation
 from adapters.probes import REBOUND_SPEED
@@ -93,6 +94,7 @@ class PhysxEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
     expected = (
         Expected(
             "order",

@@ -16,6 +16,7 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.rapier.profiles import PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
+from adapters.rapier.script import python
 from adapters.rapier.simulation import RapierSimulation
 from adapters.scene import Scene
 from adapters.settings import checked_step
@@ -80,6 +81,7 @@ class RapierEngine(Engine):
         ),
     )
     profiles = PROFILES
+    exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed distribution."""

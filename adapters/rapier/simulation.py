@@ -39,8 +39,7 @@ class RapierSimulation(Simulation):
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
         self._set(rapier3d, dt, settings)
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
-        found = set(self.materials.values())
-        self.single = next(iter(found)) if len(found) == 1 else None
+        self.single = single(scene)
         self.index: dict[Any, int] = {}
         self.bodies = [self._made(rapier3d, index, body) for index, body in enumerate(scene.bodies)]
         if self.single is None and self.materials:
@@ -188,3 +187,9 @@ class RapierSimulation(Simulation):
                 for i, j in self.materials
             }
         return told
+
+
+def single(scene: Scene) -> tuple[float, float] | None:
+    """Restitution and friction, if they are the same for all pairs: what is combined of equal numbers is the number."""
+    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
+    return found.pop() if len(found) == 1 else None

@@ -1,9 +1,11 @@
 """`export --to`: a cell as a text for its engine alone ends in the bits of the cell."""
 
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +13,38 @@ from click.testing import CliRunner
 
 from adapters import registry
 from adapters.lift import lower_pose, lower_twist
-from adapters.stepping import posed_for, run
+from adapters.stepping import posed_for, run, step_count
 from adapters.trajectory import Sampling
 from reports.command import main
 from reports.scripts import written
 from validation.cells import Slot, prepare, settings_of
+from validation.posed import pinned
 
 DT = 1.0 / 240.0
+MODELS = Path(__file__).parents[1] / "models"
 OURS = ("contact_crosscheck", "adapters", "validation", "reports")
 #: What each script must get right beside what the scene file below has: tuned starts, tables of materials.
 CELLS = [("impact", {"e": 0.5}, "default"), ("pinch", {}, "tuned")]
+#: Cells of engines that are set apart: each profile, tables of materials, what is moved as prescribed.
+APART = [
+    ("rapier", "bounce", {}, 2, "default"), ("rapier", "stack", {}, 3, "tuned"),
+    ("rapier", "oblique", {}, 3, "default"), ("rapier", "pair_matrix", {}, 2, "default"),
+    ("rapier", "closing_wall", {}, 3, "tuned"),
+    ("dart", "bounce", {}, 2, "default"), ("dart", "stack", {"n": 2.0}, 3, "pgs"),
+    ("dart", "incline", {}, 3, "default"), ("dart", "pinch", {}, 2, "default"), ("dart", "oblique", {}, 3, "nsgs"),
+    ("dart", "oblique", {}, 2, "fbf"),
+    ("box2d", "bounce", {}, 2, "default"), ("box2d", "stack", {}, 2, "tuned"), ("box2d", "incline", {}, 2, "tuned"),
+    ("box2d", "pair_matrix", {}, 2, "tuned"), ("box2d", "closing_wall", {}, 2, "default"),
+    ("box2d3", "bounce", {}, 2, "default"), ("box2d3", "stack", {}, 2, "tuned"),
+    ("box2d3", "incline", {}, 2, "default"), ("box2d3", "pinch", {}, 2, "tuned"),
+    ("box2d3", "closing_wall", {}, 2, "default"),
+    ("drake", "stack", {"n": 2.0}, 3, "default"), ("drake", "incline", {}, 2, "sap"),
+    ("drake", "pinch", {}, 2, "tamsi"), ("drake", "oblique", {"e": 0.0}, 3, "similar"),
+    ("physx", "bounce", {}, 2, "default"), ("physx", "stack", {}, 3, "tuned"), ("physx", "incline", {}, 2, "pgs"),
+    ("physx", "oblique", {}, 3, "tuned"), ("physx", "closing_wall", {}, 3, "default"),
+    ("newton", "impact", {}, 2, "default"), ("newton", "oblique", {}, 3, "default"),
+    ("newton", "impact", {}, 3, "tuned"),
+]  # fmt: skip
 LOADED = """
 name = "loaded"
 dimension = {d}
@@ -45,6 +69,11 @@ twist = {twist}
 [[pairs]]
 restitution = 0.25
 friction = 0.5
+[[pairs]]
+a = "belt"
+b = "box"
+restitution = 0.25
+friction = 0.4
 """
 PLANAR = {"d": 2, "gravity": [0.0, -9.81], "half": [0.5, 0.5], "pose": [0.0, 0.7, 0.1], "force": [1.0, 0.5],
           "torque": [0.3], "away": [1.3, 0.6, 0.0], "twist": [-0.5, 0.0, 0.2]}  # fmt: skip
@@ -52,6 +81,19 @@ SPATIAL = {"d": 3, "gravity": [0.0, 0.0, -9.81], "half": [0.5, 0.4, 0.3],
            "pose": [0.0, 0.0, 0.7, 0.9887710779360422, 0.0, 0.14943813247359922, 0.0], "force": [1.0, 0.2, 0.5],
            "torque": [0.3, 0.1, 0.2], "away": [1.3, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0],
            "twist": [-0.5, 0.0, 0.0, 0.0, 0.0, 0.2]}  # fmt: skip
+
+
+def installed(engine):
+    """An engine; whoever asks for one that is not there is skipped."""
+    found = registry.find(engine).engine
+    if found is None:
+        pytest.skip(f"{engine} is not installed")
+    return found
+
+
+def best_of(engine):
+    """Profile of a textbook, or the tuned one."""
+    return engine.facts.profile("textbook") or engine.facts.profile("tuned")
 
 
 def slot_of(engine, scene, params, profile, dimension):
@@ -67,18 +109,23 @@ def ended(slot):
 
 
 def printed(slot, tmp_path, allowed=()):
-    """Final pose and twist that the script prints, run in a folder of its own without our packages."""
+    """Final pose and twist that the script of a cell prints."""
+    return told(written(slot, "python"), prepare(slot).scene, tmp_path, allowed)
+
+
+def told(script, scene, tmp_path, allowed=()):
+    """Final pose and twist that a script prints, run in a folder of its own without our packages."""
     path = tmp_path / "cell.py"
     blocked = [name for name in (*OURS, "reference_solver") if name not in allowed]
     guard = f"\nimport sys\nassert not set(sys.modules) & set({blocked!r}), 'it imports us'\n"
-    path.write_text(written(slot, "python") + guard)
-    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path)
+    path.write_text(script + guard)
+    alone = [] if allowed else ["-I"]  # what is allowed may stand on PYTHONPATH
+    done = subprocess.run([sys.executable, *alone, str(path)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
-    prepared = prepare(slot)
-    bodies = [last["bodies"][body.name] for body in prepared.scene.bodies]
+    bodies = [last["bodies"][body.name] for body in scene.bodies]
     pose, twist = (np.array([body[key] for body in bodies]) for key in ("pose", "twist"))
-    if pose.shape[1] == 7 and slot.dimension == 2:
+    if pose.shape[1] == 7 and scene.dimension == 2:
         pose, twist = lower_pose(pose), lower_twist(twist)
     return pose, twist
 
@@ -98,6 +145,65 @@ def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
 
+@pytest.mark.parametrize(("engine", "scene", "params", "dimension", "profile"), APART)
+def test_so_does_one_for_an_engine_that_is_set_apart(engine, scene, params, dimension, profile, tmp_path):
+    installed(engine)
+    assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
+
+
+@pytest.mark.parametrize(("engine", "changes"), [
+    ("rapier", {"friction_model": "coulomb", "recycling": False, "clustering": False}),
+    ("dart", {"detector": "bullet"}), ("box2d", {"early_restitution": True, "units_per_metre": 4.0}),
+    ("box2d3", {"continuous": False, "units_per_metre": 4.0}), ("drake", {"boxes": "point", "dissipation": 10.0}),
+    ("physx", {"friction_every_iteration": False, "persistent_manifolds": False}),
+    ("newton", {"weighted": False, "rebound_iterations": 3}),
+])  # fmt: skip
+def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
+    found = installed(engine)
+    slot = slot_of(engine, "oblique", {"e": 0.0 if engine == "drake" else 0.5}, "default", 2)
+    scene = prepare(slot).scene
+    settings = {setting.name: setting.value for setting in settings_of(found, slot, scene)} | changes
+    script = found.exports["python"](posed_for(found, scene), DT, settings, step_count(scene.duration, DT))
+    ends = run(found, scene, DT, settings, Sampling(10**6))
+    for state, expected in zip(told(script, scene, tmp_path), (ends.pose[-1], ends.twist[-1]), strict=True):
+        assert np.array_equal(state, expected)
+
+
+#: Another word for settings that are words.
+OTHER_WORD = {"coulomb": "simplified", "simplified": "coulomb", "fcl": "dart", "lagged": "sap", "sap": "lagged",
+              "tamsi": "sap", "similar": "sap", "hydroelastic": "point", "tgs": "pgs", "pgs": "tgs"}  # fmt: skip
+
+
+def another(value):
+    """Another value of a setting that an engine can take."""
+    if isinstance(value, str):
+        return OTHER_WORD[value]
+    return not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else 0.5 * value or 1.0
+
+
+@pytest.mark.parametrize("engine", sorted({engine for engine, *_ in APART}))
+def test_no_setting_is_left_out(engine):
+    """A profile's own number may be the engine's default, so that a script ends in the same bits without it."""
+    found = installed(engine)
+    for profile in found.profiles:
+        slot = slot_of(engine, "stack", {"n": 1.0}, profile, 2)
+        scene = prepare(slot).scene
+        settings = {setting.name: setting.value for setting in settings_of(found, slot, scene)}
+        texts = {}
+        for name, value in settings.items():
+            if name == "solver" and engine == "dart":  # each brings settings of its own; profiles have them all
+                continue
+            texts[name] = found.exports["python"](posed_for(found, scene), DT, settings | {name: another(value)}, 3)
+        texts[""] = found.exports["python"](posed_for(found, scene), DT, settings, 3)
+        assert len(set(texts.values())) == len(settings) + 1 - (engine == "dart"), (profile, texts)
+
+
+@pytest.mark.parametrize("name", ["rollers", "soft_surfaces"])
+def test_so_does_one_of_a_model_with_its_own_surfaces(name, tmp_path):
+    installed("drake")
+    assert_same_bits(slot_of("drake", pinned(str(MODELS / f"{name}.sdf")), {}, "model", 3), tmp_path)
+
+
 def test_so_does_one_whose_bodies_come_from_files(tmp_path):
     """Tuned Bullet clips faces of hulls, and knows those of bodies from URDF alone."""
     pytest.importorskip("pybullet")
@@ -110,23 +216,27 @@ def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, t
     assert_same_bits(slot_of("mujoco", scene, params, "matched", 3), tmp_path)
 
 
-@pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco", "reference"])
+@pytest.mark.parametrize("engine", [
+    "chipmunk", "bullet", "mujoco", "reference", "rapier", "dart", "box2d", "box2d3", "drake", "physx", "newton",
+])  # fmt: skip
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
 def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
-    found = registry.find(engine).engine
-    if found is None:
-        pytest.skip(f"{engine} is not installed")
+    found = installed(engine)
     if values["d"] == 3 and found.facts.dimensions == {2}:
         pytest.skip(f"{engine} is planar: it has no spatial script")
     path = tmp_path / "loaded.toml"
-    path.write_text(LOADED.format(**values))
-    from validation.posed import pinned
-
-    profile = found.facts.profile("textbook") or "tuned"
-    slot = slot_of(engine, pinned(str(path)), {}, profile, values["d"])
+    text = LOADED.format(**values)
+    if engine in UNMOVED:
+        text = re.sub(r'motion = "prescribed"(.*?)twist = [^\n]*', r'motion = "fixed"\1', text, flags=re.DOTALL)
+    if engine == "drake":  # has no restitution
+        text = text.replace("restitution = 0.25", "restitution = 0.0")
+    path.write_text(text)
+    slot = slot_of(engine, pinned(str(path)), {}, best_of(found), values["d"])
     assert_same_bits(slot, tmp_path, allowed=("reference_solver",) if engine == registry.solver() else ())
 
 
+#: Engines that move no body as prescribed.
+UNMOVED = ("dart", "drake")
 DRIVEN = """
 name = "driven"
 dimension = 2
@@ -158,19 +268,15 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 @pytest.mark.parametrize(("engine", "runs", "shaken"), [
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
     ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
-    ("reference", True, False),
+    ("reference", True, False), ("physx", None, True), ("newton", True, True), ("newton", False, True),
 ])  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
-    found = registry.find(engine).engine
-    if found is None:
-        pytest.skip(f"{engine} is not installed")
-    from validation.posed import pinned
-
+    found = installed(engine)
     path, course = tmp_path / "driven.toml", COURSE if shaken else ""
-    moved = ("fixed", 1.0, "") if runs else ("prescribed", 0.0, COURSE)
+    moved = {True: ("fixed", 1.0, ""), False: ("prescribed", 0.0, COURSE), None: ("fixed", 0.0, "")}[runs]
     path.write_text(DRIVEN % (*moved, course))
-    slot = slot_of(engine, pinned(str(path)), {}, profile or found.facts.profile("textbook") or "tuned", 2)
+    slot = slot_of(engine, pinned(str(path)), {}, profile or best_of(found), 2)
     allowed = ("reference_solver",) if engine == registry.solver() else ()
     pose, twist = printed(slot, tmp_path, allowed)
     expected = ended(slot)
@@ -208,17 +314,14 @@ HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1,
 
 @pytest.mark.parametrize(("engine", "values"), [
     ("chipmunk", IN_THE_PLANE), ("reference", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
-    ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL),
+    ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL), ("physx", IN_THE_PLANE), ("physx", HULL),
+    ("newton", IN_THE_PLANE), ("newton", HULL),
 ])  # fmt: skip
 def test_so_does_one_of_other_shapes(engine, values, tmp_path):
-    found = registry.find(engine).engine
-    if found is None:
-        pytest.skip(f"{engine} is not installed")
-    from validation.posed import pinned
-
+    found = installed(engine)
     path = tmp_path / "shapes.toml"
     path.write_text(SHAPES.format(**values))
-    slot = slot_of(engine, pinned(str(path)), {}, found.facts.profile("textbook") or "tuned", values["d"])
+    slot = slot_of(engine, pinned(str(path)), {}, best_of(found), values["d"])
     assert_same_bits(slot, tmp_path, ("reference_solver",) if engine == registry.solver() else ())
     if engine == "mujoco":
         import mujoco
@@ -275,10 +378,8 @@ def test_hostile_names_end_neither_comment_nor_string(tmp_path):
     """A body's name is data in a script and in a model, whatever it holds."""
     pytest.importorskip("pymunk")
     path = tmp_path / "hostile.toml"
-    text = LOADED.format(**PLANAR).replace('name = "box"', "name = '''a'\"\"\" --> <b/> ]}} ''' ")
+    text = re.sub('(name|b) = "box"', "\\1 = '''a'\"\"\" --> <b/> ]}} ''' ", LOADED.format(**PLANAR))
     path.write_text(text.replace('name = "loaded"', "name = '''-->'\"\"\"'''"))
-    from validation.posed import pinned
-
     assert_same_bits(slot_of("chipmunk", pinned(str(path)), {}, "default", 2), tmp_path)
     if registry.find("mujoco").engine:
         path.write_text(path.read_text().replace("force = ", "#").replace("torque = ", "#"))
@@ -308,8 +409,8 @@ def test_a_wrong_call_is_one_line(words, said, tmp_path, monkeypatch):
 def test_every_format_of_ours_is_tried_here():
     ours = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
     forms = {(name, form) for name in ours for form in registry.adapter(name).exports}
-    assert {("chipmunk", "python"), ("bullet", "python"), ("mujoco", "python"), ("mujoco", "mjcf"),
-            ("reference", "python")} <= forms  # fmt: skip
+    tried = {"chipmunk", "bullet", "mujoco", "reference", *(engine for engine, *_ in APART)}
+    assert forms == {(name, "python") for name in tried} | {("mujoco", "mjcf")}
 
 
 def test_what_is_posed_for_an_engine_is_what_is_written():
