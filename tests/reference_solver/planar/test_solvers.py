@@ -190,7 +190,7 @@ def solve_mode(w, q, mu, modes):
 
 
 def test_two_points_of_a_face_that_stick_share_their_friction_by_what_they_may_carry():
-    """A box of 1 kg over a floor, off its middle: J^T p takes all its velocity, p_n by the moment about either point."""
+    """A box of 1 kg over a floor, off its middle: J^T p takes all its velocity, p_n by moments about either point."""
     solve, local = from_python(pair_modes.solve_modes), np.zeros((LOCAL_ROWS, LOCAL_COLUMNS))
     left, right, height, moment = 0.2, 0.5, 0.4, 0.13
     rows = np.array([[0.0, 1.0, -left], [1.0, 0.0, height], [0.0, 1.0, right], [1.0, 0.0, height]])
