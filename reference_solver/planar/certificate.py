@@ -92,13 +92,15 @@ def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
         tally[NOT_FINITE] += 1.0
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
+    before, tally[PENETRATION] = tally[PENETRATION], 0.0
     for c in range(rows.counts[CONTACTS]):
         inspect_row(bodies, rows, c, options, tally)
         done, moved, size = row_work(bodies, rows, c)
         work, surface, effort = work + done, surface + moved, effort + size
         restored = restored or rows.real[c, TARGET] > 0.0
     if tally[OPENED] <= 1.0:
-        tally[START_OVERLAP] = tally[PENETRATION]
+        tally[START_OVERLAP] = max(tally[START_OVERLAP], tally[PENETRATION])
+    tally[PENETRATION] = max(tally[PENETRATION], before)
     tally[CONTACT_WORK] += work
     tally[SURFACE_WORK] += surface
     enter_creation(work, effort, restored, tally)

@@ -21,7 +21,7 @@ from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, 
 from reference_solver.planar.midpoint import exchange_levers
 from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
 from reference_solver.planar.state import Bodies, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, UNTIL_REST
+from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.clock import ROCKING as COMES_TO_REST
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
@@ -59,7 +59,7 @@ def enter_moments(journal: Journal, lasting: Lasting, first: int) -> None:
 @inner_kernel
 def impulse_scheme(sub: SubStep) -> int:
     """By what rule the impulse-level scheme was taken: for what is left, or until bodies that rock rest (E22)."""
-    return ROCKING if sub.clock[HELD] == UNTIL_REST or sub.clock[COMES_TO_REST] > 0.0 else IMPULSE_LEVEL
+    return ROCKING if sub.clock[COMES_TO_REST] > 0.0 else IMPULSE_LEVEL
 
 
 @inner_kernel

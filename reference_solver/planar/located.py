@@ -27,7 +27,9 @@ from reference_solver.planar.columns import (
     PT,
     REACH,
     RELEASE,
+    SHAPE,
     SIN,
+    SIZE,
 )
 from reference_solver.planar.direct import mend_velocities, solve_directly
 from reference_solver.planar.entries import enter_fixed_step, enter_release, enter_sub_step
@@ -45,6 +47,7 @@ from reference_solver.planar.state import (
     CONTACTS,
     FIXED,
     FREE,
+    HALF_SPACE,
     KEPT,
     REMEMBERED,
     Bodies,
@@ -328,7 +331,11 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
     """By bounding boxes of all that a body may sweep."""
     bodies, options, limit, boxes = whole.bodies, whole.options, world.islands.limit, whole.pairs.boxes
     for i in range(len(bodies.kind)):
-        reach = bodies.real[i, REACH] + options.margin * bodies.real[i, EXTENT]
+        if bodies.kind[i, SHAPE] == HALF_SPACE:
+            c, s, x, y = bodies.real[i, COS], bodies.real[i, SIN], bodies.real[i, SIZE], bodies.real[i, SIZE + 1]
+            stays, plane = 1.0 if bodies.twist[i, 2] == 0.0 else 0.0, world.islands.plane[i]
+            plane[0], plane[1], plane[2] = stays * (c * x - s * y), stays * (s * x + c * y), bodies.real[i, SIZE + 2]
+        reach = world.islands.reach[i] = bodies.real[i, REACH] + options.margin * bodies.real[i, EXTENT]
         for k in range(2):
             way = abs(bodies.twist[i, k]) * options.dt
             if bodies.kind[i, MOTION] == FREE:

@@ -80,6 +80,7 @@ def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array
         tally[NOT_FINITE] += 1.0
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
+    before, tally[PENETRATION] = tally[PENETRATION], 0.0
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         v_start, w_start = relative_twist(bodies.start, manifolds, m, options.rotation)
@@ -91,7 +92,8 @@ def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array
             work, surface, effort = work + done, surface + moved, effort + size
             restored = restored or manifolds.target[m, p] > 0.0
     if tally[OPENED] <= 1.0:
-        tally[START_OVERLAP] = tally[PENETRATION]
+        tally[START_OVERLAP] = max(tally[START_OVERLAP], tally[PENETRATION])
+    tally[PENETRATION] = max(tally[PENETRATION], before)
     tally[CONTACT_WORK] += work
     tally[SURFACE_WORK] += surface
     enter_creation(work, effort, restored, tally)

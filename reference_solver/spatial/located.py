@@ -51,7 +51,7 @@ from reference_solver.spatial.state import (
 from reference_solver.spatial.step import copy_contacts, step
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.spatial.touching import detect_touching
-from reference_solver.spatial.vector import add, row, times_transposed
+from reference_solver.spatial.vector import add, row, times, times_transposed
 from reference_solver.stepping import operations
 from reference_solver.stepping.accounting import keep
 from reference_solver.stepping.broadphase import boxes_part
@@ -394,6 +394,12 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
     bound_bodies(bodies, boxes, options)
     for i in range(len(bodies)):
         far = flight.reach_of(bodies, i) + radius_of(bodies, i) if bodies.kind[i] != HALF_SPACE else math.inf
+        world.islands.reach[i] = far + options.margin * bodies.extent[i]
+        if bodies.kind[i] == HALF_SPACE:
+            normal = times(bodies.axes, i, row(bodies.geometry, i, 0))
+            for k in range(3):
+                world.islands.plane[i, k] = 0.0 if bodies.turning[i] else normal[k]
+            world.islands.plane[i, 3] = bodies.geometry[i, 3]
         for k in range(3):
             way = abs(bodies.twist[i, k]) * options.dt
             if bodies.motion[i] == FREE:

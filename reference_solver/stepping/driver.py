@@ -219,11 +219,8 @@ def settle(island: Island) -> bool:
     anew.
     """
     clock = island.sub.clock
-    found = find_loaded(island)
-    if found <= 0:
-        if found == 0:
-            end_settling(clock)
-        return found == 0
+    if find_loaded(island) < 0:
+        return False
     keep_state(island.sub.journal, island.bodies.pose, island.bodies.twist)
     moved = close_gaps(island)
     if moved:

@@ -212,16 +212,25 @@ class TestPlantedFaults:
         usual = 2.0 / 2.5 if dimension == 2 else 4.0 / 4.0
         assert planted.tally[entries.PUMPED] == pytest.approx(1.5 / (1.5 + usual), rel=1e-12)
 
+    def test_an_overlap_that_another_island_met_before_is_none_of_the_start(self, dimension):
+        """The first solve of each island tells what overlaps at the start: of that island alone."""
+        planted = Planted(dimension)
+        planted.tally[entries.PENETRATION], planted.tally[entries.OPENED] = 1e-3, 1.0
+        planted.run()
+        assert planted.tally[entries.START_OVERLAP] < 1e-12 and planted.tally[entries.PENETRATION] == 1e-3
+
     def test_an_overlap_past_the_middle(self, dimension):
         planted = Planted(dimension)
         planted.gap[0] = -0.51
         assert planted.exceeded() == {"penetration"}
 
     def test_what_is_no_number(self, dimension):
+        """It is told, and nothing else is measured by it."""
         planted = Planted(dimension)
         planted.bodies.twist[1, 0] = math.nan
         assert planted.exceeded() == set()
         assert "no numbers" in reasons(planted.tally)[0]
+        assert np.isfinite(planted.tally).all()
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

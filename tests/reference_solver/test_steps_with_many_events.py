@@ -17,7 +17,10 @@ from reference_solver.stepping.clock import (
     MOST_SOFT,
     PATIENCE,
     SOFT,
+    UNSETTLED,
+    UNTIL_REST,
     count_event,
+    end_settling,
     hurry,
     jams,
     open_step,
@@ -111,6 +114,14 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
         count_event(clock, tally, 1.0)
         assert clock[HELD] == 1.0
     assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
+
+
+def test_rocking_that_has_ended_is_behind_when_it_is_settled_and_what_is_held_for_its_events_is_not():
+    for held, after in ((UNTIL_REST, 0.0), (1.0, 1.0)):
+        clock = np.zeros(CLOCK_SIZE)
+        clock[HELD], clock[UNSETTLED] = held, 0.5 * DT
+        end_settling(clock)
+        assert (clock[HELD], clock[UNSETTLED]) == (after, 0.0)
 
 
 def test_a_cluster_jams_where_contacts_have_more_rows_than_bodies_have_freedoms_or_bodies_are_many():

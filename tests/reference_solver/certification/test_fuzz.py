@@ -12,6 +12,7 @@ from reference_solver.certification.fuzz.trial import attack
 from reference_solver.certification.fuzz.variants import FINER, Variant, variants
 from reference_solver.certification.geometry import gap
 from reference_solver.certification.truth import certify, distance
+from reference_solver.model import Model
 from reference_solver.settings import Settings
 from reference_solver.shapes import Polygon
 from reference_solver.simulation import Simulation
@@ -28,6 +29,23 @@ def test_a_box_that_comes_to_lie_by_rocking_needs_no_step_of_lower_order():
     simulation = Simulation(drawn.model, Settings.reference(1.0 / drawn.rate))
     simulation.advance(30)
     assert simulation.certificate["held_steps"] == 0 and simulation.certificate["events"] > 10
+
+
+def test_a_run_that_ended_had_met_a_problem_that_has_no_solution():
+    """A box comes down, as prescribed, on a disc over the floor: friction of both holds it there (enumeration, O9)."""
+    drawn = scene(13, 2)
+    simulation = Simulation(drawn.model, Settings.reference(1.0 / drawn.rate))
+    pieces = simulation.record(26, pieces=True).pieces
+    assert any("bodies 0 and 3 apart" in reason for reason in simulation.certificate["reasons"])
+    last = slice(pieces.first_body[-2], pieces.first_body[-1])
+    who = pieces.body[last]
+    assert who.tolist() == [0, 2, 3]
+    then = zip(who, pieces.pose_after[last], pieces.twist_after[last], strict=True)
+    bodies = [replace(drawn.model.bodies[i], pose=tuple(pose), twist=tuple(twist)) for i, pose, twist in then]
+    friction = np.asarray(drawn.model.friction)[np.ix_(who, who)]
+    problem = Simulation(Model(2, bodies, (0.0, 0.0), 0.0, friction), Settings.fixed_step(1e-9)).step_problem()
+    assert list(zip(problem.body_a.tolist(), problem.body_b.tolist(), strict=True)) == [(0, 2), (1, 2)]
+    assert not problem.solutions()
 
 
 class TestScenes:

@@ -10,10 +10,11 @@ from reference_solver.certification.relations import Change
 from reference_solver.certification.truth import certify
 from reference_solver.compilation import from_python
 from reference_solver.needs import needs
-from reference_solver.pieces import IMPACT
-from reference_solver.planar import manifolds
+from reference_solver.pieces import IMPACT, IMPULSE_LEVEL, ROCKING
+from reference_solver.planar import entries, manifolds
 from reference_solver.planar.columns import GAP, NX, NY
 from reference_solver.planar.world import World
+from reference_solver.stepping import clock
 
 detect = from_python(manifolds.detect)
 
@@ -163,3 +164,12 @@ def test_where_nothing_rubs_no_contact_is_said_to():
             along = normal[0] * impulse[1] - normal[1] * impulse[0]
             assert abs(along) <= 0.05 * math.hypot(*impulse) + 1e-15  # normals turn within a step
     assert simulation.certificate["excess"] <= 1e-14
+
+
+def test_a_piece_in_which_bodies_rock_to_rest_is_named_so_and_another_that_is_held_is_not():
+    model, named = Model(2, [FLOOR, rod((0.5, 0.1), 0.1, 0.0)], DOWN, 0.0, 0.5), from_python(entries.impulse_scheme)
+    sub = World(model, Settings.reference(1.0 / 60.0), needs(model))._sub
+    sub.clock[clock.HELD] = 1.0
+    assert named(sub) == IMPULSE_LEVEL
+    sub.clock[clock.ROCKING] = 1.0
+    assert named(sub) == ROCKING

@@ -38,6 +38,35 @@ def test_a_ball_that_bounces_far_away_changes_nothing_here():
     assert beside.certificate["events"] > alone.certificate["events"] > 0
 
 
+def islands_of(simulation):
+    """Which bodies made their last step together."""
+    label = simulation._world._world.islands.label
+    return [int(label[i]) for i in range(len(label)) if simulation.model.bodies[i].motion == "free"]
+
+
+def test_only_what_may_meet_is_one_island_and_what_can_meet_nobody_flies_together():
+    """Two discs askew, whose boxes overlap; two that fall over a floor, and one that reaches it within the step."""
+    askew, side = 0.65 / math.sqrt(2.0), 0.2
+    falling = [disc(5.0, 4.0), disc(-5.0, 3.0), disc(0.0, 0.3 + side * DT, 0.0, -1.0)]
+    simulation = world([disc(20.0, 5.0), disc(20.0 + askew, 5.0 + askew), *falling])
+    simulation.advance(1)
+    assert islands_of(simulation) == [1, 1, 1, 1, 5]
+    closer = 0.605 / math.sqrt(2.0)
+    simulation = world([disc(20.0, 5.0), disc(20.0 + closer, 5.0 + closer), *falling])
+    simulation.advance(1)
+    assert islands_of(simulation) == [1, 1, 3, 3, 5]
+    lands = 1.0 + side * 9.81 * DT  # a fifth of the step later, or a thousandth less of it
+    assert simulation.twist[5, 1] == pytest.approx(0.4 * lands - (1.0 - side) * 9.81 * DT, rel=0.01)
+
+
+def test_a_floor_that_turns_may_meet_whatever_it_can_turn_to():
+    """A half-space about a far pivot: what lies over it now is hit by it within the step."""
+    floor = Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(0.0, 0.0, 3.0))
+    simulation = Simulation(Model(2, [floor, disc(30.0, 1.0)], (0.0, 0.0), 0.0, 0.0), Settings.reference(DT))
+    simulation.advance(1)
+    assert simulation.twist[1, 1] > 10.0
+
+
 def test_contacts_of_all_islands_carry_all_weights():
     simulation = world([disc(float(x), 0.3, mass=1.0 + x) for x in range(6)], restitution=0.0)
     simulation.advance(2)

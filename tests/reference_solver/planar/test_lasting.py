@@ -172,3 +172,20 @@ def test_a_phase_that_an_impact_cuts_ends_where_bodies_touch(rate, half, lean, s
     # Height less the parts of both half widths: a rounding each, of numbers below the longer one, and of the angle's.
     low = height + np.array([-1.0, 1.0]) * half[0] * math.sin(angle) - half[1] * math.cos(angle)
     assert np.abs(low).max() <= 4.0 * np.finfo(float).eps * half[0]
+
+
+@pytest.mark.parametrize(
+    "end, rate, form", [(1, 0.5, "corner"), (1, -0.5, "edge"), (-1, -0.5, "corner"), (-1, 0.5, "edge")]
+)
+def test_a_ball_over_the_end_of_a_face_goes_by_its_corner_where_it_goes_out_and_by_the_face_where_it_comes_in(
+    end, rate, form
+):
+    block = Body(Box((0.3, 0.4)), motion="fixed")
+    ball = Body(Disc(0.5), 1.0, 0.1, (0.3 * end, 0.9, 0.0), (rate, 0.0, 0.0))
+    model = Model(2, [block, ball], (0.0, 0.0), 0.0, 0.5)
+    world = World(model, Settings.reference(1.0 / 240.0), needs(model))
+    lasting = allocate_lasting(2, 2, 8)
+    assert detect(world._bodies, world._pairs, world._rows, world._options)
+    prepare_masses(world._bodies, world._rows, 0)
+    hold(world._bodies, world._rows, lasting, 0, 0)
+    assert lasting.kind[0, held.FORM] == {"corner": held.POINTS, "edge": held.EDGE_OF_A}[form]

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings
+from reference_solver.compilation import from_python
+from reference_solver.planar import pair_modes
+from reference_solver.planar.pair_modes import IMPULSE, LOCAL_COLUMNS, LOCAL_ROWS, VELOCITY
 
 G = 9.81
 
@@ -184,3 +187,21 @@ def solve_mode(w, q, mu, modes):
         if not fine or (mode != "open" and abs(u[n]) > 1e-9) or (mode == "stick" and abs(u[t]) > 1e-9):
             return None
     return p
+
+
+def test_two_points_of_a_face_that_stick_share_their_friction_by_what_they_may_carry():
+    """A box of 1 kg over a floor, off its middle: J^T p takes all its velocity, p_n by moments about either point."""
+    solve, local = from_python(pair_modes.solve_modes), np.zeros((LOCAL_ROWS, LOCAL_COLUMNS))
+    left, right, height, moment = 0.2, 0.5, 0.4, 0.13
+    rows = np.array([[0.0, 1.0, -left], [1.0, 0.0, height], [0.0, 1.0, right], [1.0, 0.0, height]])
+    w = rows @ np.diag((1.0, 1.0, 1.0 / moment)) @ rows.T
+    mu, falls, slides = (0.6, 0.9), 2.0, 0.3
+    velocity = np.array([-slides, -falls, 0.0])
+    local[VELOCITY, :4] = rows @ velocity
+    assert solve(w, local, *mu)
+    impulse = local[IMPULSE, :4]
+    first = (falls * right + slides * height) / (left + right)
+    assert impulse[[0, 2]] == pytest.approx([first, falls - first], rel=1e-13)
+    may = np.array(mu) * impulse[[0, 2]]
+    assert impulse[[1, 3]] == pytest.approx(slides * may / may.sum(), rel=1e-13)
+    assert np.abs(local[VELOCITY, :4]).max() < 1e-15 * falls / moment

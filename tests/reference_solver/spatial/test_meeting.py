@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Sphere
-from reference_solver.compilation import from_python
+from reference_solver.compilation import from_python, kernel
 from reference_solver.needs import EVERYTHING
 from reference_solver.spatial.meeting import allocate_meeting, spin_on
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.separation import separation as separation_and_normal
 from reference_solver.spatial.state import allocate_bodies
-from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
+from reference_solver.stepping.time_of_impact import (
+    NORMAL,
+    TURN,
+    first_contact,
+    introduce,
+    next_contact_of_held,
+    set_normal,
+    stand,
+    turn_with_edges,
+)
 
 DT = 1.0 / 60.0
 #: Samples of a step: a corner that turns 30 rad in it goes 2e-3 of its lever between two.
@@ -202,3 +211,45 @@ def test_the_face_of_a_box_held_by_an_edge_comes_down_when_it_lies_flat():
         heights = places(Box(half), start, path, np.array([t]))[0, 4:, 2] - top  # corners at x = +0.5
         assert abs(heights).min() <= TOUCHING
         assert next_contact_of_held(meeting, 0, 1, 0.0, 0.0, 1.0, 0.0, 0.9 * t) == math.inf
+
+
+def about(axis, angle):
+    """Quaternion of a turn."""
+    return np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * np.array(axis))])
+
+
+def product(p, q):
+    return np.array([p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
+
+
+@kernel
+def turned_along(meeting):
+    """Let the direction upwards turn along with the edges of a pair at the start of its paths."""
+    introduce(meeting, 0, 1)
+    stand(meeting, 0.0)
+    set_normal(meeting, 0.0, 0.0, 1.0)
+    return turn_with_edges(meeting)
+
+
+@pytest.mark.parametrize("below, above", [("edge", "edge"), ("edge", "corner"), ("corner", "edge")])
+def test_the_direction_that_turns_along_stays_square_to_the_edges_that_it_separates(below, above):
+    """Edges turn as ``e' = w x e``, so that ``n.e = 0`` lasts where ``n'.e = -n.(w x e)``."""
+    random = np.random.default_rng(5)
+    upright = about((1.0, 0.0, 0.0), 0.25 * math.pi)  # on an edge along x
+    on_corner = product(about((0.0, 1.0, 0.0), -math.atan(math.sqrt(0.5))), upright)
+    for _ in range(8):
+        heading = about((0.0, 0.0, 1.0), random.uniform(0.4, math.pi - 0.4))
+        turns = [upright if below == "edge" else on_corner, product(heading, upright if above == "edge" else on_corner)]
+        bodies = [Body(Box((1.0,) * 3), 1.0, (1.0,) * 3, (0.0, 0.0, 3.0 * k, *turns[k])) for k in range(2)]
+        paths = [np.zeros((6, 1)), np.zeros((6, 1))]
+        for path in paths:
+            path[3:, 0] = random.normal(size=3)
+        meeting = meeting_of(bodies, paths)
+        assert turned_along(meeting)
+        n = meeting.vector[NORMAL]
+        turned = np.cross(meeting.vector[TURN], n)
+        for k, feature in enumerate((below, above)):
+            edge = matrix(turns[k])[:, 0]
+            if feature == "edge":
+                assert turned @ edge == pytest.approx(-n @ np.cross(paths[k][3:, 0], edge), abs=1e-13)
+        assert np.abs(turned).max() > 0.01

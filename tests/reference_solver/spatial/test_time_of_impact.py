@@ -12,13 +12,13 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Sphere
-from reference_solver.compilation import kernel
+from reference_solver.compilation import from_python, kernel
 from reference_solver.needs import EVERYTHING
 from reference_solver.spatial.flight import place_at
 from reference_solver.spatial.meeting import allocate_meeting, turn_bounds
 from reference_solver.spatial.motion import initialise
-from reference_solver.spatial.state import allocate_bodies
-from reference_solver.spatial.time_of_impact import begin_paths
+from reference_solver.spatial.state import MANIFOLD, allocate_bodies
+from reference_solver.spatial.time_of_impact import begin_paths, is_pressed
 from reference_solver.stepping.time_of_impact import first_contact
 
 G = 9.81
@@ -299,3 +299,13 @@ def test_edges_that_cross_and_part_are_not_met_though_both_turn(spin, gap):
     else:  # turning brings them together again
         assert depth(time) <= 1e-12 and time <= late
         assert min(depth(t) for t in np.linspace(0.0, time, 200)) >= -1e-12
+
+
+def test_a_point_is_held_at_impulse_level_unless_it_was_left_to_go_and_elsewhere_unless_it_parts():
+    pressed, manifolds = from_python(is_pressed), np.zeros(1, MANIFOLD).view(np.recarray)
+    for target, impulse, held in ((-1.0, 0.0, False), (-1.0, 0.2, True), (0.0, 0.0, True)):
+        manifolds.target[0, 3], manifolds.impulse[0, 3, 2] = target, impulse
+        for parts in (0, 1):
+            manifolds.open[0, 3] = parts
+            assert pressed(manifolds, 0, 3, True) == held
+            assert pressed(manifolds, 0, 3, False) == (parts == 0)
