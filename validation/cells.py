@@ -245,6 +245,7 @@ def observation_from_dict(data: Mapping[str, Any]) -> Observation:
     for name, most in (("cell", NAME), ("engine_version", NAME), ("reason", REASON), ("state_hash", NAME)):
         values[name] = one_line(data[name], most)
     values["log"] = lines(str(data["log"]), LOG_LINES)
+    values.pop("out_of_plane", None)  # of runs before there was a metric of it: one number of mixed units
     return Observation(**values)
 
 
