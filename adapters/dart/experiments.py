@@ -197,7 +197,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("nsgs", scene, 2, "out_of_plane", {}),
         )
     ),
-    *_swept("heavy-on-light-few-sweeps", 10000, ("pgs", "heavy_on_light", 2, "out_of_plane", {})),
+    *_swept("heavy-on-light-few-sweeps", 4000, ("pgs", "heavy_on_light", 2, "out_of_plane", {"duration": 2.0})),
     *_swept(
         "overhang-few-sweeps",
         1000,
@@ -218,5 +218,5 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ("pgs", "pinch", 2, "out_of_plane", {"margin": 100.0}),
     ),
     *_swept("pyramid-few-sweeps", 600, ("pgs", "pyramid", 2, "out_of_plane", {"rows": 5.0})),
-    *_swept("stack-few-sweeps", 10000, ("pgs", "stack", 2, "out_of_plane", {"n": 10.0})),
+    *_swept("stack-few-sweeps", 4000, ("pgs", "stack", 2, "out_of_plane", {"n": 10.0, "duration": 2.0})),
 )
