@@ -88,6 +88,14 @@ def planar(scene: Scene, dt: float, growth: float = 1.0) -> Check:
     return Check(OUT_OF_PLANE, "m", 0.0, step + ROUND_OFF * most * size, because, source)
 
 
+def saddle(exponent: float) -> float:
+    """By how much what is off a saddle grows that leaves it from rest, y'' = r^2 y, in ``exponent`` = r t.
+
+    Beyond 700, where a double ends, it is told as that: nothing is judged long before.
+    """
+    return math.cosh(min(exponent, 700.0))
+
+
 # ---- what stands ----
 
 

@@ -129,6 +129,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     }
 
 
+def growth(scene: Scene) -> float:
+    """By how much the hill multiplies what is off its line across it, at most.
+
+    The push of the hill, m g at most, is tilted by y/(R + r): y'' = g y/(R + r) at most, what rolls gains less. It is
+    little from a start of some speed, and grows as 1/v where the disc begins almost at rest.
+    """
+    p = scene.params
+    return bounds.saddle(scene.duration * math.sqrt(p["g"] / (p["hill"] + p["radius"])))
+
+
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Steps of first order: they take (a dt)^2/2 off the energy, a: what keeps the disc on the hill, v^2/(R + r).
 
@@ -198,6 +208,7 @@ SCENE = CanonicalScene(
     measure=measure,
     rule=checks,
     sampling=states,
+    growth=growth,
     quick=(Variation({}), Variation({"mu": 0.1})),
     full=tuple(Variation({"v": v, "mu": mu}) for v in (0.5, 1.0, 2.0) for mu in (0.0, 0.1, 0.5, 2.0)),
     planted=({},),

@@ -132,13 +132,13 @@ def coarsest(p: Params) -> float:
     return largest
 
 
-def strayed(p: Params, seen: list[Meeting]) -> float:
-    """How far off the line [m] what is rounded in the normals of all meetings may bring a rod.
+def strayed(p: Params, seen: list[Meeting], begun: float = 0.0, normal: float = NORMAL) -> float:
+    """How far off the line [m] what is rounded in the normals of all meetings may bring a rod, ``begun`` off it.
 
     A normal that is off by q pushes two rods across the line with u q each, a wall's one rod with 2 u q. Rods that are
     off it by y and y' touch with a normal that is off by up to (y + y')/d: round ends spread what comes in, every time.
     """
-    off, across = [0.0] * int(p["n"]), [0.0] * int(p["n"])
+    off, across = [begun] * int(p["n"]), [0.0] * int(p["n"])
     now = p["delay"]
     for meeting in [*seen, None]:
         then = meeting.time if meeting else p["delay"] + p["duration"]
@@ -147,10 +147,19 @@ def strayed(p: Params, seen: list[Meeting]) -> float:
         if meeting is None:
             break
         met = [k for k in (meeting.rank - 1, meeting.rank) if 0 <= k < len(off)]
-        turned = NORMAL + sum(off[k] for k in met) / (2.0 * RADIUS) if len(met) == 2 else 2.0 * NORMAL
+        turned = normal + sum(off[k] for k in met) / (2.0 * RADIUS) if len(met) == 2 else 2.0 * normal
         for k in met:
             across[k] += meeting.closing * turned
     return max(off)
+
+
+def growth(scene: Scene) -> float:
+    """By how much meetings multiply what rods are off their line by, at most: 1e5 in the 16 of the defaults.
+
+    What is out of the plane is off the line as what is off it in the plane is, and spreads as in `strayed`.
+    """
+    end = scene.params["delay"] + scene.duration
+    return strayed(scene.params, [each for each in meetings(scene.params) if each.time < end], 1.0, 0.0)
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -248,6 +257,7 @@ SCENE = CanonicalScene(
     measure=measure,
     rule=checks,
     sampling=states,
+    growth=growth,
     quick=(Variation({}),),
     full=tuple(
         Variation({"n": n, "room": room, "duration": duration})

@@ -11,6 +11,7 @@ stops sooner lets the row in. Nothing else is asked: no friction, no weight, one
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -81,6 +82,17 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return [bound.check(name, unit, truth[name], source) for name, (unit, bound) in allowed.items()]
 
 
+def growth(scene: Scene) -> float:
+    """By how much a pressed row multiplies what is off its line, at most: it buckles, a saddle, not a rest that lasts.
+
+    Two balls that are y and y' off the line press each other across it by F (y - y')/d, d being their diameter:
+    m y_k'' = F/d (2 y_k - y_{k-1} - y_{k+1}). The sizes of these factors add up to 4 at most, and those of all powers of
+    the differences to powers of 4, so that what began at rest grows as cosh(2 t sqrt(F/(m d))) at most.
+    """
+    p = scene.params
+    return bounds.saddle(2.0 * scene.duration * math.sqrt(p["press"] / (p["mass"] * 2.0 * RADIUS)))
+
+
 def sampling(scene: Scene) -> Sampling:
     """Every step; contacts over the last second."""
     return Sampling(1, max(0.0, scene.duration - WINDOW))
@@ -128,6 +140,7 @@ SCENE = CanonicalScene(
     measure=measure,
     rule=checks,
     sampling=sampling,
+    growth=growth,
     track=track,
     quick=(Variation({}, (None, *FEW)),),
     full=(Variation({}, (None, *MANY)), Variation({"n": 3.0}), Variation({"n": 30.0})),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver.compilation import from_python
+from reference_solver.stepping.islands import allocate_islands, may_meet
 
 DOWN = (0.0, -9.81)
 DT = 1.0 / 60.0
@@ -106,3 +108,57 @@ def test_moving_floors_are_where_their_velocity_takes_them_for_all_islands():
     simulation.advance(60)
     assert simulation.pose[0, 1] == pytest.approx(0.5, abs=1e-14)
     assert simulation.pose[1:, 1] == pytest.approx([0.8, 0.8, 0.8], abs=1e-12)
+
+
+def bounded(*bodies):
+    """Islands of bodies of a reach each, whose centres lie between two corners, of which some are half-spaces."""
+    found = allocate_islands(2, len(bodies), 1)
+    for i, (reach, low, high, plane) in enumerate(bodies):
+        found.reach[i], found.limit[i], found.plane[i] = reach, (*low, *high), plane
+    return found
+
+
+FREE = (0.0, 0.0, 0.0)
+
+
+def test_bodies_may_meet_that_are_no_farther_apart_than_both_reach_from_the_nearest_ends_of_their_bounds():
+    """Corners 3 and 4 m apart, 5 m from each other; to either side, whoever is named first."""
+    meet = from_python(may_meet)
+    for reach, found in ((2.999, False), (3.001, True)):
+        islands = bounded((2.0, (-7.0, -9.0), (0.0, 0.0), FREE), (reach, (3.0, 4.0), (8.0, 9.0), FREE))
+        assert meet(islands, 0, 1) is found and meet(islands, 1, 0) is found
+    islands = bounded((0.1, (-1.0, -1.0), (1.0, 1.0), FREE), (0.1, (0.5, 0.5), (9.0, 9.0), FREE))
+    assert meet(islands, 0, 1)
+
+
+def test_a_body_may_meet_a_half_space_that_it_can_reach_down_to():
+    """A floor through (1, 2) turned to the slope of 3 in 4, 0.5 m above its own centre's plane; least heights by it."""
+    meet, normal = from_python(may_meet), (-0.6, 0.8)
+    floor = (math.inf, (1.0, 2.0), (1.0, 2.0), (*normal, 0.5))
+    for height, found in ((1.001, False), (0.999, True)):
+        for corner, far in (((2.0, 0.0), (-3.0, 4.0)), ((0.0, 0.0), (0.0, 0.0))):
+            x, y = 1.0 + (0.5 + height) * normal[0], 2.0 + (0.5 + height) * normal[1]
+            # Bounds that begin at the lowest point of all: the largest x and the smallest y.
+            islands = bounded(floor, (1.0, (x - corner[0], y), (x, y + far[1]), FREE))
+            assert meet(islands, 0, 1) is found and meet(islands, 1, 0) is found
+
+
+@pytest.mark.parametrize(("pose", "offset"), [((0.0, 2.0, 0.0), 0.0), ((0.0, 0.0, 0.0), 2.0), ((0.0, 0.0, 0.5), 2.0)])
+def test_a_floor_is_where_its_pose_and_its_offset_take_it(pose, offset):
+    """A disc that touches within the step is an island by itself; one that does not flies with the others."""
+    normal = np.array([-math.sin(pose[2]), math.cos(pose[2])])
+    floor = Body(HalfSpace((0.0, 1.0), offset), motion="fixed", pose=pose)
+    for gap, apart in ((0.5 * DT, True), (4.0 * DT, False)):
+        foot = np.array(pose[:2]) + (offset + 0.3 + gap) * normal
+        bodies = [floor, disc(*(foot + 9.0 * normal)), disc(*foot, *(-normal)), disc(*(foot + 5.0 * normal))]
+        simulation = Simulation(Model(2, bodies, (0.0, 0.0), 0.0, 0.0), Settings.reference(DT))
+        simulation.advance(1)
+        assert islands_of(simulation) == ([1, 2, 1] if apart else [1, 1, 1])
+        assert (abs(simulation.twist[2, :2] @ normal) < 1e-12) == apart  # it has landed, or has not
+
+
+def test_what_a_body_reaches_has_room_for_the_distance_at_which_contacts_are_kept():
+    simulation = world([disc(0.0, 5.0), disc(3.0, 5.0)])
+    simulation.advance(1)
+    model = simulation._world._world
+    assert (model.islands.reach[1:] > 0.3).all() and (model.islands.reach[1:] < 0.31).all()
