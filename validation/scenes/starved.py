@@ -86,8 +86,8 @@ def growth(scene: Scene) -> float:
     """By how much a pressed row multiplies what is off its line, at most: it buckles, a saddle, not a rest that lasts.
 
     Two balls that are y and y' off the line press each other across it by F (y - y')/d, d being their diameter:
-    m y_k'' = F/d (2 y_k - y_{k-1} - y_{k+1}). The sizes of these factors add up to 4 at most, and those of all powers of
-    the differences to powers of 4, so that what began at rest grows as cosh(2 t sqrt(F/(m d))) at most.
+    m y_k'' = F/d (2 y_k - y_{k-1} - y_{k+1}). The sizes of these factors add up to 4 at most, and those of all
+    powers of the differences to powers of 4, so that what began at rest grows as cosh(2 t sqrt(F/(m d))) at most.
     """
     p = scene.params
     return bounds.saddle(2.0 * scene.duration * math.sqrt(p["press"] / (p["mass"] * 2.0 * RADIUS)))
