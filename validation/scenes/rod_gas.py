@@ -132,13 +132,14 @@ def coarsest(p: Params) -> float:
     return largest
 
 
-def strayed(p: Params, seen: list[Meeting], begun: float = 0.0, normal: float = NORMAL) -> float:
+def strayed(p: Params, seen: list[Meeting], begun: float = 0.0, rounded: bool = True) -> float:
     """How far off the line [m] what is rounded in the normals of all meetings may bring a rod, ``begun`` off it.
 
     A normal that is off by q pushes two rods across the line with u q each, a wall's one rod with 2 u q. Rods that are
     off it by y and y' touch with a normal that is off by up to (y + y')/d: round ends spread what comes in, every time.
     """
     off, across = [begun] * int(p["n"]), [0.0] * int(p["n"])
+    normal = NORMAL if rounded else 0.0
     now = p["delay"]
     for meeting in [*seen, None]:
         then = meeting.time if meeting else p["delay"] + p["duration"]
@@ -159,7 +160,7 @@ def growth(scene: Scene) -> float:
     What is out of the plane is off the line as what is off it in the plane is, and spreads as in `strayed`.
     """
     end = scene.params["delay"] + scene.duration
-    return strayed(scene.params, [each for each in meetings(scene.params) if each.time < end], 1.0, 0.0)
+    return strayed(scene.params, [each for each in meetings(scene.params) if each.time < end], 1.0, rounded=False)
 
 
 def make(dimension: int, params: Params) -> Scene:
