@@ -110,7 +110,11 @@ def test_what_lies_rolls_to_two_thirds_of_its_speed_on_mujoco(shape):
 @pytest.mark.parametrize("engine", ["mujoco", "bullet"])
 @pytest.mark.parametrize("kind", ["hull", "cylinder", "capsule"])
 def test_what_stands_and_lands_in_space(engine, kind):
-    """At rest for half a second, and Newton's e flat on the floor; Bullet's margin is 1 mm, and its ends turn."""
+    """At rest for half a second, and Newton's e flat on the floor; Bullet's margin is 1 mm, and its ends turn.
+
+    Bullet cuts vertices of hulls down to 1/10216 of their extents: a face lands tilted by up to a cell on each side,
+    and the corner that comes first takes (1 + e) v of that share from the rebound.
+    """
     upright = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
     shape, height, attitude = {
         "hull": (BRICK, 0.3, (1.0, 0.0, 0.0, 0.0)),
@@ -122,7 +126,8 @@ def test_what_stands_and_lands_in_space(engine, kind):
         assert rests.pose[-1, 1, :3] == pytest.approx([0.0, 0.0, height], abs=1.1e-3 if engine == "bullet" else 1e-4)
     down = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
     lands = made(engine, "tuned", spatial(shape, BRICK_MOMENTS, height + 0.1, attitude, down, 0.0, 0.5, 0.0, 0.2))
-    assert lands.twist[-1, 1, 2] == pytest.approx(0.5, abs=0.03 if (engine, kind) == ("bullet", "cylinder") else 2e-4)
+    within = {("bullet", "cylinder"): 0.03, ("bullet", "hull"): 1.5 * 2.0 / 10216}.get((engine, kind), 2e-4)
+    assert lands.twist[-1, 1, 2] == pytest.approx(0.5, abs=within)
 
 
 def test_a_tetrahedron_rests_on_its_face():

@@ -56,9 +56,18 @@ def test_the_growth_that_a_plane_is_owed_is_the_horizon_of_the_certificate():
 def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_thousandth_is_not_judged():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
     assert bounds.planar(scene, DT, 0.5).bound == bounds.planar(scene, DT).bound == pytest.approx(1e-9 * 5.5)
-    assert bounds.planar(scene, DT, 1e8).bound == pytest.approx(1e-4 * 5.5)
-    beyond = bounds.planar(scene, DT, 4e10)
-    assert (beyond.truth, beyond.bound) == (None, None) and "4e+10 times" in beyond.because
+    assert bounds.planar(scene, DT, 9e7).bound == pytest.approx(9e-5 * 5.5)  # a thousandth of the radius is 5e-4
+    for growth, said in ((1e8, "1e+08"), (4e10, "4e+10")):
+        beyond = bounds.planar(scene, DT, growth)
+        assert (beyond.truth, beyond.bound) == (None, None) and f"grown {said} times" in beyond.because
+
+
+def test_a_plane_far_out_is_owed_by_bodies_that_are_large_beside_its_round_off():
+    """At 1e8 m a tilt of 11 degrees would have passed: 1e-9 of the place is a tenth of the box."""
+    canonical = CATALOGUE["far_origin"]
+    for far, judged in ((1e8, False), (2.0**17, True)):
+        scene = canonical.scene(2, {"far": far})
+        assert (bounds.planar(scene, DT).bound is not None) is judged
 
 
 @pytest.mark.parametrize(("ratio", "gap"), [(1.0, 2.0), (3.0, 2.0), (16.0, 1.0)])
