@@ -13,12 +13,14 @@ image in the plane, so that no law of contact moves anything out of it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Shape, Sphere
+from adapters.shapes import reach
 
 
 def lift(scene: Scene) -> Scene:
@@ -128,21 +130,28 @@ def lower_twist(twist: Array) -> Array:
     return np.column_stack([twist[:, 0], twist[:, 2], -twist[:, 4]])
 
 
-def out_of_plane(pose: Array, reach: Array) -> float:
+def size_across(scene: Scene) -> float:
+    """Largest number whose round-off may move a planar scene across its plane: places of points, ways of flight [m]."""
+    place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
+    speed = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
+    return max(place, speed * scene.duration)
+
+
+def out_of_plane(pose: Array, reaches: Array) -> float:
     """Farthest that any point of a lifted scene has left its plane [m].
 
-    A tilt by an angle a moves what lies ``reach`` from the centre by the chord 2 sin(a/2) reach at most, and sin(a/2)
-    is the length of the quaternion's part across the plane.
+    A tilt by an angle a moves what lies r from the centre by the chord 2 r sin(a/2) at most, and sin(a/2) is the length
+    of the quaternion's part across the plane.
 
     Parameters
     ----------
     pose
         Spatial poses (samples, n, 7). Of those that are no numbers nothing is told, so that a run which ends in NaN
         tells what it had left the plane by before.
-    reach
+    reaches
         Distance of each body's outermost point from its centre (n,) [m].
     """
-    away = np.abs(pose[..., 1]) + 2.0 * np.hypot(pose[..., 4], pose[..., 6]) * reach
+    away = np.abs(pose[..., 1]) + 2.0 * np.hypot(pose[..., 4], pose[..., 6]) * reaches
     return float(np.fmax.reduce(away, axis=None, initial=0.0))
 
 

@@ -123,10 +123,8 @@ def loaded(entry: EntryPoint, distribution: str = "") -> Found:
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
         return Found(name, engine, one_line(engine.version(), NAME), "", facts)
     except ImportError as error:
-        reason, trace = (
-            f"{one_line(error)}; {_remedy(entry, facts, distribution)}",
-            "" if is_ours(entry) else trace_of(error),
-        )
+        reason = f"{one_line(error)}; {_remedy(entry, facts, distribution)}"
+        trace = "" if is_ours(entry) else trace_of(error)
         return Found(name, None, "", reason, facts, trace=trace)
     except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
         return Found(name, None, "", said_by(error), facts, trace=trace_of(error))

@@ -117,6 +117,11 @@ class Body:
     surface_velocity: tuple[float, ...] = ()
     course: Harmonic | None = None
 
+    @property
+    def is_loaded(self) -> bool:
+        """Whether it moves freely under a load of its own."""
+        return self.motion == "free" and (any(self.force) or any(self.torque))
+
 
 @dataclass(frozen=True)
 class Scene:

@@ -23,9 +23,8 @@ import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift, lower_contacts, lower_twist
+from adapters.lift import lift, lower_contacts, lower_twist, size_across
 from adapters.scene import Box, HalfSpace, Pair, Scene, Shape, Sphere
-from adapters.shapes import reach
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
@@ -133,9 +132,7 @@ def plane_law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
     """
     if scene.dimension != 2:
         return None
-    place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
-    speed = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
-    return 0.0, UPDATES * UNIT * max(place, speed * scene.duration)
+    return 0.0, UPDATES * UNIT * size_across(scene)
 
 
 def _band(scene: Scene, motion: Trajectory, share: float, metric: str, value: float, measure: Measure) -> float:

@@ -92,14 +92,13 @@ class _Cells(pytest.Collector):
 
     def collect(self) -> Iterator[pytest.Item]:
         """Checks that have a tolerance, cell by cell."""
-        engine = registry.find(self.plugin.engine).engine
-        dimensions = engine.facts.dimensions if engine else frozenset((2, 3))
+        facts = registry.facts(self.plugin.engine)
+        lifted = facts is not None and 2 not in facts.dimensions
         for slot in self.plugin.slots:
             canonical = resolve(slot.scene)
             scene = canonical.scene(slot.dimension, dict(slot.params))
             asked = slot.params_text() + (f" iterations={slot.iterations}" if slot.iterations else "")
             cell = f"{slot.engine}/{slot.profile}/{slot.scene} {slot.dimension}-D {asked}".rstrip()
-            lifted = 2 not in dimensions
             for check in [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]:
                 if check.bound is not None:
                     yield _Check.from_parent(self, name=f"{cell}::{check.metric}", plugin=self.plugin, slot=slot,

@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from adapters.lift import size_across
 from adapters.scene import Scene
 from adapters.shapes import reach
 from validation.canonical import Check
@@ -74,15 +75,13 @@ def planar(scene: Scene, dt: float, growth: float = 1.0) -> Check:
     round-off of the numbers that are added, places and ways of free flight, which a motion may multiply: up to `GROWTH`
     times, or by ``growth`` where the scene knows that its own motion multiplies it by more. And of two contacts which
     mirror each other round-off lets one be found a step before the other: one step of a force across the plane, as in
-    `straight`. Where round-off may grow to a thousandth of the smallest free body nothing is judged.
+    `straight`. Where round-off may grow to a hundredth of the smallest free body (a tilt of half a degree) nothing is
+    judged.
     """
-    place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
-    way = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
-    size = max(place, way * scene.duration)
-    most = max(growth, GROWTH)
+    size, most = size_across(scene), max(growth, GROWTH)
     smallest = min((reach(body.shape) for body in scene.bodies if body.motion == "free"), default=size)
-    if not ROUND_OFF * most * size <= 1e-3 * smallest:
-        why = f"not judged: round-off of {size:.2g} m, grown {most:.2g} times, is more than a thousandth of a body"
+    if not ROUND_OFF * most * size <= 0.01 * smallest:
+        why = f"not judged: round-off of {size:.2g} m, grown {most:.2g} times, is more than a hundredth of a body"
         return Check(OUT_OF_PLANE, "m", None, None, why, "")
     step = math.hypot(*scene.gravity) * (dt * dt)
     because = f"mirror symmetry: one step of a force across the plane, g dt^2, and round-off grown {most:.2g} times"

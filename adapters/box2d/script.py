@@ -38,7 +38,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     lines.append(f"HALF_SPACES = {still}  # their pose is the origin, wherever their polygons stand")
     loads = []
     for body in scene.bodies:
-        if body.motion == "free" and (any(body.force) or any(body.torque)):
+        if body.is_loaded:
             held = f"bodies[{body.name!r}]"
             loads.append(f"{held}.ApplyForceToCenter({literal(_scaled(body.force, units))}, True)")
             loads.append(f"{held}.ApplyTorque({literal(body.torque[0] * units**2)}, True)")

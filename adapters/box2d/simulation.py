@@ -41,7 +41,7 @@ class Box2DSimulation(Simulation):
         self.loads = [
             (self.bodies[i], self._vector(body.force), body.torque[0] * self.units**2)
             for i, body in enumerate(scene.bodies)
-            if body.motion == "free" and (any(body.force) or any(body.torque))
+            if body.is_loaded
         ]
 
     def _vector(self, v: tuple[float, ...]) -> tuple[float, float]:

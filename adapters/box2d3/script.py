@@ -34,7 +34,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     lines += ["", f"HALF_SPACES = {still}  # their pose is the origin, wherever their polygons stand"]
     loads = []
     for body in scene.bodies:
-        if body.motion == "free" and (any(body.force) or any(body.torque)):
+        if body.is_loaded:
             held = f"bodies[{body.name!r}]"
             loads.append(f"{held}.apply_force_to_center({literal(_scaled(body.force, units))})")
             loads.append(f"{held}.apply_torque({literal(body.torque[0] * units**2)})")

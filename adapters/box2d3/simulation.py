@@ -44,7 +44,7 @@ class Box2D3Simulation(Simulation):
         self.loads = [
             (self.bodies[i], self._vector(body.force), body.torque[0] * units**2)
             for i, body in enumerate(scene.bodies)
-            if body.motion == "free" and (any(body.force) or any(body.torque))
+            if body.is_loaded
         ]
         self.pen = Pen()
         self.before = self._places()

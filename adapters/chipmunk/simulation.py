@@ -49,9 +49,7 @@ class ChipmunkSimulation(Simulation):
             self.space.add(body, shape)
         self.index = {id(shape): i for i, shape in enumerate(self.shapes)}
         self.loaded = [
-            (self.bodies[i], body.force, body.torque[0])
-            for i, body in enumerate(scene.bodies)
-            if body.motion == "free" and (any(body.force) or any(body.torque))
+            (self.bodies[i], body.force, body.torque[0]) for i, body in enumerate(scene.bodies) if body.is_loaded
         ]
 
     def _set_materials(self) -> None:

@@ -30,7 +30,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
         lines += ["", *_made(index, body, scene, numbers)]
     loads = []
     for body in scene.bodies:
-        if body.motion == "free" and (any(body.force) or any(body.torque)):
+        if body.is_loaded:
             node = f"bodies[{body.name!r}]"
             loads.append(f"{node}.setExtForce({literal(body.force)}, (0.0, 0.0, 0.0), False, True)")
             loads.append(f"{node}.setExtTorque({literal(body.torque)}, False)")

@@ -44,7 +44,7 @@ class DartSimulation(Simulation):
         self.loaded = [
             (node, list(body.force), list(body.torque))
             for node, body in zip(self.nodes, scene.bodies, strict=True)
-            if body.motion == "free" and (any(body.force) or any(body.torque))
+            if body.is_loaded
         ]
         self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
 

@@ -104,7 +104,7 @@ def _loads(free: list[Body]) -> list[str]:
     """Lines that give bodies their forces and torques, for good."""
     lines = []
     for body in free:
-        if any(body.force) or any(body.torque):
+        if body.is_loaded:
             lines += [
                 "load = drake.ExternallyAppliedSpatialForce()",
                 f"load.body_index = bodies[{body.name!r}].index()",

@@ -43,7 +43,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     step = []
     for body in scene.bodies:
         part = f"bodies[{body.name!r}][1]"
-        if body.motion == "free" and (any(body.force) or any(body.torque)):
+        if body.is_loaded:
             step.append(f"{part}.add_force_torque({literal(body.force)}, {literal(body.torque)})")
     driven = [body for body in scene.bodies if body.motion == "prescribed"]
     if driven:

@@ -62,11 +62,7 @@ class PhysxSimulation(Simulation):
             self.bodies.append(self._made(sapien, index, body))
         self.index = {f"body {index}": index for index in range(len(scene.bodies))}
         loaded = zip(self.bodies, scene.bodies, strict=True)
-        self.loads = [
-            (part, body.force, body.torque)
-            for (_, part), body in loaded
-            if body.motion == "free" and (any(body.force) or any(body.torque))
-        ]
+        self.loads = [(part, body.force, body.torque) for (_, part), body in loaded if body.is_loaded]
         self.driven = [k for k, body in enumerate(scene.bodies) if body.motion == "prescribed"]
         self.steps = 0
 

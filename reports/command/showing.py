@@ -300,11 +300,12 @@ def _why(change: Change) -> str:
 
 def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
     """How far the cell of a row has left its plane, if it has: what the row says is what is seen in the plane."""
-    same = (other for other in rows if other["cells"] == row["cells"] and other["metric"] == OUT_OF_PLANE)
-    left = next((other for other in same if other["physics"] == "fail"), None)
-    if left is None or left["metric"] == row["metric"]:
+    if row["metric"] == OUT_OF_PLANE:
         return ""
-    return f"the scene leaves its plane by {measured(left, 3)}: this row is what is seen of it in the plane"
+    for other in rows:
+        if other["cells"] == row["cells"] and other["metric"] == OUT_OF_PLANE and other["physics"] == "fail":
+            return f"the scene leaves its plane by {measured(other, 3)}: this row is what is seen of it in the plane"
+    return ""
 
 
 def _print_explanation(

@@ -140,7 +140,7 @@ def test_a_mass_that_singles_cannot_hold_is_named():
 
 
 def test_a_plane_is_kept_to_a_thousand_roundings_of_the_largest_numbers():
-    """Of the size that the check itself counts: of every planar scene the same multiple of the bound's round-off."""
+    """Of every planar scene the same multiple of the round-off that its check grants doubles."""
     for name, canonical in CATALOGUE.items():
         if 2 not in canonical.dimensions:
             continue

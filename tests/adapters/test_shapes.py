@@ -54,11 +54,11 @@ def spatial(shape, moments, height, attitude=(1.0, 0.0, 0.0, 0.0), twist=(0.0,) 
     return Scene("shape", 1, 3, bodies, (Pair(friction=mu, restitution=e),), (0.0, 0.0, -gravity), t)
 
 
-def made(engine, profile, asked):
+def made(engine, profile, asked, **switched):
     pytest.importorskip({"chipmunk": "pymunk", "bullet": "pybullet"}.get(engine, "numpy"))
     found = load(engine)
     settings = {setting.name: setting.value for setting in found.settings(profile, needs(asked), DT)}
-    return run(found, asked, DT, settings, Sampling(1, None))
+    return run(found, asked, DT, settings | switched, Sampling(1, None))
 
 
 @pytest.mark.parametrize(("engine", "profile"), PLANAR)
@@ -112,8 +112,7 @@ def test_what_lies_rolls_to_two_thirds_of_its_speed_on_mujoco(shape):
 def test_what_stands_and_lands_in_space(engine, kind):
     """At rest for half a second, and Newton's e flat on the floor; Bullet's margin is 1 mm, and its ends turn.
 
-    Bullet cuts vertices of hulls down to 1/10216 of their extents: a face lands tilted by up to a cell on each side,
-    and the corner that comes first takes (1 + e) v of that share from the rebound.
+    Its tuned slop of 1e-5 m takes off a rebound, over dt, what an impact is found less deep than that: none here.
     """
     upright = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
     shape, height, attitude = {
@@ -125,9 +124,9 @@ def test_what_stands_and_lands_in_space(engine, kind):
         rests = made(engine, "tuned", spatial(shape, BRICK_MOMENTS, height, attitude))
         assert rests.pose[-1, 1, :3] == pytest.approx([0.0, 0.0, height], abs=1.1e-3 if engine == "bullet" else 1e-4)
     down = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
-    lands = made(engine, "tuned", spatial(shape, BRICK_MOMENTS, height + 0.1, attitude, down, 0.0, 0.5, 0.0, 0.2))
-    within = {("bullet", "cylinder"): 0.03, ("bullet", "hull"): 1.5 * 2.0 / 10216}.get((engine, kind), 2e-4)
-    assert lands.twist[-1, 1, 2] == pytest.approx(0.5, abs=within)
+    falling = spatial(shape, BRICK_MOMENTS, height + 0.1, attitude, down, 0.0, 0.5, 0.0, 0.2)
+    lands = made(engine, "tuned", falling, **({"contactSlop": 0.0} if engine == "bullet" else {}))
+    assert lands.twist[-1, 1, 2] == pytest.approx(0.5, abs=0.03 if (engine, kind) == ("bullet", "cylinder") else 2e-4)
 
 
 def test_a_tetrahedron_rests_on_its_face():

@@ -53,11 +53,11 @@ def test_the_growth_that_a_plane_is_owed_is_the_horizon_of_the_certificate():
     assert bounds.GROWTH == truth.GROWTH
 
 
-def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_thousandth_is_not_judged():
+def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_hundredth_is_not_judged():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
     assert bounds.planar(scene, DT, 0.5).bound == bounds.planar(scene, DT).bound == pytest.approx(1e-9 * 5.5)
-    assert bounds.planar(scene, DT, 9e7).bound == pytest.approx(9e-5 * 5.5)  # a thousandth of the radius is 5e-4
-    for growth, said in ((1e8, "1e+08"), (4e10, "4e+10")):
+    assert bounds.planar(scene, DT, 9e8).bound == pytest.approx(9e-4 * 5.5)  # a hundredth of the radius is 5e-3
+    for growth, said in ((1e9, "1e+09"), (4e10, "4e+10")):
         beyond = bounds.planar(scene, DT, growth)
         assert (beyond.truth, beyond.bound) == (None, None) and f"grown {said} times" in beyond.because
 
@@ -65,7 +65,7 @@ def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_th
 def test_a_plane_far_out_is_owed_by_bodies_that_are_large_beside_its_round_off():
     """At 1e8 m a tilt of 11 degrees would have passed: 1e-9 of the place is a tenth of the box."""
     canonical = CATALOGUE["far_origin"]
-    for far, judged in ((1e8, False), (2.0**17, True)):
+    for far, judged in ((1e8, False), (2.0**20, True)):
         scene = canonical.scene(2, {"far": far})
         assert (bounds.planar(scene, DT).bound is not None) is judged
 
@@ -96,8 +96,9 @@ def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio,
 def test_unstable_scenes_say_by_how_much_they_multiply_what_leaves_their_plane(scene, params, least):
     """By MuJoCo, in space: bodies begin 1e-12 m off the plane, to either side in turn.
 
-    It is no more than the scene says, but for the steps at which blows are found (a tenth), and no less than a share of
-    it that other signs and modes explain. A plane that did not know of ``least`` would be owed too little.
+    It is no more than the scene says, but for blows found late: 6, 2.5, .7 and .3 % more at 1/240, 1/480, 1/960 and
+    1/3840 s (``rod_gas`` for 7.5 s), first order in the step. And no less than a share of it that other signs and modes
+    explain. A plane that did not know of ``least`` would be owed too little.
     """
     pytest.importorskip("mujoco")
     canonical = CATALOGUE[scene]
@@ -108,10 +109,11 @@ def test_unstable_scenes_say_by_how_much_they_multiply_what_leaves_their_plane(s
         replace(body, pose=(body.pose[0], off * (-1) ** next(free), *body.pose[2:])) if body.motion == "free" else body
         for body in lifted.bodies
     ]
-    settings = {each.name: each.value for each in engine.settings("tuned", needs(planar), DT)}
-    found = run(engine, replace(lifted, bodies=tuple(bodies)), DT, settings)
+    dt = 1 / 3840 if scene == "rod_gas" else DT
+    settings = {each.name: each.value for each in engine.settings("tuned", needs(planar), dt)}
+    found = run(engine, replace(lifted, bodies=tuple(bodies)), dt, settings)
     grown, said = np.abs(found.pose[..., 1]).max() / off, canonical.growth(planar)
-    assert least < grown <= 1.1 * said < 1e4 * grown
+    assert least < grown <= 1.005 * said < 1e4 * grown
 
 
 def test_a_saddle_that_lasts_is_a_number_and_not_judged():

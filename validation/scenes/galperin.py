@@ -98,7 +98,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def growth(scene: Scene) -> float:
-    """By how much blows multiply what the small ball is off its line by, across it: 1e12 in 16 blows of the balls.
+    """By how much blows multiply what the balls are off their line by: 4e10 in 31 impacts at ratio 100, gap 2 m.
 
     Two balls that meet at the speed u, off the line by y, have a normal that is tilted by y/R, R being the sum of their
     radii: an elastic blow adds 2 u y/R to their speed across it. The smooth wall changes none.
