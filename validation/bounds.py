@@ -75,18 +75,25 @@ def planar(scene: Scene, dt: float, growth: float = 1.0) -> Check:
     round-off of the numbers that are added, places and ways of free flight, which a motion may multiply: up to `GROWTH`
     times, or by ``growth`` where the scene knows that its own motion multiplies it by more. And of two contacts which
     mirror each other round-off lets one be found a step before the other: one step of a force across the plane, as in
-    `straight`. Where round-off may grow to a hundredth of the smallest free body (a tilt of half a degree) nothing is
-    judged.
+    `straight`; where there is no gravity the largest load over the mass stands for it. Where round-off may grow to a
+    hundredth of the smallest free body (a tilt of half a degree) nothing is judged.
     """
     size, most = size_across(scene), max(growth, GROWTH)
     smallest = min((reach(body.shape) for body in scene.bodies if body.motion == "free"), default=size)
     if not ROUND_OFF * most * size <= 0.01 * smallest:
-        why = f"not judged: round-off of {size:.2g} m, grown {most:.2g} times, is more than a hundredth of a body"
+        why = f"not judged: round-off of {size:.2g} m, grown {_count(most)} times, is more than a hundredth of a body"
         return Check(OUT_OF_PLANE, "m", None, None, why, "")
-    step = math.hypot(*scene.gravity) * (dt * dt)
-    because = f"mirror symmetry: one step of a force across the plane, g dt^2, and round-off grown {most:.2g} times"
+    gravity = math.hypot(*scene.gravity)
+    loads = (math.hypot(*body.force) / body.mass for body in scene.bodies if body.motion == "free")
+    pull = gravity or max(loads, default=0.0)
+    step, what = pull * (dt * dt), "g dt^2" if gravity or not pull else "F dt^2/m"
+    because = f"mirror symmetry: one step of a force across the plane, {what}, and round-off grown {_count(most)} times"
     source = "what is lifted is its own mirror image in its plane"
     return Check(OUT_OF_PLANE, "m", 0.0, step + ROUND_OFF * most * size, because, source)
+
+
+def _count(times: float) -> str:
+    return f"{times:.0f}" if times < 1e5 else f"{times:.2g}"
 
 
 def saddle(exponent: float) -> float:

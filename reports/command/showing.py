@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +36,9 @@ from reports.wording import (
     row_id,
 )
 from validation.bench import reading
-from validation.cells import Observation
+from validation.cells import Observation, Slot, checks_of
 from validation.judging.rows import rows_of
+from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
 from validation.questions.nulls import skill_of
 from validation.records.store import Store
@@ -59,11 +60,31 @@ def load(out: Path, run: str) -> tuple[list[Plain], list[Observation], Costs]:
     try:
         chosen = store.run(run)
         observations = store.observations(chosen)
-        rows: list[Plain] = [row.as_dict() for row in rows_of(chosen.id, observations)]
         timed = reading.bench_runs(store)
-        return rows, observations, speed.cheapest_passing(store, timed[-1]) if timed else {}
+        return judged(chosen.id, observations), observations, speed.cheapest_passing(store, timed[-1]) if timed else {}
     finally:
         store.close()
+
+
+def observed(out: Path, run: str) -> tuple[str, list[Observation]]:
+    """Id and observations of a run, not judged yet: laws take their time, and what nobody asked for needs none.
+
+    Raises
+    ------
+    StoreError
+        As `load` does.
+    """
+    store = Store(out, create=False)
+    try:
+        chosen = store.run(run)
+        return chosen.id, store.observations(chosen)
+    finally:
+        store.close()
+
+
+def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
+    """Rows of these observations of a run, as plain data."""
+    return [row.as_dict() for row in rows_of(run, observations)]
 
 
 @main.command()
@@ -140,12 +161,13 @@ def findings(
     if prove:
         prove_and_show(prove, wanted["engine"], as_json)
         return
-    rows, _, _ = load(out, run)
+    identity, observations = observed(out, run)
     for name, asked in wanted.items():
-        there = list(dict.fromkeys(row[name] for row in rows))
+        there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:
             raise SceneError(f"--{name}: this run has no rows of {absent[0]!r}, but of {', '.join(there)}")
-    rows = [row for row in rows if all(row[name] in chosen for name, chosen in wanted.items() if chosen)]
+    # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
+    rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
         rows = [row for row in rows if mark_of(row) in ALARMING]
     if every:
@@ -220,7 +242,9 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
     row there.
     """
-    rows, observations, _ = load(out, run)
+    identity, observations = observed(out, run)
+    observations = _where(observations, row)
+    rows = judged(identity, observations)
     found = find_row(rows, row)
     better, paste, differing = _cure(rows, observations, found)
     if as_json:
@@ -247,6 +271,40 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
     _print_explanation(found, _beside_the_plane(rows, found), better, paste, differing, terminal())
 
 
+def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
+    """What has to be judged to find the row that ``name`` means: all profiles of its engine in its scene.
+
+    Raises
+    ------
+    SceneError
+        If ids of no row or of several begin so.
+    """
+    if "/" in name:
+        keys = [key for key in zip(("engine", "scene"), name.split("/", 3)[:3:2], strict=False) if key[1]]
+    else:
+        slots = [slot for found, slot in ids_of(observations) if found.startswith(name)]
+        if len(slots) != 1:
+            many = f"{len(slots)} rows begin" if slots else "no row of this run begins"
+            raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
+        keys = [("engine", slots[0].engine), ("scene", slots[0].scene)]
+    return [one for one in observations if all(getattr(one.slot, key) == value for key, value in keys)]
+
+
+def ids_of(observations: Sequence[Observation]) -> Iterator[tuple[str, Slot]]:
+    """Id and slot of every row that the observations will have once they are judged."""
+    owed: dict[Any, list[str]] = {}
+    for observation in observations:
+        slot = observation.slot
+        asked = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
+        if asked not in owed:
+            owed[asked] = [check.metric for check in checks_of(observation)[1]]
+        plain = slot.as_dict()
+        for metric in () if slot.ulp else owed[asked]:
+            yield row_id({"slot": plain, "metric": metric}), slot
+    for study in results(observations):
+        yield row_id({"slot": study.slot.as_dict(), "metric": study.check.metric}), study.slot
+
+
 def find_row(rows: Sequence[Plain], name: str) -> Plain:
     """Return the row that ``name`` means.
 
@@ -264,11 +322,7 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         if not fits:
             raise SceneError(f"row: this run has no row {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)
-    fits = [row for row in rows if row_id(row).startswith(name)]
-    if len(fits) != 1:
-        many = f"{len(fits)} rows begin" if fits else "no row of this run begins"
-        raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
-    return fits[0]
+    return next(row for row in rows if row_id(row).startswith(name))
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, list[Change]]:

@@ -4,6 +4,7 @@ import io
 import json
 import re
 from itertools import product
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -11,9 +12,10 @@ from rich.console import Console
 
 from reports.answers import answers, choices
 from reports.command import main, showing
+from reports.findings import grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
-from reports.wording import measured, quantity
+from reports.wording import measured, quantity, row_id
 from validation.cells import Slot
 from validation.records.store import Store
 from validation.running.execution import execute
@@ -310,18 +312,40 @@ def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeyp
     out, _ = two_engines
     row = ("explain", "mujoco/default/bounce/apex", "--out", out)
     assert "off plane" not in call(*row).stdout
-    load = showing.load
+    judged = showing.judged
 
     def tipped(*asked):
-        rows, *rest = load(*asked)
+        rows = judged(*asked)
         beside = [{**each, "physics": "fail", "value": 0.25} for each in rows if each["metric"] == "out_of_plane"]
         assert beside
-        return [each for each in rows if each["metric"] != "out_of_plane"] + beside, *rest
+        return [each for each in rows if each["metric"] != "out_of_plane"] + beside
 
-    monkeypatch.setattr(showing, "load", tipped)
+    monkeypatch.setattr(showing, "judged", tipped)
     said = "off plane the scene leaves its plane by 0.25 m: this row is what is seen of it in the plane"
     assert said in " ".join(call(*row).stdout.split())
     assert "off plane" not in call("explain", "mujoco/default/bounce/out_of_plane", "--out", out).stdout
+
+
+def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(two_engines, monkeypatch):
+    """`explain` and `findings --scene` judge what they show and no more, studies and ids included."""
+    out, _ = two_engines
+    rows, observations, _ = showing.load(Path(out), "latest")
+    by_id = {row_id(row): row for row in rows}
+    assert {name for name, _ in showing.ids_of(observations)} == set(by_id) and len(by_id) == len(rows)
+    for engine, scene in dict.fromkeys((row["engine"], row["scene"]) for row in rows):
+        alone = json.loads(
+            call("findings", "--all", "--json", "--engine", engine, "--scene", scene, "--out", out).stdout
+        )
+        there = [row for row in rows if (row["engine"], row["scene"]) == (engine, scene)]
+        shown = [row for _, group in grouped(there) for row in group]
+        assert alone == json.loads(json.dumps([{**row, "id": row_id(row)} for row in shown]))
+    judged, counted = showing.judged, []
+    monkeypatch.setattr(showing, "judged", lambda *asked: counted.append(len(asked[1])) or judged(*asked))
+    for name, row in list(by_id.items())[:: max(1, len(by_id) // 9)]:
+        told = json.loads(call("explain", name, "--json", "--out", out).stdout)
+        own = json.loads(json.dumps({key: each for key, each in row.items() if key != "skill"}))  # is added there
+        assert {key: told[key] for key in own} == own
+    assert 0 < max(counted) < len(observations)
 
 
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])

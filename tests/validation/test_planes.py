@@ -122,7 +122,8 @@ def test_a_saddle_that_lasts_is_a_number_and_not_judged():
     for params in ({"duration": 1000.0, "press": 1e6}, {"duration": 5.0}):
         scene = canonical.scene(2, params)
         assert bounds.planar(scene, DT, canonical.growth(scene)).bound is None
-    assert checks_at_defaults("starved").bound == pytest.approx(1e-12 * math.cosh(2.0 * 2.0 * math.sqrt(10.0)) * 10.0)
+    grown = 1e-12 * math.cosh(2.0 * 2.0 * math.sqrt(10.0)) * 10.0
+    assert checks_at_defaults("starved").bound == pytest.approx(grown + 10.0 * DT**2)  # pressed with 10 N a kilogram
 
 
 def checks_at_defaults(name):
@@ -248,3 +249,14 @@ def test_only_what_is_lifted_is_asked(observed):
 def test_a_cell_without_an_answer_owes_no_plane(observed):
     crashed = replace(observed(0.0), outcome=Outcome.CRASHED, metrics={})
     assert "out_of_plane" not in {row.metric for row in rows_of("run", [crashed])}
+
+
+def test_without_gravity_the_largest_load_over_its_mass_stands_for_it():
+    """A box of 2 kg between pads: the pad of .5 kg that is pressed with 3, 4 N may be off by one step of 10 m/s^2."""
+    pad = replace(Body("pad", Disc(0.5), 0.5, 0.1), force=(3.0, 4.0))
+    box = replace(Body("box", Disc(0.5), 2.0, 0.1, (2.0, 0.0, 0.0)), force=(4.0, 0.0))
+    scene = replace(flying(pad, (0.0, 0.0)), bodies=(box, pad))
+    found = bounds.planar(scene, DT)
+    assert found.bound == pytest.approx(10.0 * DT**2, rel=1e-4) and "F dt^2/m" in found.because
+    heavy = bounds.planar(replace(scene, gravity=(0.0, -1.0)), DT)
+    assert heavy.bound == pytest.approx(DT**2, rel=1e-3) and "g dt^2" in heavy.because

@@ -2,18 +2,21 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.engine import Contacts
+from adapters.lift import size_across
 from adapters.scene import SceneError
 from adapters.trajectory import ContactRecord, Trajectory
 from reports.findings import refusals
-from validation.cells import Observation, Outcome, Slot
-from validation.files.scene_files import canonical_from_file, json_schema, load_scene
+from validation.cells import Observation, Outcome, Slot, plane_of
+from validation.files.scene_files import canonical_from_file, json_schema, load_scene, load_stated
 from validation.files.scene_text import read_text
+from validation.files.stated import stated_from_dict
 from validation.judging.rows import rows_of
 
 GOOD = """
@@ -259,3 +262,61 @@ def test_what_cannot_be_read_is_told_once(tmp_path, name):
     with pytest.raises(SceneError) as refused:
         read_text(tmp_path / name)
     assert str(refused.value).count("cannot read") == 1
+
+
+PILE = """
+name = "pile"
+dimension = 2
+gravity = [0.0, -10.0]
+duration = 2.0
+{stated}
+
+[constants]
+radius = 0.5
+
+[[bodies]]
+name = "ball"
+shape = {{ type = "disc", radius = 0.5 }}
+pose = [0.0, 1.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("stated", "growth"),
+    [("", 1.0), ("growth = 5e4", 5e4), ('growth = "exp(t * sqrt(g / (2 * radius)))"', math.exp(2 * math.sqrt(10.0)))],
+)
+def test_a_file_may_state_by_how_much_its_motion_multiplies_what_is_off_its_plane(tmp_path, stated, growth):
+    path = tmp_path / "pile.toml"
+    path.write_text(PILE.format(stated=stated))
+    canonical = canonical_from_file(path)
+    scene = canonical.scene(2, {})
+    assert canonical.growth(scene) == pytest.approx(growth, rel=1e-12)
+    [plane] = plane_of(canonical, scene, 1 / 240)
+    owed = 10.0 / 240**2 + 1e-12 * max(growth, 1e3) * size_across(scene)  # a thousand times at least
+    assert plane.bound == pytest.approx(owed, rel=1e-12)
+    assert stated_from_dict(load_stated(path).as_dict()).growth == pytest.approx(growth, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ("growth = 0.5", "growth: 0.5 is less than 1"),
+        ('growth = "2 * height"', "growth: '2 * height': 'height' is not one of"),
+        ("growth = nan", "growth"),
+    ],
+)
+def test_a_growth_that_means_nothing_is_refused_with_its_name(tmp_path, stated, said):
+    path = tmp_path / "pile.toml"
+    path.write_text(PILE.format(stated=stated))
+    with pytest.raises(SceneError, match=re.escape(said)):
+        load_stated(path)
+
+
+def test_a_spatial_scene_has_no_plane_to_leave(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text(
+        'name = "ball"\ndimension = 3\ngravity = [0.0, 0.0, -10.0]\nduration = 1.0\ngrowth = 10.0\n'
+        '[[bodies]]\nname = "ball"\nshape = { type = "sphere", radius = 0.5 }\n'
+    )
+    with pytest.raises(SceneError, match="growth: a spatial scene has no plane"):
+        load_stated(path)

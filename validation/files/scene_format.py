@@ -168,7 +168,13 @@ class CheckModel(_Strict):
 
 
 class SceneModel(_Strict):
-    """A scene file. ``format`` is the version of this description; ``constants`` are names for formulas of checks."""
+    """A scene file.
+
+    ``format`` is the version of this description; ``constants`` are names for formulas of checks. ``growth``, of planar
+    scenes, is by how much the scene's own motion multiplies until its end what is off its plane, a number of at least 1
+    or a formula: engines that live in space owe the plane, and what round-off leaves of it grows by that. At most a
+    thousand times is granted without it.
+    """
 
     format: Literal[1] = 1
     name: str = Field(min_length=1)
@@ -177,6 +183,7 @@ class SceneModel(_Strict):
     gravity: tuple[float, ...]
     duration: float
     impact_law: Literal["N-SIM", "N-SEQ"] = "N-SIM"
+    growth: float | str = 1.0
     bodies: tuple[BodyModel, ...]
     pairs: tuple[PairModel, ...] = ()
     constants: dict[str, float | str] = {}
@@ -193,7 +200,7 @@ def stated(model: SceneModel) -> Stated:
     """
     notes: list[str] = []
     wrong: list[str] = []
-    data = model.model_dump(exclude={"checks", "constants", "format"})
+    data = model.model_dump(exclude={"checks", "constants", "format", "growth"})
     data["bodies"] = list(data["bodies"])
     for k, body in enumerate(data["bodies"]):
         try:
@@ -218,9 +225,24 @@ def stated(model: SceneModel) -> Stated:
             wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
     names = dict(told(model, scene, wrong))
     made = [_stated(label, check, scene, names, wrong) for label, check in right]
+    growth = _growth(model, scene, names, wrong)
     if wrong:
         raise SceneErrors(list(dict.fromkeys(wrong)))
-    return Stated(scene, tuple(notes), tuple(check for check in made if check is not None))
+    return Stated(scene, tuple(notes), tuple(check for check in made if check is not None), growth)
+
+
+def _growth(model: SceneModel, scene: Scene, names: dict[str, float], wrong: list[str]) -> float:
+    """By how much what is off the plane grows, as stated; what is wrong with it is added to ``wrong``."""
+    try:
+        growth = value_of(model.growth, {**names, "t": scene.duration})
+    except FormulaError as error:
+        wrong.append(f"growth: {error}")
+        return 1.0
+    if not growth >= 1.0:
+        wrong.append(f"growth: {growth:g} is less than 1, which means that nothing grows")
+    if scene.dimension == 3 and growth != 1.0:
+        wrong.append("growth: a spatial scene has no plane to leave")
+    return growth
 
 
 def _why(error: Exception, field: str) -> str:

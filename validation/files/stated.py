@@ -40,22 +40,27 @@ class StatedCheck:
 
 @dataclass(frozen=True)
 class Stated:
-    """What a file states: a scene, notes about what was filled in, and checks with a number."""
+    """What a file states: a scene, notes about what was filled in, checks with a number, and how its motion multiplies.
+
+    ``growth`` is that of `validation.canonical.CanonicalScene`.
+    """
 
     scene: Scene
     notes: tuple[str, ...]
     checks: tuple[StatedCheck, ...]
+    growth: float = 1.0
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data (JSON-ready) that `stated_from_dict` reads back."""
         checks = [asdict(check) for check in self.checks]
-        return {"scene": self.scene.as_dict(), "notes": list(self.notes), "checks": checks}
+        return {"scene": self.scene.as_dict(), "notes": list(self.notes), "checks": checks, "growth": self.growth}
 
 
 def stated_from_dict(data: Mapping[str, Any]) -> Stated:
     """Inverse of `Stated.as_dict`."""
     checks = tuple(StatedCheck(**check) for check in data["checks"])
-    return Stated(scene_from_dict(data["scene"]), tuple(data["notes"]), checks)
+    # Scenes that were handed on before growth could be stated have none.
+    return Stated(scene_from_dict(data["scene"]), tuple(data["notes"]), checks, data.get("growth", 1.0))
 
 
 def canonical_of(read: Stated, title: str) -> CanonicalScene:
@@ -74,6 +79,7 @@ def canonical_of(read: Stated, title: str) -> CanonicalScene:
         measure=lambda scene, trajectory: _measure(read, trajectory),
         rule=lambda scene, dt, truth: _checks(read, dt),
         sampling=lambda scene: Sampling(1, scene.duration - force_window(scene)),
+        growth=lambda scene: read.growth,
         notes=read.notes,
     )
 

@@ -31,6 +31,7 @@ from validation.canonical import CanonicalScene, Check
 from validation.geometry import least_gap, separation
 from validation.judging.rows import Row
 from validation.judging.verdicts import judge_physics
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 
 #: Bodies that are nearer than this share of the scene's size touch: starts are exact to round-off only.
@@ -202,6 +203,8 @@ def skill_of(row: Mapping[str, Any]) -> tuple[float | None, str]:
     """Skill of a row (as plain data); see `skill`."""
     if row["truth"] is None or row["value"] is None:
         return None, "there is no error to compare"
+    if row["metric"] == OUT_OF_PLANE:
+        return None, "a null is computed in the plane and cannot leave it"
     asked = row["scene"], row["dimension"], row["slot"]["params"], row["dt"], row["metric"], row["truth"]
     return skill(row["value"] - row["truth"], nulls_of(*asked))
 
