@@ -61,6 +61,8 @@ def load_side(argument: str, out: Path) -> Side:
     folder, _, run = argument.partition(":")
     if Path(folder).is_dir():
         return _load_run(Path(folder), run or "latest")
+    if path.name != argument or run:  # no id of a run
+        raise MissingError(f"run: there is no folder {folder}; crosscheck compare --help says what a side may be")
     return _load_run(out, argument)
 
 

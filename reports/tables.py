@@ -75,8 +75,11 @@ def _field(entry: Plain, name: str) -> str:
         return ", ".join(map(str, value))
     if name == "date":
         return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
-    if name == "title" and len(scenes := str(value).partition(": ")[2].split()) > FEW:
-        return f"{str(value).partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
+    if name == "title":
+        asked, options, narrowing = str(value).partition(" --")
+        if len(scenes := asked.partition(": ")[2].split()) > FEW:
+            asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
+        return f"{asked}{options}{narrowing}"
     return setting_text(value) if value is not None else "-"
 
 

@@ -24,7 +24,7 @@ from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.piles import show_piles
-from reports.command.selection import JOBS, SECONDS, missing, parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from reports.stages import stage
 from reports.terminal import terminal
@@ -89,7 +89,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     store = Store(folder(out))
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
-    title = f"bench {request.suite}: {' '.join(request.scenes)}"
+    title = f"bench {request.suite}: {asked(request, options)}"
     source, known = ("", []) if options["fresh"] else answered(store, cells)
     if known:
         console.print(f"{plural(len(known), 'cell')} of {len(cells)} as run {source} answered them: they are the same")

@@ -32,6 +32,7 @@ class _Group(click.Group):
     """Prints what goes wrong as one line; the status says whose fault it was (`reports.command.statuses`)."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
+        _open_streams()
         try:
             try:
                 return super().main(*args, **kwargs)
@@ -62,6 +63,20 @@ class _Group(click.Group):
         except BrokenPipeError:  # click would end with 1, which is a verdict
             _silence_stdout()  # whoever read our output has seen enough, but not all of it
             ctx.exit(statuses.RESULTS)
+
+
+def _open_streams() -> None:
+    """Point standard streams that the caller has closed (``>&-``) at nothing.
+
+    Python has no file for such a stream, and the next file that anybody opens would get its number: what an engine
+    prints would be written into it.
+    """
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: the closed one's
+            if null == descriptor:
+                os.set_inheritable(null, True)
+            setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
 
 
 def _leave(line: str, status: int) -> NoReturn:

@@ -19,7 +19,7 @@ from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.posing import cells_of, compare_and_show
-from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
+from reports.command.selection import CLUSTER, JOBS, SECONDS, asked, missing, request_from, selection
 from reports.progress import run_plan
 from reports.spread import spread_lines
 from reports.stages import warm_up
@@ -86,7 +86,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
             console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if options["keep_trajectories"] else None
-    title = f"{request.suite}: {' '.join(request.scenes)}"
+    title = f"{request.suite}: {asked(request, options)}"
     limits = options["jobs"], options["timeout"]
     done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"])
     observations = store.observations(done)

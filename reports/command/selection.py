@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -97,6 +98,13 @@ def request_from(options: dict[str, Any]) -> Request:
         ulps=tuple(options["ulp"]) or (0,),
         floors=options["suite"] == "full" and not options["ulp"],
     )
+
+
+def asked(request: Request, options: dict[str, Any]) -> str:
+    """Words that ask for these cells but their suite, ready to paste: ``bounce --param e=0.8 --engine bullet``."""
+    names = ("param", "engine", "profile", "dim", "dt", "iterations", "ulp")
+    narrowing = [word for name in names for value in options[name] for word in (f"--{name}", str(value))]
+    return shlex.join([*request.scenes, *narrowing])
 
 
 def selection(command: Callable[..., None]) -> Callable[..., None]:

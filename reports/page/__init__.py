@@ -32,6 +32,7 @@ from reports.page.styling import engine_style, symbols
 from reports.speed import duration
 from reports.wording import missing_text, number
 from validation.canonical import SUITES
+from validation.catalogue import CATALOGUE
 from validation.cells import format_dt
 
 __all__ = ["Bench", "Source", "load_source", "render"]
@@ -166,13 +167,26 @@ def cite(source: Source) -> dict[str, str]:
         f"git checkout {clean}" + ("   # plus changes that were not committed" if run.commit.endswith("+") else "")
     ]
     lines += ['pip install -e ".[all]" -c constraints.txt']
-    suite, _, scenes = run.title.partition(": ")
-    asked = suite if suite in SUITES else "quick"
-    lines.append(f"crosscheck run {scenes} --{asked} --out again")
+    lines.append(again("run", run.title))
     if source.bench is not None:
-        lines.append(f"crosscheck bench --{'full' if asked == 'full' else 'quick'} --out again")
+        lines.append(again("bench", source.bench.run.title.removeprefix("bench ")))
     lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]
     return {"text": text, "commands": "\n".join(lines if clean else lines[1:])}
+
+
+def again(command: str, title: str) -> str:
+    """The command that asks for the cells of a run again, from its title; all of our scenes need not be named."""
+    suite, _, words = title.partition(": ")
+    scenes, options, narrowing = words.partition(" --")
+    if scenes.split() == list(CATALOGUE):
+        scenes = ""
+    told = (
+        f"crosscheck {command}",
+        scenes,
+        f"{options}{narrowing}".strip(),
+        f"--{suite if suite in SUITES else 'quick'}",
+    )
+    return " ".join([*filter(None, told), "--out again"])
 
 
 def package_version() -> str:

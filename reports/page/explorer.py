@@ -125,14 +125,15 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     opacity = alt.condition(f"datum.e == {e}", alt.value(0.8), alt.value(0.22))
     layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity)]
     if rows:
-        table = pd.DataFrame(rows)
+        table = dodged(pd.DataFrame(rows), "n", "h", logarithmic=False)
         points = alt.Chart(table).mark_point(filled=True, size=60)
         layers.append(points.encode(x=x, y=y, description="label:N", **styled(table)))
     title = f"Apex heights for e = {e:g}"
     picture = svg(alt.layer(*layers).properties(width=620, height=320), title)
-    return Figure(
-        "fig-explorer", title, "Line: h_n = e^(2n) h0. Faint: e = 0.9 and e = 0.5. Points: measured.", picture
+    said = (
+        "Line: h_n = e^(2n) h0. Faint: e = 0.9 and e = 0.5. Points: measured; those that coincide stand side by side."
     )
+    return Figure("fig-explorer", title, said, picture)
 
 
 def _maps(rebounds: Sequence[Plain]) -> list[Figure]:

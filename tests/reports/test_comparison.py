@@ -87,6 +87,15 @@ def test_a_file_of_something_else_is_refused_in_one_line(tmp_path, content):
     assert len(result.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("side", ["{}/none", "{}/none:latest", "none:latest"])
+def test_a_folder_that_is_not_there_is_refused_by_its_own_name(tmp_path, side):
+    """It was looked for as a run of another folder, and that folder was blamed."""
+    asked = side.format(tmp_path)
+    result = CliRunner().invoke(main, ["compare", str(GOLDEN / "base.jsonl"), asked, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"crosscheck: run: there is no folder {asked.removesuffix(':latest')};")
+
+
 def planted(tmp_path, change):
     """Path of the golden rows with ``change(row)`` done to every row that has a value and a tolerance."""
     lines = [json.loads(line) for line in (GOLDEN / "base.jsonl").read_text().splitlines()]

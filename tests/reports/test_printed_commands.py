@@ -6,8 +6,10 @@ import shlex
 import pytest
 
 from adapters.registry import facts
+from reports.command.benching import bench
 from reports.command.running import run
-from reports.command.selection import request_from
+from reports.command.selection import asked, request_from
+from reports.page import again
 from reports.wording import reproduce
 from validation.field import notes
 from validation.posed import resolve
@@ -24,6 +26,36 @@ def asked_by(command):
     assert words[:2] == ["crosscheck", "run"]
     options = run.make_context("run", words[2:]).params
     return slots(request_from(options))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "--engine chipmunk --standard",
+        "bounce --param e=0.8 --param height=1.03 --engine bullet --engine mujoco --profile tuned --dt 1/120 --dim 3",
+        "impact stack --iterations 7 --ulp -1",
+        "'{}/a b.toml' --engine mujoco --dim 2",
+    ],
+)
+def test_a_page_says_how_all_of_its_own_run_is_asked_again_and_no_more(line, tmp_path):
+    """It named scenes and suite alone: of a run of one profile at one step the command made another run."""
+    (tmp_path / "a b.toml").write_text(
+        'name = "b"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'
+        '[[bodies]]\nname = "ball"\nshape = { type = "disc", radius = 0.5 }\n'
+    )
+    options = run.make_context("run", shlex.split(line.format(tmp_path))).params
+    request = request_from(options)
+    said = again("run", f"{request.suite}: {asked(request, options)}")
+    assert said.endswith("--out again") and len(said) < 250  # all of our scenes are not named one by one
+    assert asked_by(said) == slots(request)
+
+
+def test_a_page_says_how_its_bench_is_asked_again():
+    words = "impact --engine chipmunk --profile tuned --dt 1/60 --full"
+    options = bench.make_context("bench", shlex.split(words)).params
+    said = again("bench", f"full: {asked(request_from(options), options)}")
+    assert said == "crosscheck bench impact --engine chipmunk --profile tuned --dt 1/60 --full --out again"
 
 
 def between(own):

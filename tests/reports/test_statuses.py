@@ -99,6 +99,22 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
     assert done.stderr == ""
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell closes streams by >&-")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    ("arguments", "status"), [("list scenes", statuses.FINE), ("explain nothing", statuses.WRONG_CALL)]
+)
+def test_a_stream_that_the_caller_has_closed_is_nothing_to_read_and_nowhere_to_write(
+    tmp_path, closed, arguments, status
+):
+    """It was a traceback with status 1, which says that a verdict is bad; a closed stderr made every run one of 3."""
+    said = tmp_path / "said"
+    line = f'exec 3>"{said}"; "{sys.executable}" -m reports.command {arguments} >&3 2>&3 {closed}'
+    done = subprocess.run(["sh", "-c", line], cwd=ROOT, check=False)
+    assert done.returncode == status
+    assert "Traceback" not in said.read_text()
+
+
 def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):
     good = {"scene": "impact", "engine": "chipmunk", "profile": "tuned", "dt": "1/240", "params": {"v": 6.0}}
     wrong = ["{", "[1]", "7", json.dumps(good | {"engine": "chipmonk"}), json.dumps(good | {"dt": "nan"}),

@@ -162,12 +162,12 @@ def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     """The title of a quick suite names forty-six scenes: a screen for every run."""
     store = Store(tmp_path)
     names = [f"scene{k}" for k in range(46)]
-    for scenes in (names, names[:4]):
+    for scenes in ([*names, "--dim", "2"], names[:4]):
         store.start(f"quick: {' '.join(scenes)}", [Slot("impact", (("e", float(len(scenes))),), 2, "x", "y", 1 / 240)])
     store.close()
     result = call("list", "runs", "--out", tmp_path)
     many, few = (line for line in result.stdout.splitlines() if "quick:" in line)
-    assert "quick: scene0 scene1 scene2 scene3 and 42 more" in many and "scene4" not in many
+    assert "quick: scene0 scene1 scene2 scene3 and 42 more --dim 2" in many and "scene4" not in many
     assert "quick: scene0 scene1 scene2 scene3 " in few and "more" not in few
     plain = json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)
-    assert plain[0]["title"].split()[1:] == names and plain[0]["date"][:16].replace("T", " ") in many
+    assert plain[0]["title"].split()[1:-2] == names and plain[0]["date"][:16].replace("T", " ") in many

@@ -73,7 +73,9 @@ KINDS = (
 #: Lines of a part of a page that are told; more of the same follow.
 LONGEST = 900
 #: Long texts in a page that are none: packed data, and what is hashed of style and script.
+#: Padding decides whether a link has quotes, and the packer's version which padding there is: they are left out.
 _PACKED = re.compile(r"[A-Za-z0-9+/=]{120,}")
+_QUOTED = re.compile(r'"(data:[^"]*)"')
 _HASHED = re.compile(r"'sha256-[^']+'")
 _CODE = re.compile(r"<(style|script)>.*?</\1>", re.DOTALL)
 
@@ -231,7 +233,7 @@ def page_parts() -> Sections:
     text = _CODE.sub(lambda found: f"<{found[1]}>", pages()[0])
     parts, title = Sections({"top": {}}), "top"
     for piece in re.split(r"(?=<)", _HASHED.sub("'sha256'", text)):
-        line = " ".join(unescape(_PACKED.sub(unpacked, piece)).split())
+        line = " ".join(unescape(_PACKED.sub(unpacked, _QUOTED.sub(r"\1", piece))).split())
         if re.match(r"<h[12]\b", line):
             title = f"{len(parts)} {line.partition('>')[2]}"[:60]
             parts[title] = {}

@@ -5,18 +5,32 @@ import math
 import numpy as np
 import pytest
 
-from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Pair, Polygon, Scene, Sphere
 from adapters.trajectory import Trajectory
 from validation import geometry, metrics
 from validation.files import invariants
 from validation.geometry import deepest, least_gap, overlap, separation
 
 COUNT = 10_000
-PLANAR = [(Disc(0.4), Disc(0.7)), (Disc(0.3), Box((1.0, 0.25))), (Box((0.4, 0.7)), Box((1.0, 0.1)))]
+ROD = Capsule(0.6, 0.15)
+TRIANGLE = Polygon(((0.7, -0.1), (-0.2, 0.5), (-0.5, -0.4)))
+PLANAR = [
+    (Disc(0.4), Disc(0.7)),
+    (Disc(0.3), Box((1.0, 0.25))),
+    (Box((0.4, 0.7)), Box((1.0, 0.1))),
+    (ROD, Box((0.4, 0.7))),
+    (ROD, Capsule(0.3, 0.4)),
+    (TRIANGLE, Disc(0.3)),
+    (TRIANGLE, ROD),
+    (TRIANGLE, Box((1.0, 0.1))),
+]
 SPATIAL = [
     (Sphere(0.4), Sphere(0.7)),
     (Sphere(0.3), Box((1.0, 0.25, 0.5))),
     (Box((0.4, 0.7, 0.2)), Box((1.0, 0.1, 0.6))),
+    (ROD, Sphere(0.4)),
+    (ROD, Box((0.4, 0.7, 0.2))),
+    (ROD, Capsule(0.3, 0.4)),
 ]
 
 
@@ -31,11 +45,16 @@ def poses(dimension, seed, count=COUNT):
 
 
 def corners(shape, pose):
-    """Corners of a planar box, or the centre of a disc (k, 2)."""
+    """Corners of a planar body (k, 2); of what is round, the points that its radius is about."""
     if isinstance(shape, Disc):
         return pose[None, :2]
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    local = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * shape.half_extents
+    if isinstance(shape, Box):
+        local = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * shape.half_extents
+    elif isinstance(shape, Capsule):
+        local = np.array([(-shape.half_length, 0.0), (shape.half_length, 0.0)])
+    else:
+        local = np.array(shape.vertices)
     return pose[:2] + local @ np.array([(c, s), (-s, c)])
 
 
@@ -46,7 +65,7 @@ def test_planar_distances_and_depths_are_those_of_shapely(pair):
     a, b = pair
     pose_a, pose_b = poses(2, 1), poses(2, 2)
     found = separation(a, pose_a, b, pose_b)
-    radii = sum(shape.radius for shape in pair if isinstance(shape, Disc))
+    radii = sum(shape.radius for shape in pair if isinstance(shape, Disc | Capsule))
     expected = np.empty(COUNT)
     origin = shapely.Point(0.0, 0.0)
     for k in range(COUNT):
@@ -58,9 +77,20 @@ def test_planar_distances_and_depths_are_those_of_shapely(pair):
     np.testing.assert_allclose(found, expected, atol=1e-12)  # coordinates of metres, some hundred roundings
 
 
-def placed(coal, pose):
+def placed(coal, shape, pose):
     w, x, y, z = pose[3:]
-    return coal.Transform3s(coal.Quaternion(w, x, y, z), pose[:3])
+    turn = coal.Quaternion(w, x, y, z)
+    if isinstance(shape, Capsule):  # coal's lies along z
+        turn = turn * coal.Quaternion(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    return coal.Transform3s(turn, pose[:3])
+
+
+def of_coal(coal, shape):
+    if isinstance(shape, Box):
+        return coal.Box(*(2.0 * half for half in shape.half_extents))
+    return (
+        coal.Sphere(shape.radius) if isinstance(shape, Sphere) else coal.Capsule(shape.radius, 2.0 * shape.half_length)
+    )
 
 
 @pytest.mark.parametrize("pair", SPATIAL, ids=str)
@@ -69,17 +99,15 @@ def test_spatial_distances_and_depths_are_those_of_coal(pair):
     a, b = pair
     pose_a, pose_b = poses(3, 3), poses(3, 4)
     found = separation(a, pose_a, b, pose_b)
-    bodies = [
-        coal.Sphere(s.radius) if isinstance(s, Sphere) else coal.Box(*(2.0 * half for half in s.half_extents))
-        for s in pair
-    ]
+    bodies = [of_coal(coal, shape) for shape in pair]
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.gjk_tolerance = request.epa_tolerance = 1e-8
     request.gjk_max_iterations = request.epa_max_iterations = 512
     expected = np.empty(COUNT)
     for k in range(COUNT):
         result.clear()
-        coal.distance(bodies[0], placed(coal, pose_a[k]), bodies[1], placed(coal, pose_b[k]), request, result)
+        where = [placed(coal, shape, pose[k]) for shape, pose in ((a, pose_a), (b, pose_b))]
+        coal.distance(bodies[0], where[0], bodies[1], where[1], request, result)
         expected[k] = result.min_distance
     assert ((expected < 0.0).sum() > 500) and ((expected > 0.0).sum() > 500)
     # Iterative to 1e-8 of a squared length of metres where bodies are apart: 1e-4 of a length at worst, mostly 1e-8.
@@ -168,7 +196,7 @@ def test_a_round_body_clear_of_a_corner_does_not_overlap(dimension):
 def test_a_pose_that_gives_no_distance_is_neither_apart_nor_shallow(shapes):
     """A NaN after a depth that is a number was passed over, and left an overlap of 0, which passes."""
     a, b = shapes
-    d = 2 if isinstance(b, Disc) or len(getattr(b, "half_extents", (0, 0, 0))) == 2 else 3
+    d = 3 if shapes in SPATIAL else 2
     turn = (0.0,) if d == 2 else (1.0, 0.0, 0.0, 0.0)
     pose_a, pose_b = (np.array([[0.0] * d + list(turn)] * 70) for _ in range(2))
     pose_b[:, d - 1] = np.linspace(0.3, 9.0, 70)  # from inside to far away
