@@ -57,8 +57,12 @@ def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
     """Print a listing of scenes, engines, checks or runs."""
     columns = LISTINGS[what]
     table = grid(*(heading for heading, _ in columns))
+    last = ""
     for entry in entries:
-        table.add_row(*(Text(_field(entry, name)) for _, name in columns))
+        told = {name: _field(entry, name) for _, name in columns}
+        if "because" in told:  # one reason after the other in a narrow column: told once
+            told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
+        table.add_row(*map(Text, told.values()))
     console.print(table)
     for entry in entries:
         if entry.get("reason"):

@@ -232,6 +232,34 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
         assert page.locator("#explorer-plot").inner_html() != linear
 
 
+def test_who_is_switched_off_leaves_tables_charts_and_replay_and_the_address_keeps_it(browser, page_file):
+    who, other = "bullet/default", "bullet/tuned"
+    charts, rows = f".canvas [data-who='{who}']", f"#impact-2 tr[data-who='{who}']"
+
+    def gone(page):
+        until(page, f"document.querySelectorAll(\"[data-who='{who}']\").length > 0")
+        for selector in (".matrix.overall", "#scene-impact"):
+            page.locator(selector).first.wait_for()
+        assert page.locator(f"[data-who='{who}']:visible").count() == 0
+        assert page.locator(f".matrix.overall [data-who='{other}']:visible").count() > 2
+        assert page.locator(f"#explorer-plot path[aria-label^='{who}']").count() == 0
+        assert page.locator(f"#explorer-plot path[aria-label^='{other}']").count() > 0
+
+    with opened(browser, page_file, "#scene-impact") as page:
+        assert page.locator(charts).count() > 0 and page.locator(rows).count() > 0
+        assert page.locator(f".matrix.overall [data-who='{who}']:visible").count() > 2
+        page.locator(f"#filter input[value='{who}']").uncheck()
+        gone(page)
+        kept = "#" + page.url.partition("#")[2]
+    assert kept.startswith("#scene-impact?") and "hide=" in kept
+    with opened(browser, page_file, kept) as page:
+        assert not page.locator(f"#filter input[value='{who}']").is_checked()
+        gone(page)
+        page.locator("#filter-all").click()
+        assert page.locator(f".matrix.overall [data-who='{who}']:visible").count() > 2
+        assert "hide=" not in page.url
+
+
 def test_a_chart_point_says_what_it_is(browser, page_file):
     with opened(browser, page_file, "#scene-impact") as page:
         point = page.locator("#fig-work-impact-2 [data-is*='per simulated second']").first

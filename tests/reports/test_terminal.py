@@ -2,6 +2,7 @@
 
 import ast
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -156,6 +157,16 @@ def test_an_estimate_for_idle_cores_says_where_they_are_not_idle(monkeypatch, lo
     monkeypatch.setattr(stages.os, "cpu_count", lambda: 2)
     monkeypatch.setattr(stages.os, "getloadavg", lambda: (load, 0.0, 0.0))
     assert stages._busy() == said
+
+
+def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
+    """Each told it again, seven lines of two words at 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+    plain = json.loads(call("list", "checks", "--json").stdout)
+    lines = {line.partition(" ")[0]: line for line in call("list", "checks").stdout.splitlines()}
+    shared = [after["because"] == before["because"] for before, after in pairwise(plain)]
+    assert any(shared)
+    assert ["as above" in lines[check["name"]] for check in plain[1:]] == shared
 
 
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
