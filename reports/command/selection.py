@@ -73,6 +73,16 @@ def parameter(text: str) -> tuple[str, float]:
         raise SceneError(f"param: {name}={value!r} is not a number") from None
 
 
+def _once(texts: Sequence[str]) -> dict[str, float]:
+    """Parameters that are fixed; of two values for one of them neither is what was asked for."""
+    found: dict[str, float] = {}
+    for name, value in map(parameter, texts):
+        if name in found:
+            raise SceneError(f"param: {name} is given twice; crosscheck sweep --grid asks several values")
+        found[name] = value
+    return found
+
+
 def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
     names: list[str] = []
     for argument in arguments or ["*"]:
@@ -93,7 +103,7 @@ def request_from(options: dict[str, Any]) -> Request:
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
-        params=dict(map(parameter, options["param"])) or None,
+        params=_once(options["param"]) or None,
         suite=options["suite"],
         ulps=tuple(options["ulp"]) or (0,),
         floors=options["suite"] == "full" and not options["ulp"],

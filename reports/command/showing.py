@@ -162,6 +162,7 @@ def findings(
         prove_and_show(prove, wanted["engine"], as_json)
         return
     identity, observations = observed(out, run)
+    _say_missing(out, run)
     for name, asked in wanted.items():
         there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:

@@ -441,6 +441,8 @@ def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
     shown = CliRunner().invoke(main, ["show", "--out", str(tmp_path)])
     made = CliRunner().invoke(main, ["report", "--json", "--out", str(tmp_path)])
     assert said in shown.stderr and said in made.stderr
+    # Nothing else is alarming, and the run had ended with 1.
+    assert said in CliRunner().invoke(main, ["findings", "--new", "--out", str(tmp_path)]).stderr
     assert json.loads(made.stdout)["missing"] == 2
     plain = json.loads(CliRunner().invoke(main, ["show", "--json", "--out", str(tmp_path)]).stdout)
     assert (plain["run"], plain["planned"], plain["missing"]) == (run.id, 3, 2)

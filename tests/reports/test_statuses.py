@@ -49,6 +49,12 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_parameter_that_is_given_twice_is_refused_and_the_way_to_ask_both_is_named(tmp_path):
+    result = call(*SMALL, "--param", "e=.5", "--param", "e=.6", "--out", tmp_path)
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result) == "crosscheck: param: e is given twice; crosscheck sweep --grid asks several values"
+
+
 def test_results_that_are_not_there_are_a_wrong_call(tmp_path):
     result = call("report", "--out", tmp_path)
     assert result.exit_code == statuses.WRONG_CALL
@@ -102,14 +108,15 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell closes streams by >&-")
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
-    ("arguments", "status"), [("list scenes", statuses.FINE), ("explain nothing", statuses.WRONG_CALL)]
+    ("arguments", "status"),
+    [("list scenes", statuses.FINE), ("explain nothing", statuses.WRONG_CALL), ("run-cell", statuses.WRONG_CALL)],
 )
 def test_a_stream_that_the_caller_has_closed_is_nothing_to_read_and_nowhere_to_write(
     tmp_path, closed, arguments, status
 ):
     """It was a traceback with status 1, which says that a verdict is bad; a closed stderr made every run one of 3."""
     said = tmp_path / "said"
-    line = f'exec 3>"{said}"; "{sys.executable}" -m reports.command {arguments} >&3 2>&3 {closed}'
+    line = f'exec 3>"{said}"; "{sys.executable}" -m reports.command {arguments} </dev/null >&3 2>&3 {closed}'
     done = subprocess.run(["sh", "-c", line], cwd=ROOT, check=False)
     assert done.returncode == status
     assert "Traceback" not in said.read_text()
