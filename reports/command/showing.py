@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ from validation.cells import Observation, Slot, checks_of
 from validation.judging.rows import rows_of
 from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
+from validation.posed import is_file
 from validation.questions.nulls import skill_of
 from validation.records.store import Store
 
@@ -163,6 +164,9 @@ def findings(
         return
     identity, observations = observed(out, run)
     _say_missing(out, run)
+    wanted["scene"] = [
+        scene_of(told, {observation.slot.scene for observation in observations}) for told in wanted["scene"]
+    ]
     for name, asked in wanted.items():
         there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:
@@ -241,7 +245,7 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
     """Say everything about one ROW: what was asked and measured, the truth, the tolerance and why, what cures it.
 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
-    row there.
+    row there; SCENE may be the path of a scene file.
     """
     identity, observations = observed(out, run)
     observations = _where(observations, row)
@@ -281,7 +285,8 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
         If ids of no row or of several begin so.
     """
     if "/" in name:
-        keys = [key for key in zip(("engine", "scene"), name.split("/", 3)[:3:2], strict=False) if key[1]]
+        named = named_by(name, {observation.slot.scene for observation in observations})
+        keys = [(key, named[key]) for key in ("engine", "scene") if named.get(key)]
     else:
         slots = [slot for found, slot in ids_of(observations) if found.startswith(name)]
         if len(slots) != 1:
@@ -289,6 +294,25 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
             raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
         keys = [("engine", slots[0].engine), ("scene", slots[0].scene)]
     return [one for one in observations if all(getattr(one.slot, key) == value for key, value in keys)]
+
+
+def scene_of(told: str, scenes: Collection[str]) -> str:
+    """The scene of a run that is meant: a scene file by its path alone as well, without the hash of what it said."""
+    if told in scenes:
+        return told
+    return next((scene for scene in scenes if is_file(scene) and scene.rpartition("@")[0] == told), told)
+
+
+def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
+    """What ENGINE/PROFILE/SCENE[/METRIC] says of each; the path of a scene file has slashes itself."""
+    engine, profile, *rest = name.split("/", 2)
+    found = {"engine": engine, "profile": profile}
+    if not rest:
+        return found
+    ends = [k for k, letter in enumerate(rest[0]) if letter == "/"] + [len(rest[0])]
+    end = next((k for k in reversed(ends) if scene_of(rest[0][:k], scenes) in scenes), ends[0])
+    found["scene"] = scene_of(rest[0][:end], scenes)
+    return found | ({"metric": rest[0][end + 1 :]} if rest[0][end + 1 :] else {})
 
 
 def ids_of(observations: Sequence[Observation]) -> Iterator[tuple[str, Slot]]:
@@ -315,11 +339,11 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         If there is none, or ids of several rows begin so.
     """
     if "/" in name:
-        parts = name.split("/", 3)
-        keys = ("engine", "profile", "scene")
-        fits = [row for row in rows if all(row[k] == part for k, part in zip(keys, parts, strict=False))]
-        if len(parts) > 3:
-            fits = [row for row in fits if parts[3] in (row["metric"], row["metric"].partition("[")[0])]
+        named = named_by(name, {row["scene"] for row in rows})
+        metric = named.pop("metric", "")
+        fits = [row for row in rows if all(row[key] == told for key, told in named.items())]
+        if metric:
+            fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
         if not fits:
             raise SceneError(f"row: this run has no row {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)

@@ -348,6 +348,41 @@ def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(tw
     assert 0 < max(counted) < len(observations)
 
 
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("toy/tuned", {}),
+        ("toy/tuned/", {"scene": ""}),
+        ("toy/tuned/bounce", {"scene": "bounce"}),
+        ("toy/tuned/bounce/apex", {"scene": "bounce", "metric": "apex"}),
+        ("toy/tuned/nowhere/apex/x", {"scene": "nowhere", "metric": "apex/x"}),
+        ("toy/tuned//tmp/a b.toml@0123abcd", {"scene": "/tmp/a b.toml@0123abcd"}),
+        ("toy/tuned//tmp/a b.toml", {"scene": "/tmp/a b.toml@0123abcd"}),
+        ("toy/tuned//tmp/a b.toml/x[floor/box.fy]", {"scene": "/tmp/a b.toml@0123abcd", "metric": "x[floor/box.fy]"}),
+        ("toy/tuned/drop.json/energy_growth", {"scene": "drop.json@89abcdef", "metric": "energy_growth"}),
+    ],
+)  # fmt: skip
+def test_a_row_is_named_by_the_path_of_its_scene_file_as_well(name, found):
+    """Paths have slashes, and a hash that nobody types."""
+    scenes = {"bounce", "/tmp/a b.toml@0123abcd", "drop.json@89abcdef"}
+    assert showing.named_by(name, scenes) == {"engine": "toy", "profile": "tuned", **found}
+
+
+def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
+    pytest.importorskip("pymunk")
+    path = tmp_path / "a b.toml"
+    path.write_text(
+        'name = "ball"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'
+        '[[bodies]]\nname = "ball"\nshape = { type = "disc", radius = 0.5 }\n'
+    )
+    out = str(tmp_path / "out")
+    assert call("run", str(path), "--engine", "chipmunk", "--profile", "tuned", "--out", out).exit_code == 0
+    told = json.loads(call("explain", f"chipmunk/tuned/{path}/energy_growth", "--json", "--out", out).stdout)
+    assert told["metric"] == "energy_growth" and told["scene"].startswith(f"{path}@")
+    found = call("findings", "--scene", str(path), "--out", out)
+    assert (found.exit_code, found.stdout) == (0, "no such row fails\n")
+
+
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])
 def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
     out, _ = two_engines
