@@ -114,7 +114,7 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
 def test_a_stream_that_the_caller_has_closed_is_nothing_to_read_and_nowhere_to_write(
     tmp_path, closed, arguments, status
 ):
-    """It was a traceback with status 1, which says that a verdict is bad; a closed stderr made every run one of 3."""
+    """A closed stdout was a traceback with status 1, which says that a verdict is bad."""
     said = tmp_path / "said"
     line = f'exec 3>"{said}"; "{sys.executable}" -m reports.command {arguments} </dev/null >&3 2>&3 {closed}'
     done = subprocess.run(["sh", "-c", line], cwd=ROOT, check=False)
