@@ -63,6 +63,7 @@ class Speed:
     """Everything of the section."""
 
     run: str
+    columns: list[tuple[str, str]]
     quality: str
     busy: str
     cheapest: list[tuple[str, str, list[LevelCell]]]
@@ -87,6 +88,7 @@ def speed(source: Source) -> Speed | None:
     at_error = _level_tables(tables["time_at_equal_error"], "cost", 1e-6, ranked=not busy)
     return Speed(
         bench.run.id,
+        _timed(source, tables),
         tables_of_speed.quality_line(tables["timings"]),
         busy,
         *_cheapest(tables["time_at_equal_error"]),
@@ -99,6 +101,13 @@ def speed(source: Source) -> Speed | None:
         _protocol(bench),
         _voided(tables["timings"]),
     )
+
+
+def _timed(source: Source, tables: Mapping[str, pd.DataFrame]) -> list[tuple[str, str]]:
+    """Columns of the page that were timed, in its order: profiles without a rank are run, but not timed."""
+    told = [tables[name] for name in ("work_points", "scaling") if len(tables[name])]
+    timed = {who for table in told for who in zip(table["engine"], table["profile"], strict=True)}
+    return [column for column in source.columns if column in timed]
 
 
 def level_text(level: float) -> str:

@@ -40,6 +40,16 @@ def test_the_cheapest_cell_names_one_its_cost_and_who_is_not_told_apart():
     assert cost._cheapest_cell([]) == cost.LevelCell("none reaches it", "", False, "")
 
 
+def test_the_legend_of_the_cost_charts_names_who_was_timed_in_the_order_of_the_page():
+    """A profile without a rank is run for its verdicts, and its name above charts without it would be a riddle."""
+    columns = [("bullet", "one"), ("mujoco", "matched"), ("mujoco", "tuned"), ("chipmunk", "tuned")]
+    points = pd.DataFrame([{"engine": "mujoco", "profile": "tuned"}, {"engine": "bullet", "profile": "one"}])
+    sizes = pd.DataFrame([{"engine": "chipmunk", "profile": "tuned"}])
+    source = SimpleNamespace(columns=columns)
+    assert cost._timed(source, {"work_points": points, "scaling": sizes}) == [columns[0], columns[2], columns[3]]
+    assert cost._timed(source, {"work_points": points, "scaling": pd.DataFrame()}) == [columns[0], columns[2]]
+
+
 def test_a_table_of_levels_has_who_answers_and_names_who_cannot_be_asked():
     assert cost._level_tables(pd.DataFrame(columns=list(told("a"))), "cost", 0.0) == []
     rows = [

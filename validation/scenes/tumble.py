@@ -104,9 +104,10 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
     return "changed its spin" if metrics.largest([momentum, energy]) > HALF else ""
 
 
-def _euler(own: Array, spin: Array) -> Array:
-    """Rate of the spin in body axes, I w' = (I w) x w."""
-    return np.asarray(np.cross(own * spin, spin) / own)
+def _euler(own: Array, spin: Array, other: Array) -> Array:
+    """I^-1 ((I w) x v) for principal moments I, spin w and another vector v: with v = w the rate of the spin."""
+    (i1, i2, i3), (x, y, z), (u, v, w) = own, spin, other
+    return np.array(((i2 * y * w - i3 * z * v) / i1, (i3 * z * u - i1 * x * w) / i2, (i1 * x * v - i2 * y * u) / i3))
 
 
 @lru_cache(maxsize=64)
@@ -121,14 +122,17 @@ def _step_errors(start: tuple[float, ...], duration: float) -> tuple[float, floa
     momentum, energy = float(np.linalg.norm(own * spin)), float(own @ spin**2)
     lost, given, turned, crossing = 0.0, 0.0, 0.0, 0.0
     for _ in range(STEPS):
-        rate = _euler(own, spin)
-        second = (np.cross(own * rate, spin) + np.cross(own * spin, rate)) / own
+        rate = _euler(own, spin, spin)
+        second = _euler(own, rate, spin) + _euler(own, spin, rate)
         lost += h * 0.5 * float(np.linalg.norm(own * second)) / momentum
         given += h * abs(float(own * spin @ second)) / energy
         turned += h * 0.5 * float(np.linalg.norm(rate))
-        k2 = _euler(own, spin + 0.5 * h * rate)
-        k3 = _euler(own, spin + 0.5 * h * k2)
-        after = spin + h / 6.0 * (rate + 2.0 * k2 + 2.0 * k3 + _euler(own, spin + h * k3))
+        half = spin + 0.5 * h * rate
+        k2 = _euler(own, half, half)
+        half = spin + 0.5 * h * k2
+        k3 = _euler(own, half, half)
+        whole = spin + h * k3
+        after = spin + h / 6.0 * (rate + 2.0 * k2 + 2.0 * k3 + _euler(own, whole, whole))
         if spin[1] > 0.0 >= after[1]:
             crossing = turned * float(np.linalg.norm(spin)) / abs(float(rate[1]))
         spin = after
