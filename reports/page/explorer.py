@@ -42,9 +42,13 @@ class Effective:
 
 @dataclass(frozen=True)
 class Explorer:
-    """Data of the slider, its picture without JavaScript, the map and the table of effective restitution."""
+    """Data of the slider, its picture without JavaScript, the map and the table of effective restitution.
+
+    ``shown`` are the engines and profiles that have points in the picture.
+    """
 
     data: dict[str, Any]
+    shown: list[tuple[str, str]]
     figure: Figure
     maps: list[Figure]
     effective: list[Effective]
@@ -65,20 +69,20 @@ def explorer(source: Source) -> Explorer | None:
     rebounds = _rebounds(source, *struck) if struck else []
     if not heights and not rebounds:
         return None
-    colours = colours_of(source.engines)
+    colours, own = colours_of(source.engines), [column for column in source.columns if heights.get(column)]
     series = [
         {
             "name": f"{engine}/{profile}", "colour": colours[engine], "shape": shape_of(profile),
             "heights": {f"{e:g}": values for e, values in sorted(heights.get((engine, profile), {}).items())},
         }
-        for engine, profile in source.columns if heights.get((engine, profile))
+        for engine, profile in own
     ]  # fmt: skip
     measured = sorted({float(e) for entry in series for e in entry["heights"]})
-    shown = bounced[1].heights if bounced else 0
-    data = {"presets": PRESETS, "faint": FAINT, "apexes": shown, "measured": measured, "series": series}
+    apexes = bounced[1].heights if bounced else 0
+    data = {"presets": PRESETS, "faint": FAINT, "apexes": apexes, "measured": measured, "series": series}
     effective = _effective(rebounds, source.columns)
     said = _answers(rebounds)
-    return Explorer(data, _picture(heights, 0.8), _maps(rebounds), effective, said, struck[0] if struck else "")
+    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds), effective, said, struck[0] if struck else "")
 
 
 def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
