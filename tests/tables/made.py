@@ -14,6 +14,7 @@ import of_print
 import of_questions
 import of_results
 import of_scenes
+import of_shown
 from telling import Sections
 
 from adapters.registry import find
@@ -67,5 +68,15 @@ def of_installed() -> Makers:
 def tables() -> Makers:
     """All of them that can be made here."""
     return (
-        SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | QUESTIONS | OPTIONS | PRINTED | of_results.MAKERS | of_installed()
+        SCENES
+        | MOTIONS
+        | LAWS
+        | EXPERIMENTS
+        | KIT
+        | QUESTIONS
+        | OPTIONS
+        | PRINTED
+        | of_results.MAKERS
+        | of_shown.MAKERS
+        | of_installed()
     )
