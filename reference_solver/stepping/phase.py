@@ -46,13 +46,7 @@ from reference_solver.stepping.operations import (
     feature_limits,
     free_accelerations,
 )
-from reference_solver.stepping.turning_slips import (
-    SIDEWAYS,
-    follow_slip,
-    foreseen_end,
-    steady_slip,
-    stops_across,
-)
+from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
 
 # Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
 #: Times of the stages, as shares of the step.
@@ -458,7 +452,7 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
             break
         if step_phase(bodies, lasting, guess) < 0.0:
             return -1.0
-        if lasting.size[TANGENTS] > 1 and (lasting.error[0] > 1.0 or stops_across(lasting, SIDEWAYS)):
+        if lasting.size[TANGENTS] > 1 and lasting.error[0] > 1.0:
             return guess  # a slip turns on its way to its end
         value = lowest(lasting, LAST)
         if abs(value) <= LOCATED:
@@ -534,7 +528,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
     if not changed:
         go_back(bodies, lasting)
         return 0.0, FAILED
-    length, outcome, beyond = left, WHOLE, 0.0
+    length, outcome = left, WHOLE
     for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
         if changed:
             if not start_again(bodies, lasting):
@@ -543,43 +537,36 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             if back < length:
                 length, left, outcome = back, back, SHORTENED
             changed = False
-            if lasting.size[TANGENTS] > 1:
-                length, beyond = max(length, beyond), 0.0
-                ahead = foreseen_end(lasting)
-                if SHORTEST * left < ahead < length:
-                    length, beyond = ahead, length
         error = step_phase(bodies, lasting, length)
         if error < 0.0:
-            length, outcome, beyond = 0.25 * length, SHORTENED, 0.0
+            length, outcome = 0.25 * length, SHORTENED
         elif error > 1.0:
             parts = math.ceil(max(error, 1.0) ** 0.2 / SAFETY)
-            length, outcome, beyond = length / max(parts, 2), SHORTENED, 0.0
+            length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
         elif fallen_at_once(lasting)[0] >= 0:
             which, what = fallen_at_once(lasting)
             if what >= FEATURE and length > SHORTEST * left and rises_first(bodies, lasting, which, what, length):
-                length, outcome, beyond = 0.25 * length, SHORTENED, 0.0
+                length, outcome = 0.25 * length, SHORTENED
                 continue
             end_mode(bodies, lasting, which, what)
             changed = True
             continue
         elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
-            length, outcome, beyond = lasting.early[0] * length, SHORTENED, 0.0
+            length, outcome = lasting.early[0] * length, SHORTENED
         elif lowest(lasting, LAST) < -LOCATED:
             end = find_end(bodies, lasting, length)
             if end >= SHORTEST * left:
-                ends = not stops_across(lasting, math.inf) and lasting.error[0] <= 1.0
+                ends = not stops_across(lasting) and lasting.error[0] <= 1.0
                 if ends or BEFORE_END * end < SHORTEST * left:
                     return end, ENDED
-                length, outcome, beyond = BEFORE_END * end, SHORTENED, 0.0
+                length, outcome = BEFORE_END * end, SHORTENED
                 continue
             if end < 0.0:
                 break
             end_first(bodies, lasting)
             changed = True
-        elif length < beyond:  # a slip was foreseen to end before, and has not
-            length, beyond = beyond, 0.0
         else:
             return length, outcome
         if length < SHORTEST * left:

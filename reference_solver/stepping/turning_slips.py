@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.stepping.equalities import effect, list_rows, row_value, solve_rows
-from reference_solver.stepping.lasting import CONTACTS, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
+from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 
 #: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
@@ -18,12 +18,6 @@ BEARABLE = 0.4
 FAR_LIGHTER = 0.1
 #: An acceleration turns a slip no more than round-off does if this share of it is across.
 STRAIGHT = 1e-6
-#: What is left along the last direction of a slip that has turned, as a share of what is across, where its end is known
-#: well enough for a step that is made before it.
-SIDEWAYS = 0.1
-#: How many times the time to its end, foreseen by the acceleration of its start, a step of a slip takes at most: in all
-#: of it the end is found by a chord; what is far beyond it is another motion.
-BEYOND = 2.0
 
 
 @inner_kernel
@@ -159,38 +153,20 @@ def without_friction(lasting: Lasting, k: int) -> None:
 
 
 @inner_kernel
-def stops_across(lasting: Lasting, passed: float) -> bool:
+def stops_across(lasting: Lasting) -> bool:
     """Whether a slip that comes to its end along its last direction has turned, and goes on across it.
 
     How a slip turns while it ends is a power of the time left: a step over the end itself is of no order, steps that
-    leave a share of that time are. ``passed``: how far beyond that end it may be, as a share of what is across.
+    halve that time are. What is left in the end is round-off, and sticks.
     """
     for k in range(lasting.size[CONTACTS]):
         if lasting.mode[k] != SLIP or lasting.friction[k] == 0.0 or lasting.size[TANGENTS] == 1:
             continue
-        if lasting.monitor[START, k, ONWARD] > FORCE_NOISE:
+        if lasting.monitor[START, k, ONWARD] > FORCE_NOISE and lasting.monitor[LAST, k, ONWARD] <= LOCATED:
             speed, along = 0.0, 0.0
             for t in range(lasting.size[TANGENTS]):
                 speed += lasting.speed[k, 1 + t] ** 2
                 along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
-            across = math.sqrt(max(speed - along**2, 0.0))
-            near = max(LOCATED * lasting.speeds[k], SIDEWAYS * across)
-            if across > NOISE * lasting.speeds[k] and -passed * across <= along <= near:
+            if math.sqrt(max(speed - along**2, 0.0)) > NOISE * lasting.speeds[k]:
                 return True
     return False
-
-
-@inner_kernel
-def foreseen_end(lasting: Lasting) -> float:
-    """Time that a step may take at most where slips come to their ends: `BEYOND` of the first one's [s]."""
-    first = math.inf
-    for k in range(lasting.size[CONTACTS]):
-        if lasting.mode[k] != SLIP or lasting.friction[k] == 0.0 or lasting.slides[k] == 0:
-            continue
-        along, gain = 0.0, 0.0
-        for t in range(lasting.size[TANGENTS]):
-            along += lasting.speed[k, 1 + t] * lasting.direction[k, t]
-            gain += slip_gain(lasting, k, t) * lasting.direction[k, t]
-        if gain < 0.0 < along:
-            first = min(first, -BEYOND * along / gain)
-    return first
