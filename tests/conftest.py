@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import sys
 import textwrap
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import settings
 
 from adapters import registry
@@ -92,6 +94,34 @@ def errors_say_one_line(offences):
         for error in SAID:
             patch.setattr(error, "__init__", checked, raising=False)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def data_is_laid_out_alike(offences):
+    """Whatever test asks a command for JSON, it is indented by one column, or, if no list of records, on one line."""
+    invoke = CliRunner.invoke
+
+    def watched(runner, command, args=None, *rest, **named):
+        result = invoke(runner, command, args, *rest, **named)
+        if not isinstance(args, str) and "--json" in (args or ()):
+            offences.extend(f"{' '.join(map(str, args))}: {said}" for said in layout_of(result.stdout))
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CliRunner, "invoke", watched)
+        yield
+
+
+def layout_of(text):
+    """What is wrong with the layout of JSON; of JSON Lines, or of what was not said after all, nothing."""
+    try:
+        data = json.loads(text)
+    except ValueError:
+        return []
+    text = text.rstrip("\n")
+    records = isinstance(data, list) and any(isinstance(each, dict) for each in data)
+    fine = text == json.dumps(data, indent=1) or (text == json.dumps(data) and not records)
+    return [] if fine else [f"is laid out otherwise: {text[:80]!r}"]
 
 
 EVIL = '''

@@ -16,10 +16,19 @@ def planted(pytester, line, before=""):
     (folder / "test_planted.py").write_text(f"""
 import contextlib
 import pytest
+import click
+from click.testing import CliRunner
 from rich.console import Console
 from rich.table import Table
 from adapters.engine import EngineError
 from adapters.shapes import SceneError
+
+
+@click.command()
+@click.option("--json", "text")
+def told(text):
+    click.echo(text)
+
 {before}
 def test_one():
     with contextlib.suppress(Exception):
@@ -35,7 +44,7 @@ def test_two():
 @pytest.mark.parametrize(
     ("line", "told"),
     [
-        ("raise SceneError('first\\nsecond')", "SceneError does not say one line*test_planted.py:11"),
+        ("raise SceneError('first\\nsecond')", "SceneError does not say one line*test_planted.py:20"),
         ("raise SceneError(' ')", "SceneError does not say one line"),
         ("raise SceneError()", "SceneError does not say one line"),
         ("raise SceneError('a', 'b')", "SceneError does not say one line"),
@@ -44,6 +53,8 @@ def test_two():
         ("Table('a').add_row('1', '2')", "a row of 2 cells in a table of 1 columns"),
         ("Table('a', 'b').add_row('1', None)", "a row with nothing in a cell"),
         ("Console(quiet=True).print(None)", "nothing is printed"),
+        ("CliRunner().invoke(told, ['--json', '[\\n  1\\n]'])", "is laid out otherwise"),
+        ("CliRunner().invoke(told, ['--json', '[{\"a\": 1}]'])", "is laid out otherwise"),
     ],
 )
 def test_what_is_swallowed_is_told(pytester, line, told):
@@ -57,6 +68,9 @@ def test_what_is_swallowed_is_told(pytester, line, told):
     [
         "raise SceneError('one line')",
         "raise EngineError('first\\nsecond')",
+        "CliRunner().invoke(told, ['--json', '[\\n 1\\n]'])",
+        "CliRunner().invoke(told, ['--json', '{\"a\": [1]}'])",
+        "CliRunner().invoke(told, ['--json', 'not JSON'])",
         "Table('a', 'b').add_row('1', '2')",
         "Table('a', 'b').add_row('1')",
         "Console(quiet=True).print('')",

@@ -9,10 +9,12 @@ import of_engines
 import of_kit
 import of_laws
 import of_motions
+import of_options
 import of_print
 import of_questions
 import of_results
 import of_scenes
+import of_shown
 from telling import Sections
 
 from adapters.registry import find
@@ -45,6 +47,8 @@ QUESTIONS: Makers = {
     "questions/planted": of_questions.table_of_planted,
     "questions/bench": of_questions.table_of_units,
 }
+#: Options are told apart from what commands print: no run is kept for them.
+OPTIONS: Makers = {"print/options": of_options.table}
 PRINTED: Makers = of_print.makers()
 #: How the names of those end that are files, pages, or parts of them.
 PAGES = ("files", "bench", "frame", "page", "charts", "dashboard")
@@ -63,4 +67,16 @@ def of_installed() -> Makers:
 
 def tables() -> Makers:
     """All of them that can be made here."""
-    return SCENES | MOTIONS | LAWS | EXPERIMENTS | KIT | QUESTIONS | PRINTED | of_results.MAKERS | of_installed()
+    return (
+        SCENES
+        | MOTIONS
+        | LAWS
+        | EXPERIMENTS
+        | KIT
+        | QUESTIONS
+        | OPTIONS
+        | PRINTED
+        | of_results.MAKERS
+        | of_shown.MAKERS
+        | of_installed()
+    )

@@ -1,5 +1,6 @@
 """What commands print of one run that is kept, word by word."""
 
+import of_print
 import pytest
 from made import PAGES, PRINTED
 from telling import check
@@ -9,6 +10,12 @@ for package in ("altair", "pymunk", "pybullet", "mujoco"):
 
 #: Pages and what explains a row have files of their own.
 OWN = [name for name in PRINTED if "explain" not in name and not name.endswith(PAGES)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept():
+    """What all of them show is made once, in no test's time."""
+    of_print.folder()
 
 
 @pytest.mark.parametrize("name", OWN)

@@ -27,6 +27,16 @@ def test_a_table_is_read_back_with_its_tuples(tmp_path):
     other = replace(CURE, dimension=3, before=None, changes={}, profile="", others=(), cost_before=None, left=5)
     write([CURE, other], tmp_path / "cures.csv")
     assert read(tmp_path / "cures.csv") == [CURE, other]
+    mending = replace(CURE, mends=("creep", "turned"))
+    write([mending], tmp_path / "cures.csv")
+    assert read(tmp_path / "cures.csv") == [mending]
+
+
+def test_a_table_of_before_what_is_mended_was_written_down_is_read_all_the_same(tmp_path):
+    path = tmp_path / "cures.csv"
+    write([CURE], path)
+    path.write_text("".join(f"{line.rpartition(',')[0]}\n" for line in path.read_text().splitlines()))
+    assert "mends" not in path.read_text() and read(path) == [CURE]
 
 
 def test_numbers_of_numpy_are_written_and_a_table_that_cannot_be_keeps_the_old_one(tmp_path):
@@ -177,13 +187,14 @@ def test_what_is_told_is_a_check_that_the_cure_mends(monkeypatch):
     assert [each.check.metric for each in failing] == ["creep", "turned"]
     assert cures._told(trials, failing, best).check.metric == "turned"
     assert cures._told(trials, failing, None).check.metric == "creep"
+    assert cures._mended(trials, failing, best) == ("turned",) and cures._mended(trials, failing, None) == ()
 
 
 def test_a_real_engine_is_cured_by_what_its_sheet_says():
     """Chipmunk's box hops as it starts to slide, by an overlap that it is not given at the start."""
     pytest.importorskip("pymunk")
     found = search("chipmunk", "slide", 2)
-    assert (found.failing, found.left) == (1, 0) and found.metric == "hop"
+    assert (found.failing, found.left) == (1, 0) and found.metric == "hop" and found.mends == ("hop",)
     assert list(found.changes) == ["start_overlap"] and found.before > found.tolerance > found.after
     assert found.cost_before > 0.0 and found.cost_after > 0.0
     passes, refuses = search("chipmunk", "incline", 2), search("chipmunk", "slide", 3)

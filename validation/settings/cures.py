@@ -74,6 +74,9 @@ class Cure:
         How many changes were tried.
     cost_before, cost_after
         CPU time per step [s] in the cell that is told; None where it was not clocked.
+    mends
+        Kinds of metrics, without their index, that failed as shipped in cells that were asked and pass in all of them
+        with the cure. Of no other kind anything is promised; empty in a table that was kept before it was written down.
     """
 
     engine: str
@@ -98,6 +101,7 @@ class Cure:
     tried: int
     cost_before: float | None
     cost_after: float | None
+    mends: tuple[str, ...] = ()
 
     @property
     def helps(self) -> bool:
@@ -293,7 +297,21 @@ def _cure(
         tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
         len(trials.start), check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value,
         after.value, changes, _profile_of(engine, trials.slots, best), others, trials.tried, before_cost, after_cost,
+        _mended(trials, failing, best),
     )  # fmt: skip
+
+
+def _kind(found: Reading) -> str:
+    return found.check.metric.partition("[")[0]
+
+
+def _mended(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> tuple[str, ...]:
+    """Kinds that fail as shipped and of which nothing fails with the cure, in the order in which scenes state them."""
+    if best is None:
+        return ()
+    cured = [switched(slot, own) for slot, own in zip(trials.slots, best.changes, strict=True)]
+    left = {_kind(each) for slot in cured for each in trials.seen[slot] if each.badness > 1.0}
+    return tuple(kind for kind in dict.fromkeys(_kind(each) for each in failing) if kind not in left)
 
 
 def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
@@ -390,6 +408,7 @@ def _cure_of(row: Mapping[str, str]) -> Cure:
     values: dict[str, Any] = {name: text if name in _PLAIN else json.loads(text) for name, text in row.items()}
     others = tuple(_settings(each) for each in values["others"])
     values |= {"cells": tuple(values["cells"]), "others": others, "changes": _settings(values["changes"])}
+    values["mends"] = tuple(values.get("mends", ()))  # tables of before it was written down have none
     return Cure(**values)
 
 

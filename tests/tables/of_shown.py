@@ -1,0 +1,227 @@
+"""Tables of how findings are told that take minutes, releases or a quiet machine to make: they are made up here."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pandas as pd
+from click.testing import CliRunner
+from of_print import numbered
+from of_results import printed, told
+from rich.console import Console
+from telling import Sections
+
+from adapters.conformance import self_test
+from adapters.conformance.self_test import Caught
+from reports import releases as shown
+from reports import speed, tables
+from reports.command import benching, inspecting, main, piles, posing, releasing
+from validation.bench import agreement
+from validation.bench.piles import KINDS, Lap
+from validation.cells import Slot
+from validation.judging.comparison import Change, Kind
+from validation.questions import invariance
+from validation.questions.detection import BlindSpot, Detected
+from validation.releases.bisection import Found, Unchanged
+from validation.releases.environments import Environment
+
+SLOT = Slot("stack", (("n", 2.0), ("mu", 0.1)), 3, "chipmunk", "tuned", 1 / 240, 7)
+
+
+def said(arguments: list[str]) -> dict[str, str]:
+    """What a command prints, and its status."""
+    with patch.dict("os.environ", {"COLUMNS": "120", "NO_COLOR": "1", "TERM": "dumb"}):
+        result = CliRunner().invoke(main, arguments)
+    return {"status": str(result.exit_code)} | numbered(result.stdout, "out") | numbered(result.stderr, "err")
+
+
+def sensitivity() -> Sections:
+    """What checks see and what they are blind to, on the terminal."""
+    entries = [
+        {"name": "stack/creep", "e": "", "mu": "1 %", "g": "0.1 %"},
+        {"name": "impact/apex", "e": "10 %", "mu": "", "g": ""},
+        {"name": "receipt damping", "e": "", "mu": "", "g": ""},
+    ]
+    blind = [
+        BlindSpot("incline", "angle", "g", 0.001, 0.05, ("speed", "drift"), 1 / 1920),
+        BlindSpot("stack", "creep", "mass", 0.2, 0.3, ()),
+    ]
+    text = printed(lambda console: tables.sensitivity(entries, {"spin": ["inertia", "spin"]}, blind, console))
+    with patch.object(inspecting, "detection", lambda *asked, **named: Detected([], blind)):
+        own = {f"command{' as data' * bool(more)}": said(["list", "checks", "--sensitivity", *more])
+               for more in ([], ["--json"])}  # fmt: skip
+    return {"text": text, **own, "refused": said(["list", "scenes", "--sensitivity"])}
+
+
+def clocked_piles() -> Sections:
+    """What steps of piles cost: three sizes of which an exponent is fitted, and one that has none."""
+
+    def laps(kind: str, most: int, seed: int) -> list[Lap]:
+        sizes = [20 * 2**k for k in range(3) if 20 * 2**k <= most]
+        costs = [1e-5 * (1.0 + seed) * (1.0 + 0.1 * k) for k in range(3)]
+        return [Lap(kind, n, cost * n**1.5, cost * n) for n in sizes for cost in costs]
+
+    found = Sections()
+    with patch.object(piles, "laps", laps):
+        for most, as_data in ((80, False), (20, False), (20, True)):
+            console = Console(file=io.StringIO(), width=120, markup=False, emoji=False, no_color=True)
+            runner = CliRunner()
+            with runner.isolation() as streams:
+                piles.show_piles(console, as_data, most, len(KINDS))
+                out = streams[0].getvalue().decode()
+            title = f"up to {most}{', as data' * as_data}"
+            found[title] = numbered(console.file.getvalue(), "shown") | numbered(out, "out")  # type: ignore[attr-defined]
+    return found
+
+
+def tried_faults() -> Sections:
+    """The kit's test of itself, where every fault is caught and where one is not."""
+    rows = [
+        Caught("none: the healthy toy", "all", math.nan, "", True, "every check holds"),
+        Caught("gravity", "free fall", 0.01, "of g", True, "falls too slowly"),
+    ]
+    missed = Caught("drag", "momentum", 0.25, "1/s", False, "ok")
+    found = Sections()
+    for name, told_of in (("caught", rows), ("missed", [*rows, missed])):
+        for more in ([], ["--json"]):
+            with patch.object(self_test, "self_test", lambda told_of=told_of: iter(told_of)):
+                found[" ".join([name, *more])] = said(["check-adapter", "--self-test", *more])
+    return found | {"neither": said(["check-adapter"]), "both": said(["check-adapter", "bullet", "--self-test"])}
+
+
+def bisected() -> Sections:
+    """Changes between two releases: the only one, one of several, nobody knows; and none at all."""
+    versions = ["1.0", "1.1", "1.2", "2.0"]
+    change = Change(
+        next(iter(Kind)),
+        True,
+        "toy",
+        "default",
+        "stack",
+        3,
+        "n=2 mu=0.1",
+        "creep",
+        "pass",
+        "fail",
+        3.25,
+        SLOT.as_dict(),
+    )
+    found = Sections()
+    for name, others in {"unknown": None, "several": ((0, 1), (2, 3)), "only": ()}.items():
+        what = Found(1, 3, (0, 3, 1), {2: "it cannot be imported"}, change, others)
+        for out in ("crosscheck-out", "else where"):
+            commands = releasing._commands("toy", "1.1", "2.0", SLOT, Path(out))
+            plain = shown.found_as_plain(what, "toy", versions, commands)
+            found[f"{name}, {out}"] = numbered(shown.found_as_text(plain), "out") | told(plain)
+    for reason in ("", "release 0 has no answer", "release 3 has no answer"):
+        for as_data in (False, True):
+            found[f"unchanged: {reason}{', as data' * as_data}"] = _left(
+                lambda reason=reason, as_data=as_data: releasing._say_unchanged(
+                    Unchanged(reason), versions, "creep", "stack", as_data
+                )
+            )
+    plain_slot = Slot("<toy>@abc", (), 2, "chipmunk", "default", 1 / 60)
+    found["commands"] = told(releasing._commands("toy", "1", "2", plain_slot, Path("crosscheck-out")))
+    return found
+
+
+def _left(do: Callable[[], object]) -> dict[str, str]:
+    """What is printed before a process is left, and with which status."""
+    runner, status = CliRunner(), "stays"
+    with runner.isolation() as streams:
+        try:
+            do()
+        except SystemExit as end:
+            status = str(end.code)
+        return {"status": status} | numbered(streams[0].getvalue().decode(), "out")
+
+
+def kept_environments() -> Sections:
+    """Environments of releases: sound, spoilt, removed, none."""
+    receipt: dict[str, Any] = {"python": "3.11.4", "packages": {"numpy": "2.0"}, "files": "abc"}
+    found = Sections()
+    for name, wrong in {"sound": "", "spoilt": "numpy is 1.0, not 2.0"}.items():
+        own = [Environment(Path("/x/toy-1.0"), receipt), Environment(Path("/x/toy-2.0"), {})]
+        with (
+            patch.object(releasing.environments, "found", lambda own=own: list(own)),
+            patch.object(releasing.environments, "size", lambda each: 3 * 2**20 + len(each.receipt) * 2**19),
+            patch.object(releasing.environments, "check", lambda each, wrong=wrong: wrong if each.receipt else ""),
+            patch.object(releasing.environments, "folder", lambda: Path("/x")),
+            patch.object(releasing.environments, "remove", own.remove),
+        ):
+            for more in ([], ["--json"], ["--remove", "toy-9"], ["--remove", "toy-1.0"], ["--remove", "all"]):
+                found[" ".join([name, *more])] = said(["releases", "--environments", *more])
+        found[f"{name}, left"] = told([each.name for each in own])
+    return found
+
+
+def times() -> Sections:
+    """Fits of which some sizes are lost, and two benches that agree, do not, and have nothing in common."""
+    names = {"purpose": "bodies", "scene": "pyramid", "dimension": 2, "engine": "bullet", "profile": "tuned"}
+    series = {"dt": 1 / 240, "iterations": 10, "params": {}}
+    sizes = [{**names, **series, "x": x, "per_step": 1e-6 * x * x, "void": ""} for x in (40.0, 10.0, 20.0)]
+    lost = [{**names, **series, "x": x, "per_step": math.nan, "void": f"too slow at {x:g}"} for x in (160.0, 80.0)]
+    other = [{**row, "engine": "chipmunk"} for row in sizes]
+    fits = [{**names, "engine": engine, "exponent": p, "standard_error": 0.02}
+            for engine, p in (("bullet", 2.0), ("chipmunk", math.nan))]  # fmt: skip
+    found = Sections()
+    for title, rows in {"all ran": [*sizes, *other], "some are lost": [*sizes, *lost, *other]}.items():
+        for each in (rows, rows[::-1]):
+            table = speed.scaling_table(pd.DataFrame(each), pd.DataFrame(fits))
+            found[f"{title} {each is rows}"] = printed(lambda console, table=table: console.print(table))
+
+    first = pd.DataFrame(
+        {**names, **series, "sampled": False, "params_text": f"n={k}", "ratio_1": 1.0 + k, "ratio_low_1": 0.9 + k,
+         "ratio_high_1": 1.125 + k, "ratio_2": 1.25 + k, "ratio_low_2": 1.2 + k, "ratio_high_2": 1.4 + k,
+         "agrees": k != 1} for k in range(20)
+    )  # fmt: skip
+    run = type("Run", (), {"id": "20260101-000000"})()
+    for title, both in {"one of twenty": first, "one of three": first[:3], "nothing": first[:0]}.items():
+        with (
+            patch.object(agreement, "ratios", lambda store, run: None),
+            patch.object(agreement, "agreement", lambda a, b, both=both: both),
+        ):
+            good = list[bool]()
+            found[title] = printed(
+                lambda console, good=good: good.append(benching._compare(None, run, run, console)),
+                200,  # type: ignore[arg-type]
+            ) | {"enough": str(good)}
+    return found
+
+
+def posed() -> Sections:
+    """Which cells are posed otherwise, and what the command makes of answers that change."""
+    slots = [Slot("stack", (("n", n),), 2, "chipmunk", profile, dt, iterations, ulp)
+             for n, profile, dt, iterations, ulp in (
+                 (3.0, "tuned", 1 / 240, None, 0), (2.0, "tuned", 1 / 240, None, 0), (2.0, "default", 1 / 240, 4, 0),
+                 (2.0, "default", 1 / 60, None, 0), (2.0, "default", 1 / 240, None, 1),
+                 (5.0, "default", 1 / 240, None, 0),
+             )]  # fmt: skip
+    found = Sections()
+    for named in (False, True):
+        found[f"named: {named}"] = told([slot.as_dict() for slot in posing.cells_of(slots, named)])
+    ends = {"nothing": [invariance.Change("again")],
+            "a break": [invariance.Change("again"), invariance.Change("mirrored", "drift", 1e-3, 1e-6)]}  # fmt: skip
+    for title, changes in ends.items():
+        for as_data in (False, True):
+            runner = CliRunner()
+            with (
+                patch.object(posing, "compare", lambda slot, changes=changes: changes),
+                patch.dict("os.environ", {"COLUMNS": "120", "NO_COLOR": "1", "TERM": "dumb"}),
+                runner.isolation() as streams,
+            ):
+                fine = posing.compare_and_show(slots[:2], as_data)
+                out = streams[0].getvalue().decode()
+            found[f"{title}{', as data' * as_data}"] = {"fine": str(fine)} | numbered(out, "out")
+    return found
+
+
+MAKERS: dict[str, Callable[[], Sections]] = {
+    "shown/sensitivity": sensitivity, "shown/piles": clocked_piles, "shown/self-test": tried_faults,
+    "shown/bisected": bisected, "shown/environments": kept_environments, "shown/times": times, "shown/posed": posed,
+}  # fmt: skip
