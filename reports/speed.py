@@ -123,7 +123,10 @@ def key(ranked: bool) -> str:
 
 
 def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
-    """One table per scene and dimension: cost at equal error; of each level the cheapest and its ties are marked."""
+    """One table per scene and dimension: cost at equal error; of each level the cheapest and its ties are marked.
+
+    Who cannot be asked there (a planar engine in space) is in none: there is nothing to compare.
+    """
     levels = work.time_at_equal_error(points, SHOWN_LEVELS)
     out = []
     for (scene, dimension), group in reading.grouped(levels, ["scene", "dimension"]):
@@ -138,9 +141,11 @@ def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
         for (engine, profile), rows in reading.grouped(group, ["engine", "profile"]):
             own = points[(points["scene"] == scene) & (points["dimension"] == dimension)]
             own = own[(own["engine"] == engine) & (own["profile"] == profile)]
+            if len(own) and (own["outcome"] == Outcome.UNSUPPORTED.value).all():
+                continue
             cells = [_level_cell(row, ranked) for row in rows.to_dict("records")]
             table.add_row(f"{engine}/{profile}", *cells, _smallest(own))
-        out.append(table)
+        out += [table] if table.row_count else []
     return out
 
 

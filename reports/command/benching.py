@@ -169,8 +169,10 @@ def _print_tables(tables: speed.Tables, console: Console) -> None:
     for table in speed.level_tables(tables["work_points"], ranked):
         console.print(table)
     console.print(Text(speed.key(ranked), style="dim"))
-    console.print(speed.overhead_table(tables["overhead"]))
-    console.print(speed.scaling_table(tables["scaling"], tables["scaling_fits"]))
+    beside = speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"])
+    for table in beside:
+        if table.row_count:  # a short bench may have come to none of it
+            console.print(table)
 
 
 def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:

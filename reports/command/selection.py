@@ -111,7 +111,7 @@ def request_from(options: dict[str, Any]) -> Request:
 
 
 def asked(request: Request, options: dict[str, Any]) -> str:
-    """Words that ask for these cells but their suite, ready to paste: ``bounce --param e=0.8 --engine bullet``."""
+    """Words that ask for these cells but their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
     names = ("param", "engine", "profile", "dim", "dt", "iterations", "ulp")
     narrowing = [word for name in names for value in options[name] for word in (f"--{name}", str(value))]
     return shlex.join([*request.scenes, *narrowing])

@@ -2,6 +2,7 @@
 
 import io
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -40,7 +41,7 @@ def printed(tmp_path):
     """Print a bench whose engines cost `COSTS`; ``busy`` of them had their core taken for half of the wall time."""
     stores = []
 
-    def show(busy=()):
+    def show(busy=(), planar=0):
         store = Store(tmp_path / f"results-{len(stores)}")
         stores.append(store)
         delays = [variation["delay"] for variation in primary_of("impact").variations(DT)]
@@ -50,6 +51,9 @@ def printed(tmp_path):
                         metrics={"rebound_ratio": (truth + error, "")})
             for engine, error in ERRORS.items() for delay in delays
         ]  # fmt: skip
+        for engine in ("chipmunk", "mujoco")[:planar]:
+            slots = [replace(slot_of(engine, delay), dimension=3) for delay in delays]
+            cells += [Observation(slot, slot.key(), 1, "1.0", Outcome.UNSUPPORTED, "it is planar") for slot in slots]
         run, _ = store.start("bench test", [cell.slot for cell in cells], fresh=True)
         for cell in cells:
             store.add(run, cell)
@@ -85,6 +89,13 @@ def test_the_cheapest_is_marked_and_whoever_is_not_told_apart_from_it_is_a_tie(p
     assert [cells[name][2] for name in COSTS] == ["* 1 ms 1/240", "= 1.01 ms 1/240", "-"]
     assert "=: a tie, its interval overlaps the cheapest" in text
     assert "This machine was busy" not in text
+
+
+def test_who_cannot_be_asked_is_in_no_table_and_a_table_of_nothing_is_none(printed):
+    """``unsupport...`` stood where an error belongs, and headings over nothing."""
+    text = printed(planar=2)
+    assert text.count("chipmunk/default") == 1 and "impact 3-D" not in text and "unsupported" not in text
+    assert "Binding" not in text and "Cost of a step" not in text
 
 
 def test_a_busy_machine_is_said_and_ranks_nobody(printed):

@@ -73,6 +73,15 @@ def test_the_command_writes_the_page_and_prints_its_path(page_folder, tmp_path):
     assert (tmp_path / "r.html").read_text().startswith("<!doctype html>")
 
 
+@pytest.mark.parametrize("found", [True, False])
+def test_the_page_is_opened_where_that_is_asked_for(page_folder, tmp_path, monkeypatch, found):
+    opened, path = [], tmp_path / "page.html"
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or found)
+    result = CliRunner().invoke(main, ["report", "--open", "--out", str(page_folder), "-o", str(path)])
+    assert (result.exit_code, opened) == (0, [path.as_uri()])
+    assert ("no browser was found" in result.stderr) is not found
+
+
 def test_a_report_of_nothing_exits_with_two_and_one_line(tmp_path):
     result = CliRunner().invoke(main, ["report", "--out", str(tmp_path / "empty")])
     assert result.exit_code == 2

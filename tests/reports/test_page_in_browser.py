@@ -184,6 +184,27 @@ def test_the_replay_draws_at_every_width_and_when_nothing_of_it_is_seen(browser,
         page.evaluate("document.getElementById('player').hidden = true; dispatchEvent(new Event('resize'))")
 
 
+#: Heights of the topmost marks in columns of the replay, from the top, as shares of the canvas.
+TOPMOST = (
+    "shares => { const c = document.getElementById('replay-canvas'), w = c.width, h = c.height;"
+    "const all = c.getContext('2d').getImageData(0, 0, w, h).data;"
+    "return shares.map((share) => { const x = Math.round(share * (w - 1));"
+    "for (let y = 0; y < h; y++) if (all[4 * (y * w + x) + 3] > 40) return y / h; return -1; }); }"
+)
+
+
+@pytest.mark.parametrize(("scene", "falls"), [("impact", False), ("incline", True)])
+def test_gravity_points_down_so_that_an_incline_is_inclined(browser, page_file, scene, falls):
+    """The scene is posed with its floor level and gravity aslant; beside the bodies the floor alone is drawn."""
+    with opened(browser, page_file, "#replay") as page:
+        page.select_option("#replay-scene", f"replay-{scene}-2")
+        page.select_option("#replay-layout", "over")
+        page.locator("#replay-time").press("Home")
+        left, right = page.evaluate(TOPMOST, [0.05, 0.25])
+        assert left > 0.0 and right > 0.0
+        assert (right - left > 0.1) if falls else (abs(right - left) < 0.01)
+
+
 def test_no_name_of_a_lane_is_cut_off_by_the_next_lane(browser, page_file):
     """On a phone lanes stand in several rows: the name of each must fit beside its square."""
     with opened(browser, page_file, "#replay", width=320) as page:

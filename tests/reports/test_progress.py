@@ -48,6 +48,16 @@ def test_the_line_counts_every_cell_that_ends_and_names_the_last(planned):
     assert run.finished and {o.slot for o in planned.store.observations(run)} == set(SLOTS)
 
 
+def test_kernels_are_compiled_before_the_first_cell_has_a_clock_and_for_no_cluster(planned, monkeypatch):
+    order = []
+    monkeypatch.setattr(progress, "warm_up", lambda slots, jobs, console: order.append((list(slots), jobs)))
+    planned(lambda todo, leave: order.append("cells") or map(answer, todo), jobs=1)
+    assert order == [(SLOTS, 1), "cells"]
+    monkeypatch.setattr(progress, "run_cells_on", lambda where, todo, *rest: map(answer, todo))
+    planned(None, cluster="tcp://elsewhere:1", fresh=True)
+    assert order[2:] == []  # its machines have caches of their own
+
+
 def test_who_writes_into_a_file_gets_no_line(planned):
     _, said = planned(lambda todo, leave: map(answer, todo), terminal=False)
     assert counted(said) == [] and "\x1b" not in said
