@@ -111,3 +111,10 @@ def test_what_passes_as_shipped_has_no_cure():
     pytest.importorskip("pymunk")
     with pytest.raises(ValueError, match="no cure"):
         measure("chipmunk", Cured("default", "tuned", "incline", ({},)))
+
+
+def test_every_cure_that_is_named_is_measured_with_the_workers_that_are_asked_for(monkeypatch):
+    engine = ENGINES[0]
+    monkeypatch.setattr(decisive, "measure", lambda *asked: asked)
+    assert decisive.measure_all(engine, 3) == [(engine, target, 3) for target in cured_of(engine)]
+    assert decisive.measure_all(engine) == [(engine, target, 1) for target in cured_of(engine)]
