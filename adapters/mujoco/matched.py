@@ -117,7 +117,8 @@ def rebounding(scene: Scene) -> list[tuple[int, int, float]]:
 
 def law_of(settings: Mapping[str, Any]) -> tuple[float, float, int, float]:
     """What `matched_step2` is handed as law."""
-    return float(settings["push_out"]), float(settings["push_out_speed"]), int(settings["rounds"]), AGREED
+    push, fastest, agreed = (float(settings[name]) for name in ("push_out", "push_out_speed", "agreed"))
+    return push, fastest, int(settings["rounds"]), agreed
 
 
 #: Line of a script that makes the second half of a step.
