@@ -54,6 +54,21 @@ ON_MATCHED: tuple[Experiment, ...] = (
             ("domino", "struck_spin", dict[str, float](), 2, _FINE),
         )
     ),
+    *(
+        Experiment(
+            "head-on-unfinished",
+            "with Newton's method to its end what lasts carries nothing; more rounds, or shifts that agree to less, do "
+            "nothing",
+            "matched",
+            "head_on",
+            "impulse",
+            _FURTHER,
+            {"e": 0.0, "ratio": 1e5},
+            dimension=dimension,
+            idle=(_ROUNDS, {"agreed": 1e-15}),
+        )
+        for dimension in (2, 3)
+    ),
     Experiment(
         "card-tent-let-go",
         "with a margin ten times as wide feet and heads stay in contact; push-out or more rounds do nothing",
