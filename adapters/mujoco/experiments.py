@@ -8,6 +8,7 @@ from adapters.experiment import Cured, Experiment
 from adapters.mujoco.experiments_elsewhere import elsewhere
 from adapters.mujoco.experiments_on_blows import on_blows
 from adapters.mujoco.experiments_on_loads import on_loads
+from adapters.mujoco.experiments_on_matched import ON_MATCHED
 from adapters.mujoco.experiments_on_rods import on_rods
 
 #: Iterations are left alone: Newton's count is a limit that is not reached.
@@ -332,3 +333,5 @@ EXPERIMENTS += on_blows(_REFLECT)
 EXPERIMENTS += on_rods(_REFLECT, _HOLD)
 
 EXPERIMENTS += elsewhere(_REFLECT, _HOLD, _SLIDE)
+
+EXPERIMENTS += ON_MATCHED

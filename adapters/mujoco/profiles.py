@@ -120,6 +120,7 @@ def matched(needs: Needs, dt: float) -> list[Setting]:
         Setting("tolerance", SOLVED, "Newton goes on until a step gains no more than round-off", MEASURED),
         Setting("margin", depth, "bodies that touch at a distance of exactly 0 are in contact", f"{DOC}, margin"),
         Setting("rounds", _rounds(needs.friction), "enough for the shifts to agree without the secant", DE_SAXCE),
+        Setting("agreed", AGREED, "share of the contacts' largest acceleration that rounds end at", DE_SAXCE),
         Setting("push_out", KAPPA, "share of an overlap that a step takes away", CARRIES),
         Setting("push_out_speed", fall, "no faster than the load brings it back in a step: nothing hops", NEWTON),
     )
@@ -160,12 +161,13 @@ NUMBERS = {
     "kappa_elastic": (0.0, False),
     "kappa_plastic": (0.0, False),
     "rounds": (1, True),
+    "agreed": (0.0, False),
     "push_out": (0.0, False),
     "push_out_speed": (0.0, False),
 }
 NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
 ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
-ONLY_MATCHED = frozenset({"rounds", "push_out", "push_out_speed"})
+ONLY_MATCHED = frozenset({"rounds", "agreed", "push_out", "push_out_speed"})
 #: Settings that only a model brings (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
 #: switched off, and pairs (indices of bodies) with a softness of their own.
 BROUGHT = frozenset({"solver", "disabled", "apart"})

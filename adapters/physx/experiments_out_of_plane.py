@@ -56,6 +56,8 @@ _ROWS: tuple[tuple[str, str, dict[str, float], int | None, _Settings, tuple[_Set
     ("rocking_block", "tuned", _SLIM, None, {**_WHOLE, **_BOTH}, (_WHOLE, _ANEW, _UNSEEN), 0.0),
     ("stack", "default", {"n": 10.0}, None, _SWEPT, (_WHOLE, _ANEW), 0.0),
     ("stack", "default", {"n": 10.0}, 1, _SWEPT, (_WHOLE, _ANEW), 0.0),
+    *(("stack", profile, {"n": 10.0}, count, _SWEPT, (_ANEW,), 0.0)
+      for profile in ("default", "pgs", "tuned") for count in (4, 10)),
     ("stack", "pgs", {"n": 10.0}, None, _SWEPT, (_ANEW, _UNSEEN), 0.0),
     ("stack", "tuned", {"n": 10.0}, None, _SWEPT, (_ANEW,), 0.0),
     ("tilt_table", "pgs", {"aspect": 1.0}, None, _SWEPT, (_ANEW, _UNSEEN), 0.0),

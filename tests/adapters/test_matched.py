@@ -20,6 +20,7 @@ from adapters.registry import is_ranked
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
+from validation.posed import resolve
 
 ENGINE = MujocoEngine()
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
@@ -230,6 +231,15 @@ def test_a_run_in_which_shifts_do_not_settle_says_so_and_is_not_certified() -> N
     assert settled(drive(scene))
 
 
+@pytest.mark.parametrize("ratio", [1e-6, 1e-5, 1e5])
+def test_what_moves_on_together_has_nothing_to_agree_about_but_roundings(ratio: float) -> None:
+    """Two balls of which one weighs next to nothing: after a blow with e = 0 the contact lasts and carries nothing.
+
+    All that shifts are made of is one rounding of 4 m/s over a step, and they cannot agree to a share of that.
+    """
+    assert settled(drive(resolve("head_on").scene(2, {"ratio": ratio, "e": 0.0})))
+
+
 # ---- what it is --------------------------------------------------------------------------------------------------
 
 
@@ -245,7 +255,12 @@ def test_it_is_matched_has_no_rank_and_flies_like_tuned() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "said"),
-    [({"rounds": 0}, "rounds: 0"), ({"push_out": -0.1}, "push_out: -0.1"), ({"kappa_plastic": 0.1}, "kappa_plastic")],
+    [
+        ({"rounds": 0}, "rounds: 0"),
+        ({"agreed": -1.0}, "agreed: -1"),
+        ({"push_out": -0.1}, "push_out: -0.1"),
+        ({"kappa_plastic": 0.1}, "kappa_plastic"),
+    ],
 )
 def test_settings_of_the_loop_are_checked(changes: dict[str, Any], said: str) -> None:
     scene = scene_of(FLOOR, slab(), mu=0.5, g=DOWN)
