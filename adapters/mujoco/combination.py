@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-#: Weights below this count as none (mjMINVAL).
+#: Weights, masses and moments below this count as none (mjMINVAL).
 MINVAL = 1e-15
 
 Row = tuple[float, ...]

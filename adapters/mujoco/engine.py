@@ -16,6 +16,7 @@ from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.mujoco.box_on_face import BoxOnFace
+from adapters.mujoco.combination import MINVAL
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
@@ -112,10 +113,13 @@ class MujocoEngine(Engine):
         return str(mujoco.__version__)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse inertias that no mass distribution has: MuJoCo does not compile them."""
+        """Refuse inertias that no mass distribution has, and those that count as none: MuJoCo does not compile them."""
         for body in scene.bodies:
             if body.motion == "free":
                 a, b, c = sorted(moments(body))
+                if min(body.mass, a) < MINVAL:
+                    what, least = ("mass", body.mass) if body.mass < MINVAL else ("inertia", a)
+                    return f"{body.name}.{what}: {least:g} is less than {MINVAL:g}, which a moving body must have"
                 if a + b < c * (1.0 - 1e-9):
                     return f"{body.name}.inertia: {a:g} + {b:g} < {c:g}, no mass distribution has these moments"
         return None
