@@ -12,7 +12,11 @@ SUBJECTS = {
     "validation/findings/__init__.py": ("validation/test_findings.py", "validation/test_acceptance.py"),
     "validation/findings/files.py": ("validation/test_findings.py",),
     "validation/judging/acceptance.py": ("validation/test_acceptance.py",),
-    "validation/bounds.py": ("validation/test_worked_bounds.py", "validation/test_tolerances.py"),
+    "validation/bounds.py": (
+        "validation/test_worked_bounds.py",
+        "validation/test_tolerances.py",
+        "validation/test_planes.py",
+    ),
     "validation/truths/columns.py": ("validation/test_worked_bounds.py", "validation/scenes/test_columns.py"),
     "validation/scenes/impact.py": (
         "validation/scenes/test_impact.py",
@@ -69,7 +73,7 @@ SUBJECTS = {
         "validation/test_acceptance.py",
     ),
     "validation/judging/comparison.py": ("validation/test_comparison.py",),
-    "adapters/lift.py": ("adapters/test_lift.py",),
+    "adapters/lift.py": ("adapters/test_lift.py", "validation/test_planes.py"),
     "adapters/plain.py": ("adapters/test_plain.py",),
     "adapters/needs.py": ("adapters/test_needs.py",),
     "adapters/scene.py": ("adapters/test_scene.py",),
