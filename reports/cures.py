@@ -108,6 +108,17 @@ def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: 
     return [cure_text(cure) for cure in known]
 
 
+def told_cure(row: Mapping[str, Any]) -> str:
+    """What was measured to mend the check of one row, or that it is not among what the scene's cure mends."""
+    cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
+    if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
+        return ""
+    kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
+    if not cure.helps or row["metric"].partition("[")[0] in kinds:
+        return cure_text(cure)
+    return f"none is known of this check; of {', '.join(kinds)} in this scene: {cure_text(cure)}"
+
+
 def cure_text(cure: Cure, where: str = "") -> str:
     """``2-D by cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
     where = where or f"{cure.dimension}-D"

@@ -18,7 +18,7 @@ from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
-from reports.cures import Change, changes, how_measured, pasteable, told_cures
+from reports.cures import Change, changes, how_measured, pasteable, told_cure
 from reports.findings import ALARMING, Family, families, grouped, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
@@ -415,8 +415,8 @@ def _print_explanation(
         lines.append(("cure", f"profile {better} passes this row. It differs in:"))
         lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing]
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
-    told = told_cures(row["engine"], row["engine_version"], row["scene"], row["profile"], [row["dimension"]])
-    lines += [("smallest" if better else "cure", text) for text in told if mark_of(row) != "pass"]
+    told = told_cure(row) if mark_of(row) != "pass" else ""
+    lines += [("smallest" if better else "cure", told)] if told else []
     lines.append(("again", reproduce(row["slot"])))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from adapters.engine_folder import CURES, inside
 from adapters.registry import find, names
 from reports.command import main
-from reports.cures import cure_paste, cure_text, decided_by, told_cures
+from reports.cures import cure_paste, cure_text, decided_by, told_cure, told_cures
 from validation.posed import resolve
 from validation.settings import cures
 from validation.settings.cures import Cure, Unsearched, _best, _Trials, asked_of, cures_of, read, search, write
@@ -72,6 +72,23 @@ def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
     assert decided_by("mujoco", "4.0.1", "pinch", [3], "default", "tuned") == ""
     planar = decided_by("mujoco", "4.0.1", "pinch", [2], "default", "tuned")
     assert planar and decided_by("mujoco", "4.0.1", "pinch", [2, 3], "default", "tuned") == f"{planar} (2-D)"
+
+
+def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
+    listed = {("pinch", 2): replace(CURE, mends=("creep", "turned"))}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
+    row |= {"metric": "turned"}
+    assert told_cure(row) == cure_text(CURE)
+    other = told_cure({**row, "metric": "out_of_plane"})
+    assert other == f"none is known of this check; of creep, turned in this scene: {cure_text(CURE)}"
+    assert told_cure({**row, "dimension": 3}) == told_cure({**row, "profile": "tuned"}) == ""
+    assert told_cure({**row, "engine_version": "4.0.2"}) == ""
+    listed["pinch", 2] = CURE  # a table of before kinds were written down: what it tells is of its own metric
+    assert told_cure({**row, "metric": "creep[1]"}) == cure_text(CURE)
+    assert "none is known" in told_cure(row)
+    listed["pinch", 2] = replace(CURE, left=5, changes={})
+    assert told_cure({**row, "metric": "out_of_plane"}).startswith("2-D: none of 45 changes")
 
 
 def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
