@@ -1,5 +1,6 @@
 """Bodies that cannot meet within a step are stepped apart: what happens elsewhere changes nothing, to the last bit."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
 from reference_solver.compilation import from_python
+from reference_solver.pieces import FORCES
 from reference_solver.stepping.islands import allocate_islands, may_meet
 
 DOWN = (0.0, -9.81)
@@ -162,3 +164,20 @@ def test_what_a_body_reaches_has_room_for_the_distance_at_which_contacts_are_kep
     simulation.advance(1)
     model = simulation._world._world
     assert (model.islands.reach[1:] > 0.3).all() and (model.islands.reach[1:] < 0.31).all()
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_whoever_a_struck_disc_meets_beyond_its_bounds_is_met_whatever_the_order(order):
+    """A heavy disc, a light one that it strikes, and one that this one strikes: all along one line, e = 0."""
+    bodies = [disc(0.0, 9.0, 6.0, mass=1e9), disc(0.61, 9.0), disc(1.26, 9.0)]
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    model = Model(2, [floor, *(bodies[i] for i in order)], (0.0, 0.0), 0.0, 0.0)
+    simulation = Simulation(model, Settings.reference(DT))
+    simulation.advance(1)
+    assert simulation.twist[1:, 0] == pytest.approx([6.0] * 3, abs=1e-6)
+    assert islands_of(simulation) == [1, 1, 1]
+    assert simulation.certificate["holds"], simulation.certificate["reasons"]
+    again = Simulation(model, Settings.reference(DT)).record(1, pieces=True)
+    assert np.array_equal(again.pose[-1], simulation.pose)
+    times = again.pieces.length[again.pieces.kind == FORCES]
+    assert times.sum() == pytest.approx(DT, rel=1e-12)  # what was made anew has left no piece

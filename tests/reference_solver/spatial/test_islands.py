@@ -1,6 +1,8 @@
 """Bodies that cannot meet within a step are stepped apart, as in the plane."""
 
+import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,3 +94,98 @@ def test_a_pair_that_no_impulses_keep_apart_ends_the_run_and_is_named():
     certificate = simulation.certificate
     assert any("no impulses keep bodies 0 and 3 apart" in reason for reason in certificate["reasons"])
     assert not np.isfinite(simulation.pose[3, :3]).any()
+
+
+def islands_of(simulation):
+    """Which bodies made their last step together."""
+    label = simulation._world._world.islands.label
+    return [int(label[i]) for i in range(len(label)) if simulation.model.bodies[i].motion == "free"]
+
+
+def test_only_what_may_meet_is_one_island_and_what_can_meet_nobody_flies_together():
+    """Two balls askew, whose boxes overlap; two that fall over a floor, and one that reaches it within the step."""
+    falling = [ball(5.0, 4.0), ball(-5.0, 3.0), ball(0.0, 0.3 + 0.2 * DT, 0.0, -1.0)]
+    for distance, pair in ((0.65, [1, 1]), (0.605, [1, 1])):
+        askew = distance / math.sqrt(2.0)
+        simulation = world([ball(20.0, 5.0), ball(20.0 + askew, 5.0 + askew), *falling])
+        simulation.advance(1)
+        others = [1, 1] if distance > 0.62 else [3, 3]
+        assert islands_of(simulation) == [*pair, *others, 5]
+    lands = 1.0 + 0.2 * 9.81 * DT
+    assert simulation.twist[5, 2] == pytest.approx(0.4 * lands - 0.8 * 9.81 * DT, rel=0.01)
+
+
+def test_a_load_takes_bodies_farther_than_their_speed():
+    """Two balls at rest, 1 mm and the margins of both apart, that a force drives together: they meet."""
+    gap = 0.001 + 4.0 * 0.003
+    push = 2.0 * (gap / 2.0) / DT**2 * 1.5  # each goes .75 of the gap
+    bodies = [ball(x, 9.0) for x in (0.0, 0.6 + gap)]
+    bodies = [replace(body, force=(sign * push, 0.0, 0.0)) for body, sign in zip(bodies, (1.0, -1.0), strict=True)]
+    simulation = world(bodies, restitution=0.0, gravity=(0.0, 0.0, 0.0))
+    simulation.advance(1)
+    assert islands_of(simulation) == [1, 1]
+    assert simulation.pose[2, 0] - simulation.pose[1, 0] == pytest.approx(0.6, abs=1e-9)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_whoever_a_struck_ball_meets_beyond_its_bounds_is_met_whatever_the_order(order):
+    """A heavy ball, a light one that it strikes, and one that this one strikes: all along one line, e = 0."""
+    bodies = [ball(0.0, 9.0, 6.0, mass=1e9), ball(0.61, 9.0), ball(1.26, 9.0)]
+    simulation = world([bodies[i] for i in order], restitution=0.0, friction=0.0, gravity=(0.0, 0.0, 0.0))
+    simulation.advance(1)
+    speed = simulation.twist[1:, 0]
+    assert speed == pytest.approx([6.0] * 3, abs=1e-6)
+    assert islands_of(simulation) == [1, 1, 1]
+    assert simulation.certificate["holds"], simulation.certificate["reasons"]
+
+
+def test_a_floor_that_turns_may_meet_whatever_it_can_turn_to():
+    """A half-space about a far pivot: what lies over it now is hit by it within the step."""
+    floor = Body(
+        HalfSpace((0.0, 0.0, 1.0)),
+        motion="prescribed",
+        pose=(0.0, 0.0, 0.0, *UPRIGHT),
+        twist=(0.0, 0.0, 0.0, 0.0, -3.0, 0.0),
+    )
+    simulation = Simulation(Model(3, [floor, ball(30.0, 1.0)], (0.0, 0.0, 0.0), 0.0, 0.0), Settings.reference(DT))
+    simulation.advance(1)
+    assert simulation.twist[1, 2] > 10.0
+
+
+@pytest.mark.parametrize(("place", "offset", "lean"), [(2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 2.0, 0.5)])
+def test_a_floor_is_where_its_pose_and_its_offset_take_it(place, offset, lean):
+    """A ball that touches within the step is an island by itself; one that does not flies with the others."""
+    normal = np.array([math.sin(lean), 0.0, math.cos(lean)])
+    turn = (math.cos(0.5 * lean), 0.0, math.sin(0.5 * lean), 0.0)
+    at = np.array([0.0, 0.0, place])
+    floor = Body(HalfSpace((0.0, 0.0, 1.0), offset), motion="fixed", pose=(*at, *turn))
+    for gap, apart in ((0.5 * DT, True), (4.0 * DT, False)):
+        foot = at + (offset + 0.3 + gap) * normal
+        places = (foot + 9.0 * normal, foot, foot + 5.0 * normal)
+        bodies = [replace(ball(0.0, 0.0), pose=(*x, *UPRIGHT)) for x in places]
+        bodies[1] = replace(bodies[1], twist=(*(-normal), 0.0, 0.0, 0.0))
+        simulation = Simulation(Model(3, [floor, *bodies], (0.0, 0.0, 0.0), 0.0, 0.0), Settings.reference(DT))
+        simulation.advance(1)
+        assert islands_of(simulation) == ([1, 2, 1] if apart else [1, 1, 1])
+        assert (abs(simulation.twist[2, :3] @ normal) < 1e-12) == apart  # it has landed, or has not
+
+
+def test_what_a_body_reaches_has_room_for_the_distance_at_which_contacts_are_kept():
+    """A ball its radius, a turned box half its diagonal."""
+    simulation = world([ball(0.0, 5.0), tipping(3.0)])
+    simulation.advance(1)
+    for reach, far, width in zip(
+        simulation._world._world.islands.reach[1:], (0.3, math.sqrt(0.38)), (0.3, 0.2), strict=True
+    ):
+        assert reach == pytest.approx(far + 0.01 * width, rel=1e-12)
+
+
+def test_every_body_of_every_island_ends_where_it_moved_and_its_contact_is_remembered():
+    """Pairs of islands with neighbouring numbers, of one shape and different speeds; nothing sweeps anew at rest."""
+    bodies = [ball(float(k), 0.3, 0.1 * k) for k in (0, 3, 6, 9)] + [ball(2.0 + 20.0 * k, 0.3 + k) for k in (1, 2)]
+    simulation = world(bodies, restitution=0.0, friction=0.0)
+    simulation.advance(1)
+    before = simulation.certificate["sweeps"]
+    simulation.advance(20)
+    assert simulation.pose[1:5, 0] == pytest.approx([k + 0.1 * k * 21 * DT for k in (0, 3, 6, 9)], abs=1e-13)
+    assert simulation.certificate["sweeps"] == before  # what carried it a moment ago carries it now
