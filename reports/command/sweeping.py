@@ -77,7 +77,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     if options["parquet"]:
         found.to_parquet(files["parquet"], index=False)
     if as_json:
-        click.echo(found.to_json(orient="records", double_precision=15))
+        click.echo(json.dumps(json.loads(found.to_json(orient="records", double_precision=15)), indent=1))
     console.print(counted(found))
     console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)

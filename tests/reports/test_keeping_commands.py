@@ -86,9 +86,13 @@ def test_merge_says_what_came(out, tmp_path):
 def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
     call("merge", out, "--out", tmp_path)
     assert "name a rule" in call("prune", "--out", tmp_path, status=2).output
+    # Two runs that ask differently have different titles: none is a repetition of the other.
+    assert "0 runs would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
+    again = ("impact", "--engine", "chipmunk", "--dim", 2, "--param", "v=3", "--fresh", "--jobs", 1)
+    call("run", *again, "--out", tmp_path)
     assert "1 run would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
     assert "1 run went" in call("prune", "--keep", 1, "--out", tmp_path).stdout
-    assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 1
+    assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 2
 
 
 def test_a_run_that_neither_machine_finished_is_not_finished_by_a_merge(out, tmp_path):
