@@ -94,6 +94,8 @@ def valid(dice, steps, dt):
         data["constants"] = {"h": 1.5, "late": "0.5 * h"}
         data["checks"] = [{"quantity": f"{free}.{'y' if d == 2 else 'z'}", "value": "h - 0.5 * g * t ** 2",
                            "tolerance": "h + late + g * dt"}]  # fmt: skip
+    if d == 2 and dice.random() < 0.3:
+        data["growth"] = dice.choice((5e4, "exp(2 * t)"))
     return data
 
 
