@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adapters import stepping
-from adapters.lift import lift
+from adapters.lift import lift, size_across
 from adapters.needs import needs
 from adapters.planted_faults import Planted
 from adapters.receipts import Receipt
@@ -260,3 +260,36 @@ def test_without_gravity_the_largest_load_over_its_mass_stands_for_it():
     assert found.bound == pytest.approx(10.0 * DT**2, rel=1e-4) and "F dt^2/m" in found.because
     heavy = bounds.planar(replace(scene, gravity=(0.0, -1.0)), DT)
     assert heavy.bound == pytest.approx(DT**2, rel=1e-3) and "g dt^2" in heavy.because
+
+
+def test_a_plane_that_is_not_judged_is_a_check_all_the_same():
+    scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
+    found = bounds.planar(scene, DT, 1e12)
+    assert (found.metric, found.unit, found.truth, found.bound, found.source) == ("out_of_plane", "m", None, None, "")
+    judged = bounds.planar(scene, DT)
+    assert (judged.metric, judged.unit, judged.truth) == ("out_of_plane", "m", 0.0)
+    assert judged.source == "what is lifted is its own mirror image in its plane"
+
+
+def test_where_nobody_is_free_no_load_is_granted_and_the_scene_itself_is_the_smallest():
+    fixed = replace(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), motion="fixed")
+    found = bounds.planar(flying(fixed, (0.0, 0.0)), DT)
+    assert found.bound == pytest.approx(1e-9 * 5.5, rel=1e-12)  # places alone
+    assert bounds.planar(flying(fixed, (0.0, 0.0)), DT, 0.9e10).bound is not None
+    assert bounds.planar(flying(fixed, (0.0, 0.0)), DT, 1.1e10).bound is None
+
+
+def test_what_a_motion_multiplies_by_is_told_in_full_below_a_hundred_thousand():
+    scene = flying(Body("a", Disc(0.5), 1.0, 0.1), (0.0, 0.0))
+    for growth, said in ((1.0, "1000"), (99999.4, "99999"), (100000.0, "1e+05"), (123456.0, "1.2e+05")):
+        assert f"grown {said} times" in bounds.planar(scene, DT, growth).because
+
+
+def test_a_saddle_beyond_all_numbers_is_told_as_the_last_that_has_one():
+    assert bounds.saddle(701.0) == bounds.saddle(1e9) == math.cosh(700.0)
+
+
+def test_an_attitude_is_no_place():
+    """A disc at 3, 4 m that has turned by 1000 rad is 5.5 m across, and owes its plane no more than that."""
+    turned = Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 1000.0))
+    assert size_across(flying(turned, (0.0, 0.0))) == pytest.approx(5.5, rel=1e-12)
