@@ -16,6 +16,7 @@ from reports.matrix import (
     matrix_of,
     sweeps_of,
     tables_of,
+    unranked,
     versions_of,
 )
 
@@ -197,3 +198,16 @@ def test_what_leaves_the_plane_is_told_by_cells_at_the_profiles_own_iterations()
     assert leaving([*flat, lost, *tipping]) == [
         "Planar cells that leave their plane in space: deep/soft 2 of 3 (most of all pinch, by 0.25 m)"
     ]
+    others = [cell("wide", far, scene=scene) for far, scene in ((0.1, "stack"), (0.3, "arch"), (0.2, "slide"))]
+    assert leaving([*tipping, *others]) == [
+        "Planar cells that leave their plane in space: deep/soft 2 of 3 (most of all pinch, by 0.25 m), "
+        "wide/soft 3 of 3 (most of all arch, by 0.3 m)"
+    ]
+
+
+def test_a_profile_in_no_ranking_says_what_it_is_and_nobody_else_does():
+    """MuJoCo's `matched` is one; an engine that nobody knows is not asked."""
+    columns = [("mujoco", "default"), ("mujoco", "matched"), ("nobody", "matched"), ("chipmunk", "tuned")]
+    [line] = unranked(columns)
+    assert line.startswith("mujoco/matched: the textbook's law in the place of the engine's own")
+    assert unranked(columns[:1]) == unranked(columns[2:]) == []
