@@ -145,6 +145,8 @@ def test_a_plane_is_kept_to_a_thousand_roundings_of_the_largest_numbers():
         if 2 not in canonical.dimensions:
             continue
         scene = replace(canonical.scene(2), gravity=(0.0, 0.0))
+        bodies = tuple(replace(body, force=(0.0, 0.0)) for body in scene.bodies)  # a step of either is granted apart
+        scene = replace(scene, bodies=bodies)
         value, band = plane_law(scene, DT, canonical.measure)
         assert value == 0.0
         assert band == pytest.approx(5000.0 * 2.0**-24 * bounds.planar(scene, DT).bound / 1e-9, rel=1e-12), name

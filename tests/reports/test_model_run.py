@@ -120,7 +120,7 @@ def test_a_robot_in_urdf_runs_as_well(tmp_path):
         "--param",
         "duration=0.3",
     )
-    done = call(*words, "--param", "duration=0.3", "--jobs", 1, "--out", tmp_path, "--json", status=(0, 1))
+    done = call(*words, "--jobs", 1, "--out", tmp_path, "--json", status=(0, 1))
     rows = json.loads(done.stdout)
     assert {row["dimension"] for row in rows} == {2, 3} and {row["outcome"] for row in rows} == {"ok"}
     assert "friction 1 in all pairs" in done.stderr
