@@ -13,9 +13,7 @@ DRAWN = Path(__file__).resolve().parent / "sample.csv"
 #: Engines that are set apart: their tests are skipped where they are not installed.
 APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx", "newton"))
 #: Seconds of CPU of a test file that are recorded, and of tests that are run against one mutant.
-RECORDED, SPENT = 4.0, 30.0
-#: The same of tables that are kept: a file of them asks all scenes, laws or commands, one a test.
-TABLES, OF_TABLES = "tests/tables/", 12.0
+RECORDED, SPENT = 12.0, 30.0
 #: Seconds of CPU of the shared fixtures of test files that are run against one mutant.
 SHARED = 30.0
 #: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
@@ -51,15 +49,9 @@ class Drawn:
 #: What a mutant meets that is drawn today.
 MEETS = (
     f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those "
-    f"that a test file begins within {RECORDED:g} s (6 s for most, {OF_TABLES:g} s for some and for tables that are "
-    f"kept) beside its shared fixtures; then, unless its form tells that it changes words, for {LONGEST:g} s what "
-    f"{REST_OF} of the files that go on has beyond them"
+    f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
+    f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"
 )
-
-
-def seconds_of(test_file: str) -> float:
-    """Seconds of CPU of a test file that are recorded."""
-    return OF_TABLES if test_file.startswith(TABLES) else RECORDED
 
 
 def stored() -> list[Drawn]:

@@ -19,7 +19,7 @@ import os
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -151,16 +151,16 @@ def environment(copy: Path, folder: Path, seconds: float, asked: Path | None = N
     return {**os.environ, **own, "PYTHONDONTWRITEBYTECODE": "1", "PYTHONHASHSEED": "0"}
 
 
-def record(copy: Path, records: Path, limit_of: Callable[[str], float]) -> None:
+def record(copy: Path, records: Path, seconds: float) -> None:
     """Record every test file that has no record, or a shorter one that ended before it, in an instrumented copy.
 
-    ``limit_of`` tells the seconds of CPU of a file. The copy is as it was afterwards.
+    The copy is as it was afterwards.
     """
     records.mkdir(parents=True, exist_ok=True)
     shutil.copy2(Path(__file__).with_name("recording.py"), copy / f"{PLUGIN}.py")
     known = recorded(records)
     lacking = [name for name in test_files()
-               if name not in known or not (known[name].whole or known[name].limit >= limit_of(name))]  # fmt: skip
+               if name not in known or not (known[name].whole or known[name].limit >= seconds)]  # fmt: skip
     if not lacking:
         return
     modules = [str(path.relative_to(copy)) for name in PACKAGES for path in (copy / name).rglob("*.py")]
@@ -168,7 +168,6 @@ def record(copy: Path, records: Path, limit_of: Callable[[str], float]) -> None:
     spoilt = {module: instrumented(text.decode(), module) for module, text in before.items()}
     import_common()
     for name in lacking:
-        seconds = limit_of(name)
         try:
             for module, text in spoilt.items():
                 (copy / module).write_text(text, encoding="utf-8")

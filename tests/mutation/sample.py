@@ -31,6 +31,7 @@ from drawn import (
     LONGEST,
     MEETS,
     NOTICED,
+    RECORDED,
     REST_OF,
     SHARED,
     SPENT,
@@ -39,7 +40,6 @@ from drawn import (
     UNREACHED,
     UNSHOWN,
     Drawn,
-    seconds_of,
     stored,
     write,
 )  # fmt: skip
@@ -121,7 +121,7 @@ def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
     """Draw, run and write down; what is written already of this seed and these sources is not run again."""
     copy, records = folder / "copy", folder / "records"
     copy_of_the_checkout(copy)
-    record(copy, records, seconds_of)
+    record(copy, records, RECORDED)
     known = recorded(records)
     reach = by_block(known)
     import_common()

@@ -105,7 +105,7 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
     assert done.stderr == ""
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a shell closes streams by >&-")
+@pytest.mark.skipif(sys.platform == "win32", reason="closes streams by >&-, which is a word of POSIX shells alone")
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
     ("arguments", "status"),

@@ -356,15 +356,15 @@ def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(tw
         ("toy/tuned/bounce", {"scene": "bounce"}),
         ("toy/tuned/bounce/apex", {"scene": "bounce", "metric": "apex"}),
         ("toy/tuned/nowhere/apex/x", {"scene": "nowhere", "metric": "apex/x"}),
-        ("toy/tuned//tmp/a b.toml@0123abcd", {"scene": "/tmp/a b.toml@0123abcd"}),
-        ("toy/tuned//tmp/a b.toml", {"scene": "/tmp/a b.toml@0123abcd"}),
-        ("toy/tuned//tmp/a b.toml/x[floor/box.fy]", {"scene": "/tmp/a b.toml@0123abcd", "metric": "x[floor/box.fy]"}),
+        ("toy/tuned//my/a b.toml@0123abcd", {"scene": "/my/a b.toml@0123abcd"}),
+        ("toy/tuned//my/a b.toml", {"scene": "/my/a b.toml@0123abcd"}),
+        ("toy/tuned//my/a b.toml/x[floor/box.fy]", {"scene": "/my/a b.toml@0123abcd", "metric": "x[floor/box.fy]"}),
         ("toy/tuned/drop.json/energy_growth", {"scene": "drop.json@89abcdef", "metric": "energy_growth"}),
     ],
 )  # fmt: skip
 def test_a_row_is_named_by_the_path_of_its_scene_file_as_well(name, found):
     """Paths have slashes, and a hash that nobody types."""
-    scenes = {"bounce", "/tmp/a b.toml@0123abcd", "drop.json@89abcdef"}
+    scenes = {"bounce", "/my/a b.toml@0123abcd", "drop.json@89abcdef"}
     assert showing.named_by(name, scenes) == {"engine": "toy", "profile": "tuned", **found}
 
 

@@ -18,7 +18,7 @@ from telling import Sections
 
 from adapters.conformance import self_test
 from adapters.conformance.self_test import Caught
-from reports import releases as shown
+from reports import releases as told_releases
 from reports import speed, tables
 from reports.command import benching, inspecting, main, piles, posing, releasing
 from validation.bench import agreement
@@ -30,6 +30,8 @@ from validation.questions.detection import BlindSpot, Detected
 from validation.releases.bisection import Found, Unchanged
 from validation.releases.environments import Environment
 
+#: Nothing is read: what would be is made up.
+NO_STORE: Any = None
 SLOT = Slot("stack", (("n", 2.0), ("mu", 0.1)), 3, "chipmunk", "tuned", 1 / 240, 7)
 
 
@@ -69,13 +71,14 @@ def clocked_piles() -> Sections:
     found = Sections()
     with patch.object(piles, "laps", laps):
         for most, as_data in ((80, False), (20, False), (20, True)):
-            console = Console(file=io.StringIO(), width=120, markup=False, emoji=False, no_color=True)
+            shown = io.StringIO()
+            console = Console(file=shown, width=120, markup=False, emoji=False, no_color=True)
             runner = CliRunner()
             with runner.isolation() as streams:
                 piles.show_piles(console, as_data, most, len(KINDS))
                 out = streams[0].getvalue().decode()
             title = f"up to {most}{', as data' * as_data}"
-            found[title] = numbered(console.file.getvalue(), "shown") | numbered(out, "out")  # type: ignore[attr-defined]
+            found[title] = numbered(shown.getvalue(), "shown") | numbered(out, "out")
     return found
 
 
@@ -116,8 +119,8 @@ def bisected() -> Sections:
         what = Found(1, 3, (0, 3, 1), {2: "it cannot be imported"}, change, others)
         for out in ("crosscheck-out", "else where"):
             commands = releasing._commands("toy", "1.1", "2.0", SLOT, Path(out))
-            plain = shown.found_as_plain(what, "toy", versions, commands)
-            found[f"{name}, {out}"] = numbered(shown.found_as_text(plain), "out") | told(plain)
+            plain = told_releases.found_as_plain(what, "toy", versions, commands)
+            found[f"{name}, {out}"] = numbered(told_releases.found_as_text(plain), "out") | told(plain)
     for reason in ("", "release 0 has no answer", "release 3 has no answer"):
         for as_data in (False, True):
             found[f"unchanged: {reason}{', as data' * as_data}"] = _left(
@@ -188,8 +191,7 @@ def times() -> Sections:
         ):
             good = list[bool]()
             found[title] = printed(
-                lambda console, good=good: good.append(benching._compare(None, run, run, console)),
-                200,  # type: ignore[arg-type]
+                lambda console, good=good: good.append(benching._compare(NO_STORE, run, run, console)), 200
             ) | {"enough": str(good)}
     return found
 
