@@ -98,6 +98,8 @@ def _load_run(folder: Path, run_id: str) -> Side:
 
 
 def _load_lines(path: Path) -> Side:
+    if path.exists() and not path.is_file():  # a pipe would be waited for
+        raise MissingError(f"run: cannot read {path}: it is not a regular file")
     try:
         lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:

@@ -69,7 +69,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
         return
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; a bench has no use for it")
-    if options["suite"] == "standard":
+    if options["standard"]:
         raise SceneError("standard: a suite of cells that are judged; a bench is --quick or --full")
     request = replace(request_from(options), ulps=(0,))
     if not options["scenes"]:

@@ -24,7 +24,18 @@ from validation.workers import LimitError
 WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
 #: What the machine refuses: a process, its memory.
 TOO_LITTLE = (LimitError, IsolationError)
-OUT = click.option("--out", default="crosscheck-out", show_default=True, type=Path, help="Folder for results.")
+
+
+def _folder(ctx: click.Context, param: click.Parameter, value: str) -> Path:
+    """A folder that has a name: of an empty one, such as a variable that is not set, nobody knows where it lies."""
+    if not value:
+        raise SceneError("--out: is empty; `.` is the folder that you are in")
+    return Path(value)
+
+
+OUT = click.option(
+    "--out", default="crosscheck-out", show_default=True, callback=_folder, metavar="PATH", help="Folder for results."
+)
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 
 

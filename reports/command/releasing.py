@@ -108,7 +108,7 @@ def _prepared(
 ) -> tuple[list[Release], list[Slot], Effort, Console]:
     """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
     console = terminal(stderr=True)
-    request = request_from({**options, "engine": [engine], "ulp": (), "suite": "standard"})
+    request = request_from({**options, "engine": [engine], "ulp": (), "quick": False, "standard": True, "full": False})
     effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
     folder(out)
     asked = chosen(engine, which)

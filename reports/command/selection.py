@@ -32,6 +32,12 @@ class _Seconds(click.ParamType):
         return seconds
 
 
+#: The suites, each an option; the first is run where none is named.
+SUITES = {
+    "quick": "A few cells a scene: the default.",
+    "standard": "The cells whose FAILs are listed row by row.",
+    "full": "All cells of each scene, and other steps.",
+}
 #: Longest time that a cell may be given [s]: a week.
 LONGEST = 7 * 86400.0
 SECONDS = _Seconds()
@@ -92,6 +98,7 @@ def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
 
 def request_from(options: dict[str, Any]) -> Request:
     """Turn the options of `selection` into a request; raises what a wrong call raises, before anything runs."""
+    suite = _suite(options)
     registry.check_required()
     for name in options["engine"]:
         registry.find(name)
@@ -104,10 +111,18 @@ def request_from(options: dict[str, Any]) -> Request:
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
         params=_once(options["param"]) or None,
-        suite=options["suite"],
+        suite=suite,
         ulps=tuple(options["ulp"]) or (0,),
-        floors=options["suite"] == "full" and not options["ulp"],
+        floors=suite == "full" and not options["ulp"],
     )
+
+
+def _suite(options: dict[str, Any]) -> str:
+    """The suite that is named; of two that are neither is what was asked for."""
+    named = [suite for suite in SUITES if options[suite]]
+    if len(named) > 1:
+        raise SceneError(f"{' and '.join(f'--{suite}' for suite in named)}: a run is of one suite")
+    return named[0] if named else next(iter(SUITES))
 
 
 def asked(request: Request, options: dict[str, Any]) -> str:
@@ -141,9 +156,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             type=click.IntRange(-MOST_ULPS, MOST_ULPS),
             help="Move the start by this many units in the last place.",
         ),
-        click.option("--quick", "suite", flag_value="quick", default=True, help="A few cells a scene: the default."),
-        click.option("--standard", "suite", flag_value="standard", help="The cells whose FAILs are listed row by row."),
-        click.option("--full", "suite", flag_value="full", help="All cells of each scene, and other steps."),
+        *(click.option(f"--{suite}", is_flag=True, help=told) for suite, told in SUITES.items()),
     )
     for option in reversed(options):
         command = option(command)

@@ -288,7 +288,7 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
         named = named_by(name, {observation.slot.scene for observation in observations})
         keys = [(key, named[key]) for key in ("engine", "scene") if named.get(key)]
     else:
-        slots = [slot for found, slot in ids_of(observations) if found.startswith(name)]
+        slots = [slot for found, slot in ids_of(observations) if found.startswith(name.lower())]
         if len(slots) != 1:
             many = f"{len(slots)} rows begin" if slots else "no row of this run begins"
             raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
@@ -347,7 +347,7 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         if not fits:
             raise SceneError(f"row: this run has no row {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)
-    return next(row for row in rows if row_id(row).startswith(name))
+    return next(row for row in rows if row_id(row).startswith(name.lower()))
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, list[Change]]:

@@ -49,6 +49,31 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("command", ["run", "bench", "compile", "residuals"])
+def test_two_suites_at_once_are_refused(command, tmp_path):
+    """The last one won: neither is what was asked for."""
+    result = call(command, "bounce", "--full", "--quick")
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result) == "crosscheck: --quick and --full: a run is of one suite"
+
+
+@pytest.mark.parametrize("command", ["run", "show", "findings"])
+def test_a_results_folder_without_a_name_is_refused(command):
+    """It was the folder that one was in: a variable that is not set filled it with results."""
+    result = call(command, "--out", "")
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result).startswith("crosscheck: --out: is empty")
+
+
+def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
+    """It was waited for, without an end."""
+    pipe = tmp_path / "rows.jsonl"
+    os.mkfifo(pipe)
+    result = call("compare", str(pipe), str(pipe))
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result).endswith("it is not a regular file")
+
+
 def test_a_parameter_that_is_given_twice_is_refused_and_the_way_to_ask_both_is_named(tmp_path):
     result = call(*SMALL, "--param", "e=.5", "--param", "e=.6", "--out", tmp_path)
     assert result.exit_code == statuses.WRONG_CALL

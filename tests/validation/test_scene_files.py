@@ -62,6 +62,11 @@ def test_toml_and_json_give_the_same_scene(tmp_path):
         ("mass = 1.0", "mass = nan", "bodies.1.mass"),
         ("mass = 1.0", "mass = 0.0", "ball.mass"),
         ("radius = 0.5", "radius = -0.5", "ball.shape.radius"),
+        ("mass = 1.0", "mass = true", "bodies.1.mass"),
+        ("mass = 1.0", 'mass = "1.0"', "bodies.1.mass"),
+        ("radius = 0.5", "radius = true", "bodies.1.shape.disc.radius"),
+        ("pose = [0.0, 1.0, 0.0]", "pose = [0.0, true, 0.0]", "bodies.1.pose.1"),
+        ("duration = 0.5", "duration = 0.5\nversion = true", "version"),
         ('name = "ball"', 'name = "floor"', "used 2 times"),
         ("duration = 0.5", "duration = 0.0", "duration"),
         ("dimension = 2", "dimension = 4", "dimension"),
@@ -305,6 +310,7 @@ def test_a_file_may_state_by_how_much_its_motion_multiplies_what_is_off_its_plan
         ("growth = 0.5", "growth: 0.5 is less than 1"),
         ('growth = "2 * height"', "growth: '2 * height': 'height' is not one of"),
         ("growth = nan", "growth"),
+        ("growth = true", "growth"),
     ],
 )
 def test_a_growth_that_means_nothing_is_refused_with_its_name(tmp_path, stated, said):

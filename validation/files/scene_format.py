@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, Strict
 
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
@@ -31,6 +31,11 @@ class SceneErrors(SceneError):
         super().__init__(listed(wrong))
 
 
+#: A number as it stands in a file: neither ``true`` nor digits in quotes, which are somebody's mistake.
+Number = Annotated[float, Strict()]
+Whole = Annotated[int, Strict()]
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -39,51 +44,51 @@ class DiscModel(_Strict):
     """Planar disc."""
 
     type: Literal["disc"]
-    radius: float
+    radius: Number
 
 
 class SphereModel(_Strict):
     """Ball."""
 
     type: Literal["sphere"]
-    radius: float
+    radius: Number
 
 
 class BoxModel(_Strict):
     """Box by half extents."""
 
     type: Literal["box"]
-    half_extents: tuple[float, ...]
+    half_extents: tuple[Number, ...]
 
 
 class CapsuleModel(_Strict):
     """All points within ``radius`` of a segment of 2 ``half_length`` on the body's x axis [m]."""
 
     type: Literal["capsule"]
-    half_length: float
-    radius: float
+    half_length: Number
+    radius: Number
 
 
 class CylinderModel(_Strict):
     """Cylinder about the body's x axis, 2 ``half_length`` long [m]; spatial."""
 
     type: Literal["cylinder"]
-    half_length: float
-    radius: float
+    half_length: Number
+    radius: Number
 
 
 class PolygonModel(_Strict):
     """Convex polygon by its corners [m], counter-clockwise; planar. The body's centre is their centroid."""
 
     type: Literal["polygon"]
-    vertices: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=MOST_VERTICES)
+    vertices: tuple[tuple[Number, Number], ...] = Field(min_length=3, max_length=MOST_VERTICES)
 
 
 class HullModel(_Strict):
     """Convex hull of its corners [m]; spatial. The body's centre is its centre of mass."""
 
     type: Literal["hull"]
-    vertices: tuple[tuple[float, float, float], ...] = Field(min_length=4, max_length=MOST_VERTICES)
+    vertices: tuple[tuple[Number, Number, Number], ...] = Field(min_length=4, max_length=MOST_VERTICES)
 
 
 class HalfSpaceModel(_Strict):
@@ -94,9 +99,9 @@ class HalfSpaceModel(_Strict):
     """
 
     type: Literal["half_space"]
-    normal: tuple[float, ...] | None = None
-    angle: float | None = None
-    offset: float = 0.0
+    normal: tuple[Number, ...] | None = None
+    angle: Number | None = None
+    offset: Number = 0.0
 
 
 class CourseModel(_Strict):
@@ -105,9 +110,9 @@ class CourseModel(_Strict):
     It begins where the body's pose is: displaced by amplitude (sin(2 pi frequency t + phase) - sin(phase)).
     """
 
-    amplitude: tuple[float, ...]
-    frequency: float
-    phase: float = 0.0
+    amplitude: tuple[Number, ...]
+    frequency: Number
+    phase: Number = 0.0
 
 
 class BodyModel(_Strict):
@@ -121,15 +126,15 @@ class BodyModel(_Strict):
         DiscModel | SphereModel | BoxModel | HalfSpaceModel | CapsuleModel | PolygonModel | CylinderModel | HullModel,
         Field(discriminator="type"),
     ]
-    mass: float | None = None
-    density: float | None = None
-    inertia: float | tuple[float, float, float] | None = None
-    pose: tuple[float, ...] = ()
-    twist: tuple[float, ...] = ()
+    mass: Number | None = None
+    density: Number | None = None
+    inertia: Number | tuple[Number, Number, Number] | None = None
+    pose: tuple[Number, ...] = ()
+    twist: tuple[Number, ...] = ()
     motion: Literal["free", "fixed", "prescribed"] = "free"
-    force: tuple[float, ...] = ()
-    torque: tuple[float, ...] = ()
-    surface_velocity: tuple[float, ...] = ()
+    force: tuple[Number, ...] = ()
+    torque: tuple[Number, ...] = ()
+    surface_velocity: tuple[Number, ...] = ()
     course: CourseModel | None = None
 
 
@@ -138,8 +143,8 @@ class PairModel(_Strict):
 
     a: str = Pair.a
     b: str = Pair.b
-    restitution: float = Pair.restitution
-    friction: float = Pair.friction
+    restitution: Number = Pair.restitution
+    friction: Number = Pair.friction
 
 
 class CheckModel(_Strict):
@@ -161,9 +166,9 @@ class CheckModel(_Strict):
     """
 
     quantity: str
-    value: float | str
-    tolerance: Annotated[float, Field(gt=0.0)] | str
-    at: float | None = Field(default=None, ge=0.0)
+    value: Number | str
+    tolerance: Annotated[Number, Field(gt=0.0)] | str
+    at: Number | None = Field(default=None, ge=0.0)
     because: str = "stated in the scene file"
 
 
@@ -178,15 +183,15 @@ class SceneModel(_Strict):
 
     format: Literal[1] = 1
     name: str = Field(min_length=1)
-    version: int = 1
+    version: Whole = 1
     dimension: Literal[2, 3]
-    gravity: tuple[float, ...]
-    duration: float
+    gravity: tuple[Number, ...]
+    duration: Number
     impact_law: Literal["N-SIM", "N-SEQ"] = "N-SIM"
-    growth: float | str = 1.0
+    growth: Number | str = 1.0
     bodies: tuple[BodyModel, ...]
     pairs: tuple[PairModel, ...] = ()
-    constants: dict[str, float | str] = {}
+    constants: dict[str, Number | str] = {}
     checks: tuple[CheckModel, ...] = ()
 
 
