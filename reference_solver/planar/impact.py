@@ -61,6 +61,7 @@ from reference_solver.stepping.impacts import (
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
+    JAMMED,
     LATE,
     NEARLY,
     NOISE,
@@ -80,6 +81,13 @@ def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
     a, b = rows.integer[c, A], rows.integer[c, B]
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     return ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
+
+
+@inner_kernel
+def closed_gap(bodies: Bodies, rows: Rows, c: int) -> float:
+    """Gap of row c that counts as none at impulse level [m]."""
+    a, b = rows.integer[c, A], rows.integer[c, B]
+    return max(gap_noise(bodies, rows, c), JAMMED * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
 
 
 @inner_kernel

@@ -21,7 +21,7 @@ from reference_solver.planar.columns import (
     SPEED,
     TARGET,
 )
-from reference_solver.planar.impact import doubt, flies, gap_noise
+from reference_solver.planar.impact import closed_gap, doubt, flies, gap_noise
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
 from reference_solver.planar.midpoint import reach_end, turn_rows
 from reference_solver.planar.rows import measure_speed, still_speed, warm_start
@@ -68,7 +68,8 @@ def press(
             rows.real[c, TARGET] = -FAR * (speed + u)
             rows.real[c, PN] = rows.real[c, PT] = 0.0
         else:
-            gap = rows.real[c, GAP] if rows.real[c, GAP] > gap_noise(bodies, rows, c) else 0.0
+            none = closed_gap(bodies, rows, c) if held else gap_noise(bodies, rows, c)
+            gap = rows.real[c, GAP] if rows.real[c, GAP] > none else 0.0
             rows.real[c, TARGET] = -gap / length
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FREE:

@@ -35,7 +35,7 @@ from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import FIXED, FREE, HALF_SPACE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
-from reference_solver.spatial.touching import gap_noise
+from reference_solver.spatial.touching import closed_gap, gap_noise
 from reference_solver.spatial.vector import (
     add,
     add_scaled,
@@ -81,7 +81,7 @@ def press_at_mid_drift(
             clear_point(manifolds, m, p)
             for k in range(3):
                 manifolds.impulse[m, p, k] = 0.5 * time * manifolds.force[m, p, k] if options.warm_starting else 0.0
-            if manifolds.gap[m, p] > gap_noise(bodies, manifolds, m, p):
+            if manifolds.gap[m, p] > closed_gap(bodies, manifolds, m, p):
                 manifolds.target[m, p] = -manifolds.gap[m, p] / time
     prepare_wrenches(bodies, manifolds, options)
     copy_vectors(bodies.twist, bodies.last)  # what the bodies would have at mid-drift without forces
