@@ -61,7 +61,7 @@ from reference_solver.planar.step import copy_contacts, move, step
 from reference_solver.stepping import operations
 from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
-from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.islands import join_candidates, leaves
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.ledger import Buffer, copy_ledger
@@ -188,16 +188,15 @@ def next_impact(island: Island, length: float) -> float:
 @inner_kernel
 def leaves_bounds(island: Island, end: float) -> bool:
     """By the sum of all terms of the path."""
-    bodies, sub = island.bodies, island.sub
+    bodies, sub, found = island.bodies, island.sub, False
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] != FREE:
             continue
         for k in range(2):
             c = sub.path[i, k]
             way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
-            if not (sub.limit[i, k] <= sub.pose[i, k] - way and sub.pose[i, k] + way <= sub.limit[i, 2 + k]):
-                return True
-    return False
+            found = leaves(sub.limit, i, k, sub.pose[i, k], way) or found
+    return found
 
 
 @inner_kernel
@@ -327,7 +326,7 @@ def enter_settled(island: Island) -> None:
 
 
 @inner_kernel
-def find_islands(whole: Island, world: World, room: float) -> bool:
+def find_islands(whole: Island, world: World) -> bool:
     """By bounding boxes of all that a body may sweep."""
     bodies, options, limit, boxes = whole.bodies, whole.options, world.islands.limit, whole.pairs.boxes
     for i in range(len(bodies.kind)):
@@ -340,7 +339,7 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
             way = abs(bodies.twist[i, k]) * options.dt
             if bodies.kind[i, MOTION] == FREE:
                 way += 0.5 * options.dt * options.dt * abs(bodies.real[i, LOAD + k])
-                way = room * way + options.margin * bodies.real[i, EXTENT]
+                way += options.margin * bodies.real[i, EXTENT]
             way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
             limit[i, k], limit[i, 2 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
             boxes.low[i, k], boxes.high[i, k] = limit[i, k] - reach, limit[i, 2 + k] + reach

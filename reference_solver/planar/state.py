@@ -163,6 +163,7 @@ class World(NamedTuple):
     limit: Array  # (n, 4): see `SubStep`
     order: Indices  # (n,): see `Boxes`
     tally: Array  # (SIZE,): to go back to where a step is made again
+    before: Array  # (SIZE,): the same of an island
 
 
 def allocate_bodies(model: Model, needs: Needs) -> Bodies:
@@ -275,7 +276,7 @@ def allocate_world(bodies: Bodies, candidates: int) -> World:
     n = len(bodies.pose)
     local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
     islands = allocate_islands(2, n, candidates)
-    return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE))
+    return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE), np.zeros(TALLY_SIZE))
 
 
 def grown(rows: Rows) -> Rows:

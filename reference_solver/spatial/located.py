@@ -56,7 +56,7 @@ from reference_solver.stepping import operations
 from reference_solver.stepping.accounting import keep
 from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import HELD, LEFT, MOST_SOFT_IN_SPACE, UNSETTLED
-from reference_solver.stepping.islands import join_candidates
+from reference_solver.stepping.islands import join_candidates, leaves
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.lasting import CONTACTS as LASTING
@@ -209,7 +209,7 @@ def next_impact(island: Island, length: float) -> float:
 @inner_kernel
 def leaves_bounds(island: Island, end: float) -> bool:
     """By the sum of all terms of the path."""
-    bodies, limit = island.bodies, island.sub.limit
+    bodies, limit, found = island.bodies, island.sub.limit, False
     for i in range(len(bodies)):
         if bodies.motion[i] != FREE:
             continue
@@ -218,9 +218,8 @@ def leaves_bounds(island: Island, end: float) -> bool:
             if bodies.curved[i]:
                 c = bodies.path[i, k]
                 way = end * (abs(c[1]) + end * (abs(c[2]) + end * (abs(c[3]) + end * (abs(c[4]) + end * abs(c[5])))))
-            if not (limit[i, k] <= bodies.pose[i, k] - way and bodies.pose[i, k] + way <= limit[i, 3 + k]):
-                return True
-    return False
+            found = leaves(limit, i, k, bodies.pose[i, k], way) or found
+    return found
 
 
 @inner_kernel
@@ -388,7 +387,7 @@ def enter_settled(island: Island) -> None:
 
 
 @inner_kernel
-def find_islands(whole: Island, world: World, room: float) -> bool:
+def find_islands(whole: Island, world: World) -> bool:
     """By bounding boxes of all that a body, turned at will, may sweep."""
     bodies, options, limit, boxes = whole.bodies, whole.options, world.islands.limit, whole.detection.boxes
     bound_bodies(bodies, boxes, options)
@@ -404,7 +403,7 @@ def find_islands(whole: Island, world: World, room: float) -> bool:
             way = abs(bodies.twist[i, k]) * options.dt
             if bodies.motion[i] == FREE:
                 way += 0.5 * options.dt * options.dt * abs(bodies.acceleration[i, k])
-                way = room * way + options.margin * bodies.extent[i]
+                way += options.margin * bodies.extent[i]
             way += 1e-14 * abs(bodies.pose[i, k])  # rounding of the sums
             limit[i, k], limit[i, 3 + k] = bodies.pose[i, k] - way, bodies.pose[i, k] + way
             if bodies.turning[i]:

@@ -272,6 +272,7 @@ class World(NamedTuple):
     order: Indices  # (n,): see `Boxes`
     kept: Memory  # for the next step
     tally: Array  # (SIZE,): to go back to where a step is made again
+    before: Array  # (SIZE,): the same of an island
 
 
 def allocate_sub_step(bodies: int, manifolds: int, meeting: Any) -> SubStep:
@@ -309,6 +310,7 @@ def allocate_world(bodies: Bodies, manifolds: int, candidates: int) -> World:
         order=np.zeros(n, np.int64),
         kept=allocate_memory(manifolds),
         tally=np.zeros(TALLY_SIZE),
+        before=np.zeros(TALLY_SIZE),
     )
 
 

@@ -77,10 +77,14 @@ from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
 
 
 @spliced_kernel
-def step_island(island: Island) -> bool:
-    """One step of an island; False if an array is too small, with the step unfinished."""
+def step_island(island: Island, goes_on: bool) -> bool:
+    """One step of an island; False if an array is too small, with the step unfinished.
+
+    Where a body may leave its bounds (``ESCAPED``) the step stops before it does; with wider ones it ``goes_on``.
+    """
     clock, tally = island.sub.clock, island.tally
-    open_step(clock, len(island.bodies.pose), island.options.dt, patience(island))
+    if not goes_on:
+        open_step(clock, len(island.bodies.pose), island.options.dt, patience(island))
     while clock[LEFT] > 0.0 or clock[UNSETTLED] > 0.0:
         if clock[UNSETTLED] > 0.0:
             if not settle(island):
@@ -88,7 +92,6 @@ def step_island(island: Island) -> bool:
         elif not make_sub_step(island):
             return False
         if clock[ESCAPED] > 0.0:
-            clock[LEFT] = clock[UNSETTLED] = 0.0
             return True
         if tally[EXHAUSTED] > 0.0 or tally[CONTRADICTED_A] > 0.0:
             end_run(island)
@@ -112,12 +115,12 @@ def end_run(island: Island) -> None:
 def make_sub_step(island: Island) -> bool:
     """Go to the next event, or to the end of the step; False, with bodies untouched, if an array is too small."""
     clock, options, tally = island.sub.clock, island.options, island.tally
-    left = clock[LEFT]
+    left, held, rocks = clock[LEFT], clock[HELD], clock[ROCKS]
     if not find_touching(island):
         return False
     if opens_step(clock, options.dt):
         weigh_clusters(island)
-        if clock[HELD] > 0.0:
+        if clock[HELD] > held:
             return True  # what may close is looked for as well
     length = solve_sub_step(island)
     if tally[CONTRADICTED_A] > 0.0:
@@ -138,7 +141,9 @@ def make_sub_step(island: Island) -> bool:
         return_to_start(island)
         return False
     if clock[CONFINED] > 0.0 and leaves_bounds(island, end):
-        clock[ESCAPED] = 1.0
+        go_back(tally, island.sub.opened)
+        return_to_start(island)
+        clock[ESCAPED], clock[HELD], clock[ROCKS] = 1.0, held, rocks
         return True
     end = follow_path(island, length, end, phase > 0.0)
     if options.restitution:

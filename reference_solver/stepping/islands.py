@@ -1,9 +1,9 @@
 """Islands: bodies that can meet each other within a step, each stepped by itself (E29).
 
 Free bodies whose places within the step may overlap are joined; bodies that forces do not move join nobody, and belong
-to every island that may touch them. Places are bounds that hold unless an impact makes a body faster: a body that
-leaves its own ends the attempt, and the step is made again with wider ones, in the end as one island. Bodies that can
-meet nobody make their step together, which costs less: with nothing to solve or to meet none knows of another.
+to every island that may touch them. Places are bounds that hold unless an impact makes a body faster: where one leaves
+its own its island is stepped again with wider ones, together with whoever it may meet in these. Bodies that can meet
+nobody make their step together, which costs less: with nothing to solve or to meet none knows of another.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ Indices = NDArray[np.int64]
 #: Entries of `Islands.size`: entries of the lists of bodies that forces do not move, bodies of the island gathered.
 NODES, MEMBERS = 0, 1
 SIZES = 2
-#: By how much farther than loads and speeds alone take it a body may get, one attempt after the other. An elastic
-#: impact with a heavy body doubles its speed and adds twice that of the other; the last attempt has no bounds.
-ROOM = (1.0, 8.0)
+#: How many times as far a body may get that leaves its bounds as it got there: it goes on until the step ends.
+FARTHER = 2.0
+#: Times that an island is stepped again in wider bounds, and how often whoever it meets there had made his step before,
+#: so that all do it anew: a few are seen, more are no use, and what is left is one island without bounds.
+WIDENINGS, RESTARTS = 16, 8
 
-#: What became of an attempt: all islands made their step; one left its bounds; an array was too small.
-MADE, LEFT_BOUNDS, NO_ROOM = 0, 1, 2
+#: What became of an attempt: all islands made their step; one left its bounds for good; an array was too small; one
+#: was joined with another that had made its step. And of wider bounds: nobody else is met in them.
+MADE, LEFT_BOUNDS, NO_ROOM, JOINED, ALONE = 0, 1, 2, 3, 4
 
 
 @structure
@@ -198,12 +201,7 @@ def join_candidates(bodies: Bodies, islands: Islands, candidate: Indices, count:
             if is_free(bodies, a) and is_free(bodies, b):
                 join(islands, a, b)
     count = met
-    for i in range(n):
-        if is_free(bodies, i):
-            label = root(islands, i)
-            if label != i:
-                islands.next_free[islands.last[label]] = i
-            islands.last[label] = i
+    link_members(bodies, islands)
     for k in range(count):
         a, b = candidate[k] // n, candidate[k] % n
         if not is_free(bodies, a):
@@ -211,6 +209,80 @@ def join_candidates(bodies: Bodies, islands: Islands, candidate: Indices, count:
         elif not is_free(bodies, b):
             list_unmoved(islands, root(islands, a), b)
     join_lonely(bodies, islands)
+
+
+@inner_kernel
+def link_members(bodies: Bodies, islands: Islands) -> None:
+    """Chain the free bodies of each island in ascending order."""
+    for i in range(len(islands.label)):
+        if is_free(bodies, i):
+            label = root(islands, i)
+            islands.next_free[i] = -1
+            if label != i:
+                islands.next_free[islands.last[label]] = i
+            islands.last[label] = i
+
+
+@inner_kernel
+def leaves(limit: Array, i: int, d: int, place: float, way: float) -> bool:
+    """Whether body i may leave its bounds along axis d on a ``way`` from a ``place``; if so they become wider [m]."""
+    axes = limit.shape[1] // 2
+    low, high = limit[i, d], limit[i, axes + d]
+    if low <= place - way and place + way <= high:
+        return False
+    middle = 0.5 * (low + high)
+    half = FARTHER * (abs(place - middle) + way)
+    limit[i, d], limit[i, axes + d] = middle - half, middle + half
+    return True
+
+
+@inner_kernel
+def widen(bodies: Bodies, islands: Islands, island: int, limit: Array) -> int:
+    """Take over the bounds ``limit`` of an island that was gathered last, with whoever may be met in them.
+
+    ``ALONE`` if that is nobody, so that its step goes on. ``MADE`` if it can be stepped again: whoever was joined has
+    not made his step. ``JOINED`` if somebody has, and all have to; ``LEFT_BOUNDS`` where there is no room to list them.
+    """
+    outcome, count = ALONE, islands.size[MEMBERS]
+    for k in range(count):
+        i = islands.member[k]
+        if not is_free(bodies, i):
+            continue
+        wider = False
+        for d in range(limit.shape[1]):
+            wider = wider or limit[k, d] != islands.limit[i, d]
+            islands.limit[i, d] = limit[k, d]
+        for j in range(len(islands.label) if wider else 0):
+            if is_free(bodies, j):
+                other = root(islands, j)
+                if other != root(islands, island) and may_meet(islands, i, j):
+                    outcome = JOINED if other < island or outcome == JOINED else MADE
+                    join_lists(islands, root(islands, island), other)
+            elif islands.mark[j] != island and may_meet(islands, i, j):
+                if islands.size[NODES] == len(islands.unmoved):
+                    return LEFT_BOUNDS
+                islands.mark[j] = island
+                list_unmoved(islands, root(islands, island), j)
+                outcome = MADE if outcome == ALONE else outcome
+    if outcome == ALONE:
+        return outcome
+    link_members(bodies, islands)
+    for j in range(len(islands.label)):
+        islands.mark[j] = -1  # all are listed again
+    return outcome
+
+
+@inner_kernel
+def join_lists(islands: Islands, a: int, b: int) -> None:
+    """Let two islands, of the lowest bodies a and b, be one."""
+    join(islands, a, b)
+    kept, other = min(a, b), max(a, b)
+    entry = islands.first[other]
+    if entry >= 0:
+        while islands.following[entry] >= 0:
+            entry = islands.following[entry]
+        islands.following[entry] = islands.first[kept]
+        islands.first[kept] = islands.first[other]
 
 
 @inner_kernel

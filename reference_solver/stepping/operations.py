@@ -227,7 +227,7 @@ def next_impact(island: Any, length: float) -> float:
 
 @operation
 def leaves_bounds(island: Any, end: float) -> bool:
-    """Whether any free body's path until ``end`` may leave the bounds given for the step."""
+    """Whether any free body's path until ``end`` may leave the bounds given for the step; its own become wider."""
     raise NotImplementedError
 
 
@@ -301,8 +301,8 @@ def enter_settled(island: Any) -> None:
 
 
 @operation
-def find_islands(whole: Any, world: Any, room: float) -> bool:
-    """Join the free bodies that may meet within ``room`` times the way they go; False if an array is too small."""
+def find_islands(whole: Any, world: Any) -> bool:
+    """Join the free bodies that may meet within the way they go; False if an array is too small."""
     raise NotImplementedError
 
 

@@ -9,7 +9,18 @@ from reference_solver.journal import close_step, keep_state
 from reference_solver.stepping.accounting import keep
 from reference_solver.stepping.clock import CONFINED, ESCAPED, LEFT, UNSETTLED
 from reference_solver.stepping.driver import step_island
-from reference_solver.stepping.islands import LEFT_BOUNDS, MADE, NO_ROOM, ROOM, gather_all, list_members, root
+from reference_solver.stepping.islands import (
+    ALONE,
+    LEFT_BOUNDS,
+    MADE,
+    NO_ROOM,
+    RESTARTS,
+    WIDENINGS,
+    gather_all,
+    list_members,
+    root,
+    widen,
+)
 from reference_solver.stepping.operations import (
     Island,
     begin_islands,
@@ -36,17 +47,11 @@ def run_located(whole: Island, world: Any, buffer: Any, first: int, steps: int, 
     take a full sample more. The caller grows it and calls again.
     """
     for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + len(whole.ledger.real) > len(buffer.real):
+        if lacks_room(buffer, k, stride, len(whole.ledger.real)) or not step_world(whole, world):
             return k
-        if not step_world(whole, world):
-            return k
-        close_step(whole.sub.journal)
-        if sampled:
-            s = (k + 1) // stride - 1
-            sample_state(whole, buffer, s)
-            if len(buffer.real) > 0:
-                buffer.offset[s + 1] += contacts_entered(whole, buffer, buffer.offset[s])
+        s = end_step(whole, buffer, k, stride)
+        if s >= 0:
+            buffer.offset[s + 1] += contacts_entered(whole, buffer, buffer.offset[s])
     return steps
 
 
@@ -54,27 +59,36 @@ def run_located(whole: Island, world: Any, buffer: Any, first: int, steps: int, 
 def run_steps(whole: Island, buffer: Any, first: int, steps: int, stride: int) -> int:
     """Make fixed steps of all bodies; otherwise as `run_located`."""
     for k in range(first, steps):
-        sampled = stride > 0 and (k + 1) % stride == 0
-        if sampled and len(buffer.real) > 0 and buffer.offset[k // stride] + most_contacts(whole) > len(buffer.real):
+        if lacks_room(buffer, k, stride, most_contacts(whole)):
             return k
         keep_state(whole.sub.journal, whole.bodies.pose, whole.bodies.twist)
         if not make_fixed_step(whole):
             return k
-        close_step(whole.sub.journal)
-        if sampled:
-            s = (k + 1) // stride - 1
-            sample_state(whole, buffer, s)
-            if len(buffer.real) > 0:
-                buffer.offset[s + 1] += contacts_found(whole, buffer, buffer.offset[s])
+        s = end_step(whole, buffer, k, stride)
+        if s >= 0:
+            buffer.offset[s + 1] += contacts_found(whole, buffer, buffer.offset[s])
     return steps
 
 
 @inner_kernel
-def sample_state(whole: Island, buffer: Any, s: int) -> None:
-    """Write poses and twists as sample s, without contacts yet."""
+def lacks_room(buffer: Any, k: int, stride: int, most: int) -> bool:
+    """Whether the sample after step k may not take the ``most`` contacts that there can be."""
+    if stride == 0 or (k + 1) % stride > 0 or len(buffer.real) == 0:
+        return False
+    return bool(buffer.offset[k // stride] + most > len(buffer.real))
+
+
+@inner_kernel
+def end_step(whole: Island, buffer: Any, k: int, stride: int) -> int:
+    """Write poses and twists if a sample follows step k; its number if contacts are to follow, else -1."""
+    close_step(whole.sub.journal)
+    if stride == 0 or (k + 1) % stride > 0:
+        return -1
+    s = (k + 1) // stride - 1
     copy_vectors(whole.bodies.pose, buffer.pose[s])
     copy_vectors(whole.bodies.twist, buffer.twist[s])
     buffer.offset[s + 1] = buffer.offset[s]
+    return s if len(buffer.real) > 0 else -1
 
 
 @spliced_kernel
@@ -83,12 +97,14 @@ def step_world(whole: Island, world: Any) -> bool:
     if not are_finite(whole.bodies.twist):
         return True
     keep(whole.tally, world.tally)
-    for attempt in range(len(ROOM) + 1):
-        if attempt == len(ROOM):
+    if not find_islands(whole, world):
+        return False
+    outcome, confined = MADE, True
+    for attempt in range(RESTARTS + 1):
+        if outcome == LEFT_BOUNDS or attempt == RESTARTS:
             gather_all(whole, world.islands)
-        elif not find_islands(whole, world, ROOM[attempt]):
-            return False
-        outcome = step_islands(whole, world, attempt < len(ROOM))
+            confined = False
+        outcome = step_islands(whole, world, confined)
         if outcome == MADE:
             return True
         keep(world.tally, whole.tally)
@@ -100,25 +116,47 @@ def step_world(whole: Island, world: Any) -> bool:
 @spliced_kernel
 def step_islands(whole: Island, world: Any, confined: bool) -> int:
     """Make the step of every island; bodies change only if all stayed in their bounds, where they are confined."""
-    islands, journal, clock, tally = world.islands, whole.sub.journal, whole.sub.clock, whole.tally
+    islands, journal, used = world.islands, whole.sub.journal, whole.ledger.used
+    clock, tally = whole.sub.clock, whole.tally
     opened, pieces, entries, contacts = tally[OPENED], journal.used[0], journal.used[1], journal.used[2]
     begin_islands(whole)
     for i in range(len(islands.label)):
         if not is_free(whole, i) or root(islands, i) != i:
             continue
-        island = gather(whole, world, list_members(islands, i))
-        if opened == 0.0:
-            tally[OPENED] = 0.0  # each island has a first solve, in which an overlap is one of the start
-        clock[CONFINED], clock[ESCAPED] = 1.0 if confined else 0.0, 0.0
+        keep(tally, world.before)
+        piece, entry, contact, listed = journal.used[0], journal.used[1], journal.used[2], used[0]
         outcome = NO_ROOM
-        if step_island(island):
-            outcome = LEFT_BOUNDS if clock[ESCAPED] > 0.0 else MADE
-        if outcome == MADE and not keep_memory(island, world):
-            outcome = NO_ROOM
+        island, goes_on = gather(whole, world, list_members(islands, i)), False
+        for attempt in range(WIDENINGS + 1):
+            if opened == 0.0 and not goes_on:
+                tally[OPENED] = 0.0  # each island has a first solve, in which an overlap is one of the start
+            clock[CONFINED], clock[ESCAPED] = 1.0 if confined else 0.0, 0.0
+            if not step_island(island, goes_on):
+                outcome = NO_ROOM
+                break
+            if clock[ESCAPED] == 0.0:
+                outcome = MADE
+                if not keep_memory(island, world):
+                    outcome = NO_ROOM
+                else:
+                    keep_end(island, world)
+                break
+            outcome = LEFT_BOUNDS
+            if attempt == WIDENINGS:
+                break
+            outcome = widen(whole, islands, i, island.sub.limit)
+            goes_on = outcome == ALONE
+            if goes_on:
+                continue
+            if outcome != MADE:
+                break
+            keep(world.before, tally)
+            clock[LEFT] = clock[UNSETTLED] = 0.0
+            journal.used[0], journal.used[1], journal.used[2], used[0] = piece, entry, contact, listed
+            island = gather(whole, world, list_members(islands, i))
         if outcome != MADE:
             clock[LEFT] = clock[UNSETTLED] = 0.0
             journal.used[0], journal.used[1], journal.used[2] = pieces, entries, contacts
             return outcome
-        keep_end(island, world)
     end_islands(whole, world)
     return MADE

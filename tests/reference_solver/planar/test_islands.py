@@ -166,6 +166,26 @@ def test_what_a_body_reaches_has_room_for_the_distance_at_which_contacts_are_kep
     assert (model.islands.reach[1:] > 0.3).all() and (model.islands.reach[1:] < 0.31).all()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_where_a_body_leaves_its_bounds_only_whoever_it_meets_makes_the_step_anew(axis):
+    """A heavy disc sends a light one off, past everybody; a box that falls over elsewhere keeps its bits."""
+    along, over = np.zeros(2), np.array([40.0, 40.0])
+    along[axis] = 1.0
+
+    def shot(place, speed, mass):
+        return disc(*(over + place * along), *(speed * along), mass=mass)
+
+    heavy, light, beyond = shot(0.0, 3.0, 1e6), shot(0.61, 0.0, 1.0), shot(9.0, 0.0, 1.0)
+    alone = world([tipping(0.0), disc(-2.0, 0.3, 1.5)], restitution=1.0)
+    beside = world([tipping(0.0), disc(-2.0, 0.3, 1.5), heavy, light, beyond], restitution=1.0)
+    alone.advance(1)
+    beside.advance(1)
+    assert beside.twist[4, axis] > 5.0  # it has been hit
+    assert islands_of(beside)[2:4] == [3, 3] and islands_of(beside)[4] not in (3, islands_of(beside)[0])
+    assert np.array_equal(alone.pose, beside.pose[:3])
+    assert np.array_equal(alone.twist, beside.twist[:3])
+
+
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_whoever_a_struck_disc_meets_beyond_its_bounds_is_met_whatever_the_order(order):
     """A heavy disc, a light one that it strikes, and one that this one strikes: all along one line, e = 0."""

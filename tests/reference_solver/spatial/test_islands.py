@@ -127,6 +127,27 @@ def test_a_load_takes_bodies_farther_than_their_speed():
     assert simulation.pose[2, 0] - simulation.pose[1, 0] == pytest.approx(0.6, abs=1e-9)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_where_a_body_leaves_its_bounds_only_whoever_it_meets_makes_the_step_anew(axis):
+    """A heavy ball sends a light one off, past everybody; a box that falls over elsewhere keeps its bits."""
+    along, over = np.zeros(3), np.array([40.0, 0.0, 40.0])
+    along[axis] = 1.0
+
+    def shot(place, velocity, mass):
+        body = ball(0.0, 0.0, mass=mass)
+        return replace(body, pose=(*(over + place * along), *UPRIGHT), twist=(*(velocity * along), 0.0, 0.0, 0.0))
+
+    heavy, light, beyond = shot(0.0, 3.0, 1e6), shot(0.61, 0.0, 1.0), shot(9.0, 0.0, 1.0)
+    alone = world([tipping(0.0), ball(-2.0, 0.3, 1.5)], restitution=1.0)
+    beside = world([tipping(0.0), ball(-2.0, 0.3, 1.5), heavy, light, beyond], restitution=1.0)
+    alone.advance(1)
+    beside.advance(1)
+    assert beside.twist[4, axis] > 5.0  # it has been hit
+    assert islands_of(beside)[2:4] == [3, 3] and islands_of(beside)[4] not in (3, islands_of(beside)[0])
+    assert np.array_equal(alone.pose, beside.pose[:3])
+    assert np.array_equal(alone.twist, beside.twist[:3])
+
+
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_whoever_a_struck_ball_meets_beyond_its_bounds_is_met_whatever_the_order(order):
     """A heavy ball, a light one that it strikes, and one that this one strikes: all along one line, e = 0."""
