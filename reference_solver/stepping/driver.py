@@ -220,13 +220,16 @@ def settle(island: Island) -> bool:
 
     Gaps first: velocities are those that the closed contacts allow. Their impulses are found anew with the rows of the
     end, by a solve that starts from them: what was too much is taken back. Otherwise it would be an impact in the
-    sub-step that follows, which knows nothing of this one. False if an array is too small; called again, it starts
-    anew.
+    sub-step that follows, which knows nothing of this one. Where closing gaps pushes bodies into others and does not
+    get them out again, they stay where they were: a gap is closed by the loads of the next step, an overlap by nobody.
+    False if an array is too small; called again, it starts anew.
     """
     clock = island.sub.clock
     if find_loaded(island) < 0:
         return False
     keep_state(island.sub.journal, island.bodies.pose, island.bodies.twist)
+    keep_places(island)
+    most = max(deepest_overlap(island), PUSHED_INTO)
     moved = close_gaps(island)
     if moved:
         before = math.inf
@@ -234,15 +237,15 @@ def settle(island: Island) -> bool:
             if find_loaded(island) < 0:
                 return False
             deepest = deepest_overlap(island)
-            if deepest > before:
-                put_back(island)
-                if find_loaded(island) < 0:
-                    return False
+            if deepest <= PUSHED_INTO:
                 break
-            if k == CLOSINGS - 1 or deepest <= PUSHED_INTO:
+            if k == CLOSINGS - 1 or deepest >= before:
+                if deepest > most:
+                    put_back(island)
+                    if find_loaded(island) < 0:
+                        return False
                 break
             before = deepest
-            keep_places(island)
             close_gaps(island)
     misses = misses_end(island, clock[UNSETTLED])
     if misses:
