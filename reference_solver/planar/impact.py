@@ -63,7 +63,7 @@ from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
     LATE,
     NEARLY,
-    NO_ROOM,
+    NO_GAP,
     NOISE,
     PASSED_ON,
     ROUND_OFF,
@@ -87,7 +87,7 @@ def gap_noise(bodies: Bodies, rows: Rows, c: int) -> float:
 def closed_gap(bodies: Bodies, rows: Rows, c: int) -> float:
     """Gap of row c that counts as none at impulse level [m]."""
     a, b = rows.integer[c, A], rows.integer[c, B]
-    return max(gap_noise(bodies, rows, c), NO_ROOM * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
+    return max(gap_noise(bodies, rows, c), NO_GAP * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
 
 
 @inner_kernel

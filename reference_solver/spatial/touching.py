@@ -21,7 +21,7 @@ from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
-from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, NO_ROOM, ROUND_OFF
+from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, NO_GAP, ROUND_OFF
 from reference_solver.stepping.options import Options
 
 
@@ -87,7 +87,7 @@ def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 def closed_gap(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
     """Gap of a point that counts as none at impulse level [m]."""
     extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-    return max(gap_noise(bodies, manifolds, m, p), NO_ROOM * extent)
+    return max(gap_noise(bodies, manifolds, m, p), NO_GAP * extent)
 
 
 @inner_kernel
