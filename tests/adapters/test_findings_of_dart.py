@@ -160,6 +160,29 @@ def test_a_column_leaves_its_plane_from_every_start_and_by_a_way_that_no_start_t
     assert fallen[0] == pytest.approx(fallen[2], abs=0.05) and fallen[0][1] < 0.6
 
 
+@pytest.mark.parametrize(
+    ("name", "params", "dimension", "profile", "lowest"),
+    [("overhang", {}, 2, "default", 1), ("overhang", {}, 2, "pgs", 1), ("pyramid", {}, 2, "default", 3),
+     ("pyramid", {}, 3, "default", 3), ("pyramid", {"rows": 5.0}, 2, "pgs", 5), ("heavy_on_light", {}, 2, "pgs", 1)],
+    ids=str,
+)  # fmt: skip
+def test_a_pile_that_starts_a_last_digit_higher_falls_for_a_step_above_its_lowest(
+    name, params, dimension, profile, lowest
+):
+    """What the bands of piles are made of beside sweeps: as it is posed it rests, or nearly."""
+    fallen = []
+    for ulp in (0, 1):
+        slot = Slot(name, params, dimension, "dart", profile, DT, None, ulp)
+        scene = replace(prepare(slot).scene, duration=2.0 * DT)
+        chosen = {setting.name: setting.value for setting in settings_of(ENGINE, slot, scene)}
+        found = run(ENGINE, scene, DT, chosen, Sampling(1, 0.0))
+        up = dimension - 1
+        fallen.append((found.pose[0, 1:, up] - found.pose[1, 1:, up]) / (9.81 * DT * DT))
+    posed, higher = fallen
+    assert abs(posed).max() < 0.5
+    assert higher[:lowest] == pytest.approx(0.0, abs=0.01) and higher[lowest:] == pytest.approx(1.0, abs=0.01)
+
+
 def test_every_family_has_an_experiment_that_is_about_its_rows():
     from adapters.dart.experiments import EXPERIMENTS
 
