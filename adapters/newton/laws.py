@@ -79,8 +79,13 @@ BALANCES: Mapping[str, tuple[str, ...]] = {
     "oblique": ("sideways",),
     "overlap": ("centre_moved",),
 }
+_STOPS = (
+    "numbers are singles; what sweeps leave below 0.1 mm/s is stopped, which no impulse tells: what overlaps ask for "
+    "after it makes up for it, but for roundings of places"
+)
 #: Why by scene and metric; what is a balance in some cells alone keeps the reason of the others.
 _DECIDED = {(scene, metric): _ROUNDED for scene, metrics in BALANCES.items() for metric in metrics}
+_DECIDED[("impact", "momentum_defect")] = _STOPS
 _DECIDED |= {(scene, metric): because for scene, (because, metrics) in MOTIONS.items() for metric in metrics}
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(

@@ -11,6 +11,11 @@ the steps of a motion that is known, that of the recurrence in doubles:
 Sweeps take back what those before them were off by, a share each, so that roundings of places count once a step. An
 impulse is one number for both bodies: places do not change a sum of momenta. Rebounds set the speed at which a contact
 parts, whatever sweeps have left of it: of places only the lever of a blow changes what two bodies have of its energy.
+
+Where sweeps stop a body it is otherwise. A stop takes what a sweep has left of a velocity, at most 0.1 mm/s, and no
+impulse tells of it; the sweeps after it ask for as much, the way that was left of the overlap over the step. In doubles
+both are the same number. In singles sweeps end where no overlap is seen any more, so that what they ask for is off by
+the roundings of a place over the step, as in any step that presses, and these are momentum.
 """
 
 from __future__ import annotations
@@ -35,13 +40,14 @@ class Roundings(NamedTuple):
     """What they add up to at most, and what a balance is told in.
 
     ``speed`` of velocities alone, ``levered`` with what levers of blows make of them, ``placed`` with what overlaps and
-    slips do [m/s]; ``place`` [m]; ``spin`` that a blow gives a body beside its speed [rad/m]; ``start``, the fastest
-    body as the scene starts [m/s].
+    slips do, ``told`` of impulses against velocities [m/s]; ``place`` [m]; ``spin`` that a blow gives a body beside its
+    speed [rad/m]; ``start``, the fastest body as the scene starts [m/s].
     """
 
     speed: float
     levered: float
     placed: float
+    told: float
     place: float
     spin: float
     start: float
@@ -54,7 +60,7 @@ def _share(of: Roundings, speed: float) -> float:
 
 #: Most that roundings make of a metric which is a balance, in its unit.
 LIMITS: Mapping[str, Callable[[Roundings], float]] = {
-    "momentum_defect": lambda of: _share(of, of.speed),
+    "momentum_defect": lambda of: _share(of, of.told),
     "energy_defect": lambda of: _share(of, 2.0 * of.levered),
     "energy_lost": lambda of: _share(of, 2.0 * of.levered),
     "asymmetry": lambda of: _share(of, of.placed),
@@ -84,7 +90,8 @@ def roundings_of(spatial: Scene, motion: Trajectory, dt: float, chosen: Mapping[
     speeds = np.linalg.norm(motion.twist[:, free, :axes], axis=2)
     far = float(np.linalg.norm(motion.pose[:, free, :axes], axis=2).max()) + max(map(_size, bodies))
     steps = len(motion.pose) - 1
-    pressed = np.count_nonzero(np.diff(motion.contacts.offset)) if motion.contacts else 0
+    pressing = np.diff(motion.contacts.offset) > 0 if motion.contacts else np.zeros(steps, bool)
+    pressed = np.count_nonzero(pressing)
     loaded = any(spatial.gravity) or any(any(body.force) for body in bodies)
     rebounds = chosen["rebound_iterations"] * (3.0 * INNER + 2.0) if chosen["rebounds"] else 0.0
     many = 2.0 * steps * loaded + pressed * (3.0 * chosen["iterations"] + rebounds)
@@ -93,7 +100,10 @@ def roundings_of(spatial: Scene, motion: Trajectory, dt: float, chosen: Mapping[
     speed, off = UNIT * many * float(speeds.max()), UNIT * pressed * ROUNDINGS * far
     place = UNIT * far * (steps + pressed * chosen["iterations"]) + speed * steps * dt
     levered = speed + off * spin * float(speeds.max())
-    return Roundings(speed, levered, speed + off / dt, place, spin, float(speeds[0].max()))
+    # Rebounds come after the last stop: what they leave at rest was not stopped.
+    stopped = not chosen["rebounds"] and bool((pressing[:, None] & (speeds[:-1] > 0.0) & (speeds[1:] == 0.0)).any())
+    placed = speed + off / dt
+    return Roundings(speed, levered, placed, placed if stopped else speed, place, spin, float(speeds[0].max()))
 
 
 def _turns(body: Body, rubs: bool) -> bool:

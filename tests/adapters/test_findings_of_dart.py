@@ -14,7 +14,10 @@ from adapters.dart.rubbing import rubbing_law
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.stepping import run
+from adapters.trajectory import Sampling
+from validation.bounds import planar
 from validation.catalogue import CATALOGUE
+from validation.cells import Slot, prepare, settings_of
 from validation.findings.files import findings_of
 
 ENGINE = DartEngine()
@@ -135,6 +138,49 @@ def test_a_solver_that_is_asked_for_alone_brings_its_sweeps_and_leaves_those_of_
     assert checked({**shipped, "solver": "fbf"})["second_sweeps"] == 30
     with pytest.raises(EngineError, match=r"^second_sweeps"):
         checked({**shipped, "second_sweeps": 0})
+
+
+@pytest.mark.parametrize(("n", "sweeps"), [(5.0, None), (10.0, 10), (10.0, 4)])
+def test_a_column_leaves_its_plane_from_every_start_and_by_a_way_that_no_start_tells(n, sweeps):
+    """Why a listed value may be less than its band: the first step decides, and the last digits of places decide it.
+
+    A unit in the last place more, which is not the same for all heights, parts faces that touched: what is above falls
+    for a step, g dt^2, where it rested. A unit less, and they touch, but what sweeps leave is another number.
+    """
+    ways, fallen = [], []
+    for ulp in (0, 1, -1, 2, -2):
+        slot = Slot("stack", {"n": n, "duration": 1.0}, 2, "dart", "pgs", DT, sweeps, ulp)
+        scene = prepare(slot).scene
+        chosen = {setting.name: setting.value for setting in settings_of(ENGINE, slot, scene)}
+        found = run(ENGINE, scene, DT, chosen, Sampling(1, 0.0))
+        ways.append(found.out_of_plane / planar(scene, DT).bound)
+        fallen.append((found.pose[0, 1:, 1] - found.pose[1, 1:, 1]) / (9.81 * DT * DT))
+    assert min(ways) > 1.0 and max(ways) > 1.2 * min(ways)
+    assert fallen[1][0] == pytest.approx(0.0, abs=0.01) and fallen[1][1:] == pytest.approx(1.0, abs=0.01)
+    assert fallen[0] == pytest.approx(fallen[2], abs=0.05) and fallen[0][1] < 0.6
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "dimension", "profile", "lowest"),
+    [("overhang", {}, 2, "default", 1), ("overhang", {}, 2, "pgs", 1), ("pyramid", {}, 2, "default", 3),
+     ("pyramid", {}, 3, "default", 3), ("pyramid", {"rows": 5.0}, 2, "pgs", 5), ("heavy_on_light", {}, 2, "pgs", 1)],
+    ids=str,
+)  # fmt: skip
+def test_a_pile_that_starts_a_last_digit_higher_falls_for_a_step_above_its_lowest(
+    name, params, dimension, profile, lowest
+):
+    """What the bands of piles are made of beside sweeps: as it is posed it rests, or nearly."""
+    fallen = []
+    for ulp in (0, 1):
+        slot = Slot(name, params, dimension, "dart", profile, DT, None, ulp)
+        scene = replace(prepare(slot).scene, duration=2.0 * DT)
+        chosen = {setting.name: setting.value for setting in settings_of(ENGINE, slot, scene)}
+        found = run(ENGINE, scene, DT, chosen, Sampling(1, 0.0))
+        up = dimension - 1
+        fallen.append((found.pose[0, 1:, up] - found.pose[1, 1:, up]) / (9.81 * DT * DT))
+    posed, higher = fallen
+    assert abs(posed).max() < 0.5
+    assert higher[:lowest] == pytest.approx(0.0, abs=0.01) and higher[lowest:] == pytest.approx(1.0, abs=0.01)
 
 
 def test_every_family_has_an_experiment_that_is_about_its_rows():
