@@ -11,6 +11,7 @@ import click
 from adapters import registry
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
+from validation.canonical import Suite
 from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.posed import is_file, pinned
@@ -33,7 +34,7 @@ class _Seconds(click.ParamType):
 
 
 #: The suites, each an option; the first is run where none is named.
-SUITES = {
+SUITES: dict[Suite, str] = {
     "quick": "A few cells a scene: the default.",
     "standard": "The cells whose FAILs are listed row by row.",
     "full": "All cells of each scene, and other steps.",
@@ -117,7 +118,7 @@ def request_from(options: dict[str, Any]) -> Request:
     )
 
 
-def _suite(options: dict[str, Any]) -> str:
+def _suite(options: dict[str, Any]) -> Suite:
     """The suite that is named; of two that are neither is what was asked for."""
     named = [suite for suite in SUITES if options[suite]]
     if len(named) > 1:
