@@ -29,7 +29,6 @@ from reports.page.scenes import scene_sections
 from reports.page.slimming import small_html
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, symbols
-from reports.speed import duration
 from reports.wording import missing_text, number
 from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
@@ -124,7 +123,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "dt": format_dt, "duration": duration, "data": as_data}
+    environment.filters |= {"number": number, "dt": format_dt, "data": as_data}
     environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text}
     return environment
 

@@ -260,6 +260,11 @@ def test_families_without_members_are_findings_of_their_engine(findings):
     assert [(entry.id, entry.dimension) for entry in found.unsupported] == [("planar", 0), ("again", 2)]
 
 
+def test_parameters_of_an_unsupported_entry_are_read_in_the_order_of_their_names(findings):
+    (entry,) = files.read("nameless", findings(UNSUPPORTED + "params = { n = 2, far = 1e8 }\n", HEAD)).unsupported
+    assert entry.params == (("far", 1e8), ("n", 2.0)) and all(type(value) is float for _, value in entry.params)
+
+
 @pytest.mark.parametrize("profiles", ['["reference"]', '["classical", "reference"]'])
 def test_rows_of_a_profile_that_promises_a_solution_cannot_be_listed_by_hand_either(findings, profiles):
     folder = findings(FAMILY.replace('["default"]', profiles), HEAD)

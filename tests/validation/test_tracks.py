@@ -1,14 +1,18 @@
 """Recordings: small, faithful to what is shown, and they say when a motion left what the tolerances allow."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from adapters.scene import Pair
 from adapters.trajectory import Trajectory
+from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.running.tracks import record, recording_from_bytes, representatives
+from validation.running.tracks import record, recording_from_bytes, representatives, tube
 
 DT = 1.0 / 240.0
 
@@ -41,6 +45,18 @@ def test_a_correct_method_stays_in_the_tube_in_every_phase_of_its_impacts(positi
     for height in np.linspace(1.0, 1.04, 9):
         scene, trajectory = bouncing(0.8, float(height), position_first)
         assert record(CATALOGUE["bounce"], scene, trajectory).departure is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "reach"),
+    [("m", 1.0), ("m/s", 0.5), ("m/s^2", 0.125), ("1", 0.0), ("rad", 0.0)],  # of what lasts half a second
+)
+def test_what_a_check_allows_of_places_speeds_and_accelerations_is_how_far_it_leads_in_the_whole_run(unit, reach):
+    fallen = CATALOGUE["impact"].scene(2)
+    scene = replace(fallen, duration=0.5, gravity=(0.0, -9.81), pairs=(Pair(restitution=0.0),))
+    judge = SimpleNamespace(checks=lambda scene, dt: [Check("speed", unit, 0.0, 7.0, "planted", "")])
+    found = tube(judge, scene, DT, 0.0)
+    assert found.distance == pytest.approx(max(7.0 * reach, 9.81 * DT**2), rel=1e-12) and found.per_impact == DT
 
 
 @pytest.mark.parametrize("e", [0.75, 0.85, 0.13])

@@ -1,9 +1,11 @@
 """An abort, a segfault, an exit, a hang or a leak costs that one cell; workers die with their parent."""
 
 import _multiprocessing
+import ctypes
 import errno
 import gc
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -166,6 +168,22 @@ def test_one_look_at_a_process_serves_until_names_or_modules_have_come(monkeypat
     assert "limits.workers" in state.changed(before)
     monkeypatch.setitem(sys.modules, "a_module_that_came", sys)
     assert state.still(later) is not later
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or sys.platform != "linux", reason="layout of glibc's fenv_t")
+@pytest.mark.parametrize("bit", [0x0040, 0x8000, 0x2000, 0x4000, 0x6000])
+def test_a_unit_that_takes_or_makes_no_denormals_or_rounds_otherwise_is_noticed(bit):
+    """MXCSR: denormals are zeros, or flushed to it; rounding down, up, to zero (Intel's manual, volume 1, 10.2.3)."""
+    libm, kept, spoilt = ctypes.CDLL("libm.so.6"), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
+    before = state.taken()
+    assert libm.fegetenv(kept) == libm.fegetenv(spoilt) == 0
+    spoilt[7] |= bit  # 28 bytes of the x87 unit stand before it
+    try:
+        libm.fesetenv(spoilt)
+        told = state._rounding()
+    finally:
+        libm.fesetenv(kept)
+    assert told != before.facts["floating point"] == state._rounding()
 
 
 def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():

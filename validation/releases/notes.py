@@ -21,7 +21,7 @@ from typing import Any
 from packaging.version import InvalidVersion, Version
 
 from adapters.engine_folder import inside
-from adapters.plain import REASON, one_line
+from adapters.plain import one_line
 from validation.findings import FindingsError
 
 FILE = "changes.toml"
@@ -75,7 +75,7 @@ def _note(label: str, entry: Any) -> Note:
         release = Version(entry["release"])
     except InvalidVersion:
         raise FindingsError(f"{label}: release {one_line(entry['release'], 40)!r} is no version") from None
-    said = (one_line(entry[name], REASON) for name in ("says", "source"))
+    said = (one_line(entry[name]) for name in ("says", "source"))
     return Note(release, tuple(entry["scenes"]), tuple(entry["profiles"]), *said)
 
 

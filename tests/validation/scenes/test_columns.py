@@ -69,6 +69,15 @@ def test_loads_that_were_not_recorded_are_missing_with_their_reasons():
     assert measured["impulse_scatter"] == (None, "impulses are not available")
 
 
+def test_an_interface_without_impulses_leaves_the_scatter_of_all_unknown():
+    """The one that is missing may be the one that shakes."""
+    scene = column()
+    measured = columns.measure(scene, resting(scene, [1.0, math.nan, 1.0]))
+    assert measured["interface_impulse[1]"] == measured["interface_impulse[3]"] == (1.0, "")
+    assert measured["interface_impulse[2]"][0] is None
+    assert measured["impulse_scatter"] == (None, "impulses are not available")
+
+
 def test_energy_is_the_mean_of_the_last_second_and_rest_begins_after_the_last_motion():
     scene = column(n=1)
     trajectory = resting(scene)
