@@ -53,6 +53,8 @@ def load_side(argument: str, out: Path) -> Side:
     MissingError
         If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
     """
+    if not argument:  # such as a variable that is not set
+        raise MissingError("run: a side is empty; `.` is the folder that you are in")
     if _RELEASE.fullmatch(argument):
         return _load_release(out, *argument.split("=="))
     path = Path(argument)

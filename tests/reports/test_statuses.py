@@ -65,6 +65,14 @@ def test_a_results_folder_without_a_name_is_refused(command):
     assert one_line(result).startswith("crosscheck: --out: is empty")
 
 
+def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
+    """It was the folder that one was in."""
+    result = call("compare", "", str(tmp_path))
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result).startswith("crosscheck: run: a side is empty")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
     """It was waited for, without an end."""
     pipe = tmp_path / "rows.jsonl"
