@@ -24,7 +24,7 @@ from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts, enter_impulses
 from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
 from reference_solver.spatial.meeting import Meeting
-from reference_solver.spatial.motion import accelerate, displace
+from reference_solver.spatial.motion import accelerate, displace, spin_of
 from reference_solver.spatial.operations import Spatial
 from reference_solver.spatial.operations import displace as displace_from_start
 from reference_solver.spatial.position import correct_positions
@@ -340,12 +340,16 @@ def find_loaded(island: Island) -> int:
 
 @inner_kernel
 def put_back(island: Island) -> None:
-    """Poses, and what goes with them."""
+    """Poses, and what goes with them: axes, inertia, and the spin that an angular momentum has about those axes."""
     bodies, lasting = island.bodies, island.sub.lasting
     space = Spatial(bodies, bodies.pose, bodies.twist)
     for i in range(len(bodies)):
         if bodies.motion[i] == FREE:
             displace_from_start(space, lasting, i)
+            if bodies.gyroscopic[i]:
+                w = spin_of(bodies, i, row(bodies.angular_momentum, i, 0))
+                for d in range(3):
+                    bodies.twist[i, 3 + d] = w[d]
 
 
 @inner_kernel
