@@ -16,17 +16,20 @@ from validation.records.store import Store
 
 
 @main.command()
-@click.argument("sources", metavar="STORE...", nargs=-1, required=True, type=Path)
+@click.argument("sources", metavar="STORE...", nargs=-1, required=True)
 @AS_JSON
 @OUT
-def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
+def merge(sources: tuple[str, ...], as_json: bool, out: Path) -> None:
     """Add the runs of other STOREs (results folders) to OUT; no row is lost, none is there twice."""
     told = {}
-    for source in sources:
+    if "" in sources:  # which would be the folder that one is in
+        raise SceneError("STORE: is empty; `.` is the folder that you are in")
+    folders = [Path(source) for source in sources]
+    for source in folders:
         Store(source, create=False).close()  # all of them must be there before the first is merged
     store = Store(out)
     try:
-        for source in sources:
+        for source in folders:
             told[str(source)] = vars(merge_stores(store, source))
     finally:
         store.close()

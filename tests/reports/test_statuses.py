@@ -73,6 +73,13 @@ def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_an_empty_name_is_no_store_to_merge(tmp_path):
+    result = call("merge", "", "--out", tmp_path / "out")
+    assert result.exit_code == statuses.WRONG_CALL
+    assert one_line(result).startswith("crosscheck: STORE: is empty")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
     """It was waited for, without an end."""
     pipe = tmp_path / "rows.jsonl"

@@ -67,6 +67,8 @@ def test_toml_and_json_give_the_same_scene(tmp_path):
         ("radius = 0.5", "radius = true", "bodies.1.shape.disc.radius"),
         ("pose = [0.0, 1.0, 0.0]", "pose = [0.0, true, 0.0]", "bodies.1.pose.1"),
         ("duration = 0.5", "duration = 0.5\nversion = true", "version"),
+        ("duration = 0.5", "duration = 0.5\nformat = true", "format"),
+        ("dimension = 2", "dimension = 2.0", "dimension"),
         ('name = "ball"', 'name = "floor"', "used 2 times"),
         ("duration = 0.5", "duration = 0.0", "duration"),
         ("dimension = 2", "dimension = 4", "dimension"),

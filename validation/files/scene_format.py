@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator
 
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
@@ -193,6 +193,14 @@ class SceneModel(_Strict):
     pairs: tuple[PairModel, ...] = ()
     constants: dict[str, Number | str] = {}
     checks: tuple[CheckModel, ...] = ()
+
+    @field_validator("format", "dimension", mode="before")
+    @classmethod
+    def _whole(cls, value: Any) -> Any:
+        """``true`` equals 1 and 2.0 equals 2, which is all that a choice of values asks."""
+        if isinstance(value, bool | float):
+            raise ValueError("must be a whole number")
+        return value
 
 
 def stated(model: SceneModel) -> Stated:
