@@ -10,8 +10,10 @@ import pytest
 from rich.console import Console
 
 from reports import speed
-from reports.command import benching
+from reports.command import benching, piles
 from validation.bench import timing as timings
+from validation.bench.piles import Row
+from validation.bench.statistics import Spread
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import primary_of, resolve
 from validation.records.store import Store
@@ -136,3 +138,13 @@ def test_the_quality_of_the_timings_is_one_line():
         "wall / CPU time 1.25 (median); 1 void"
     )
     assert speed.quality_line(table[table["void"] != ""]) == "nothing was timed"
+
+
+def test_costs_of_piles_hide_nothing_where_the_terminal_is_narrow():
+    """Intervals were cut at 80 columns: of a ratio its lower end was left."""
+    spread = Spread(6, 0.0123, 0.0874, 0.0341, 1.74)
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(piles._costs([Row("spatial boxes", 160, spread, spread, Spread(6, 1.0, 54.0, 30.1, 160.2))]))
+    said = console.export_text()
+    assert "…" not in said
+    assert all(word in said for word in ("spatial boxes", "160", "87.4 ms", "34.1", "1.74", "54", "30", "1.6e+02"))
