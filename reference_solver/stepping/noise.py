@@ -49,7 +49,7 @@ DRIFT = 1e-6
 TOUCHING = 1e-9
 #: A gap below this fraction of the smaller half width counts as none at impulse level. Contacts that hold each other
 #: have no room to close what round-off left between them: an answer that must do so differs by whole loads from one
-#: that need not, and is found by nobody. A tenth of what is touching; the next step closes what is left of it.
+#: that need not, and is found by nobody. A tenth of what is touching; `driver.settle` closes it.
 NO_GAP = 1e-10
 #: Velocities that differ from those the impulses give by more than this share of all that these can do are mended: some
 #: fifty units in the last place, which is what summing the impulses of a body costs itself.

@@ -12,7 +12,7 @@ import click
 from adapters import registry
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
-from reports.command.files import FILE, writable
+from reports.command.files import FILE, FOLDER, writable
 from reports.command.files import folder as writable_folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
@@ -25,7 +25,7 @@ from validation.running.plan import QUICK_DT
 
 @main.command()
 @click.argument("named", metavar="[RUN]...|SCENE", nargs=-1, shell_complete=scene_names)
-@click.option("--parquet", "target", type=Path, metavar="FOLDER", help="Write the RUNs as Parquet files there.")
+@click.option("--parquet", "target", type=FOLDER, metavar="FOLDER", help="Write the RUNs as Parquet files there.")
 @click.option("--all", "every", is_flag=True, help="With --parquet: all runs, not the latest.")
 @click.option("--to", "form", metavar="FORMAT", help="Write a cell of SCENE: python, or what its engine knows (mjcf).")
 @click.option("-o", "--output", type=FILE, help="File to write; stdout by default.")

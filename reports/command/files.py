@@ -23,7 +23,19 @@ class _File(click.ParamType):
         return Path(value)
 
 
-FILE = _File()
+class _Folder(click.ParamType):
+    """Name of a folder: an empty one, such as a variable that is not set, would be the folder that one is in."""
+
+    name = "folder"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if not str(value):
+            field = param.opts[0].strip("-") if param else "folder"
+            raise SceneError(f"{field}: is empty; `.` is the folder that you are in")
+        return Path(value)
+
+
+FILE, FOLDER = _File(), _Folder()
 
 
 def writable(path: Path, field: str) -> Path:

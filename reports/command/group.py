@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from pathlib import Path
 from typing import Any, NoReturn
 
 import click
@@ -16,6 +15,7 @@ from adapters.model import ReaderMissing
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports.command import statuses
+from reports.command.files import FOLDER
 from validation.findings import FindingsError
 from validation.records.store import MissingError, StoreError
 from validation.workers import LimitError
@@ -25,16 +25,8 @@ WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
 #: What the machine refuses: a process, its memory.
 TOO_LITTLE = (LimitError, IsolationError)
 
-
-def _folder(ctx: click.Context, param: click.Parameter, value: str) -> Path:
-    """A folder that has a name: of an empty one, such as a variable that is not set, nobody knows where it lies."""
-    if not value:
-        raise SceneError("--out: is empty; `.` is the folder that you are in")
-    return Path(value)
-
-
 OUT = click.option(
-    "--out", default="crosscheck-out", show_default=True, callback=_folder, metavar="PATH", help="Folder for results."
+    "--out", default="crosscheck-out", show_default=True, type=FOLDER, metavar="PATH", help="Folder for results."
 )
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from adapters.scene import SceneError
+from reports.command.files import FOLDER
 from reports.command.group import AS_JSON, OUT, main
 from reports.wording import plural
 from validation.records.keeping import Rules, doomed, prune
@@ -16,20 +17,17 @@ from validation.records.store import Store
 
 
 @main.command()
-@click.argument("sources", metavar="STORE...", nargs=-1, required=True)
+@click.argument("sources", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
 @AS_JSON
 @OUT
-def merge(sources: tuple[str, ...], as_json: bool, out: Path) -> None:
+def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
     """Add the runs of other STOREs (results folders) to OUT; no row is lost, none is there twice."""
     told = {}
-    if "" in sources:  # which would be the folder that one is in
-        raise SceneError("STORE: is empty; `.` is the folder that you are in")
-    folders = [Path(source) for source in sources]
-    for source in folders:
+    for source in sources:
         Store(source, create=False).close()  # all of them must be there before the first is merged
     store = Store(out)
     try:
-        for source in folders:
+        for source in sources:
             told[str(source)] = vars(merge_stores(store, source))
     finally:
         store.close()

@@ -24,6 +24,7 @@ from reports.command.selection import JOBS, SECONDS, request_from
 from reports.stages import say
 from reports.terminal import terminal
 from reports.wording import plural
+from validation.canonical import SUITES
 from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
 from validation.records.store import Store
 from validation.releases import environments, history
@@ -108,7 +109,7 @@ def _prepared(
 ) -> tuple[list[Release], list[Slot], Effort, Console]:
     """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
     console = terminal(stderr=True)
-    request = request_from({**options, "engine": [engine], "ulp": (), "quick": False, "standard": True, "full": False})
+    request = request_from({**options, **dict.fromkeys(SUITES, False), "standard": True, "engine": [engine], "ulp": ()})
     effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
     folder(out)
     asked = chosen(engine, which)

@@ -11,7 +11,7 @@ import click
 from adapters import registry
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
-from validation.canonical import Suite
+from validation.canonical import SUITES, Suite
 from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.posed import is_file, pinned
@@ -33,8 +33,8 @@ class _Seconds(click.ParamType):
         return seconds
 
 
-#: The suites, each an option; the first is run where none is named.
-SUITES: dict[Suite, str] = {
+#: What the options that name a suite say of it.
+WHAT_SUITES_ARE: dict[Suite, str] = {
     "quick": "A few cells a scene: the default.",
     "standard": "The cells whose FAILs are listed row by row.",
     "full": "All cells of each scene, and other steps.",
@@ -123,7 +123,7 @@ def _suite(options: dict[str, Any]) -> Suite:
     named = [suite for suite in SUITES if options[suite]]
     if len(named) > 1:
         raise SceneError(f"{' and '.join(f'--{suite}' for suite in named)}: a run is of one suite")
-    return named[0] if named else next(iter(SUITES))
+    return named[0] if named else SUITES[0]
 
 
 def asked(request: Request, options: dict[str, Any]) -> str:
@@ -157,7 +157,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             type=click.IntRange(-MOST_ULPS, MOST_ULPS),
             help="Move the start by this many units in the last place.",
         ),
-        *(click.option(f"--{suite}", is_flag=True, help=told) for suite, told in SUITES.items()),
+        *(click.option(f"--{suite}", is_flag=True, help=WHAT_SUITES_ARE[suite]) for suite in SUITES),
     )
     for option in reversed(options):
         command = option(command)

@@ -62,7 +62,7 @@ def test_a_results_folder_without_a_name_is_refused(command):
     """It was the folder that one was in: a variable that is not set filled it with results."""
     result = call(command, "--out", "")
     assert result.exit_code == statuses.WRONG_CALL
-    assert one_line(result).startswith("crosscheck: --out: is empty")
+    assert one_line(result).startswith("crosscheck: out: is empty")
 
 
 def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
@@ -72,14 +72,15 @@ def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
     assert one_line(result).startswith("crosscheck: run: a side is empty")
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
-def test_an_empty_name_is_no_store_to_merge(tmp_path):
-    result = call("merge", "", "--out", tmp_path / "out")
+@pytest.mark.parametrize(("arguments", "field"), [(["merge", ""], "sources"), (["export", "--parquet", ""], "parquet")])
+def test_a_folder_without_a_name_is_none_to_merge_or_to_write_to(tmp_path, arguments, field):
+    result = call(*arguments, "--out", tmp_path / "out")
     assert result.exit_code == statuses.WRONG_CALL
-    assert one_line(result).startswith("crosscheck: STORE: is empty")
+    assert one_line(result) == f"crosscheck: {field}: is empty; `.` is the folder that you are in"
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
     """It was waited for, without an end."""
     pipe = tmp_path / "rows.jsonl"
