@@ -28,6 +28,9 @@ FORCES, IMPACT, RELEASE = 0, 1, 2
 #: until two bodies that rock rest on each other, by constant acceleration or where rows turn at impulse level (E22).
 FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING = 0, 1, 2, 3, 4
 
+#: Contacts that there is room for with each body of a piece.
+CONTACTS_PER_BODY = 4
+
 #: Entries of `Journal.used`.
 PIECES, BODIES, CONTACTS, STEPS = 0, 1, 2, 3
 
@@ -51,7 +54,7 @@ class Journal(NamedTuple):
 def allocate_journal(dimension: int, bodies: int, pieces: int) -> Journal:
     """Return room for about ``pieces`` pieces of ``bodies`` bodies; none of either is switched off."""
     p, v, d = POSE_SIZE[dimension], TWIST_SIZE[dimension], dimension
-    rows, contacts, n = pieces * bodies, 4 * pieces * bodies, bodies if pieces else 0
+    rows, contacts, n = pieces * bodies, CONTACTS_PER_BODY * pieces * bodies, bodies if pieces else 0
     return Journal(
         used=np.zeros(4, np.int64),
         time=np.zeros((pieces, 2)),
@@ -70,6 +73,13 @@ def is_full(journal: Journal) -> bool:
     """Whether something did not fit."""
     rooms = (len(journal.time), len(journal.body), len(journal.name))
     return bool(len(journal.time) and (journal.used[:3] > rooms).any())
+
+
+def room_taken(journal: Journal) -> int:
+    """How many ``pieces`` `allocate_journal` must be asked for to hold what this one does."""
+    pieces, bodies, contacts, _ = (int(count) for count in journal.used)
+    n = max(len(journal.pose), 1)
+    return max(pieces, -(-bodies // n), -(-contacts // (CONTACTS_PER_BODY * n)))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ import numpy as np
 from reference_solver.certificate import columns, summary
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
-from reference_solver.pieces import Journal, allocate_journal, is_full, pieces_of
+from reference_solver.pieces import Journal, allocate_journal, is_full, pieces_of, room_taken
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
@@ -137,11 +137,13 @@ class Simulation:
         """Run part by part: each has a journal, and a tally that is then entered in that of the run."""
         whole, parts, tallies, journals = self._world.tally.copy(), [], [], []
         part = stride if certificates else stride * max(1, STEPS_PER_JOURNAL // stride)
+        taken = 0  # by the part before, as pieces of a step
         for chunk in [part] * (steps // part) + [steps % part] * (steps % part > 0):
             self._world.tally[:] = 0.0
             self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
             if pieces:
-                frames, journal = self._journalled(chunk, stride, contacts)
+                frames, journal = self._journalled(chunk, stride, contacts, max(2, taken) * chunk + 16)
+                taken = -(-room_taken(journal) // chunk)
                 journals.append(journal)
             else:
                 frames = self._world.run(chunk, stride, contacts)
@@ -153,9 +155,9 @@ class Simulation:
         journals = journals or [allocate_journal(self.model.dimension, len(self.model.bodies), 0)]
         return joined(parts), tallies[: steps // stride], journals
 
-    def _journalled(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, Journal]:
-        """Run once with pieces recorded; again from the start, with twice the room, while there was too little."""
-        n, room = len(self.model.bodies), 2 * steps + 16
+    def _journalled(self, steps: int, stride: int, contacts: bool, room: int) -> tuple[Frames, Journal]:
+        """Run once with pieces recorded; again from the start, with twice the ``room``, while there was too little."""
+        n = len(self.model.bodies)
         while True:
             trial = self._world.copy()
             trial.journal = allocate_journal(self.model.dimension, n, room)

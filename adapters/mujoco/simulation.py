@@ -42,7 +42,7 @@ class MujocoSimulation(Simulation):
         self._poses = np.array([body.pose for body in scene.bodies], dtype=float)
         self._twists = np.zeros((len(scene.bodies), 6))
         names = [self._model.geom(g).name for g in range(self._model.ngeom)]
-        self._body_of_geom = [int(name.removeprefix("geom")) for name in names]
+        self._body_of_geom = np.array([int(name.removeprefix("geom")) for name in names], np.int64)
         self._set_start()
 
     def _set_start(self) -> None:
@@ -116,16 +116,19 @@ class MujocoSimulation(Simulation):
 
         RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN).
         """
+        contact, count = self._data.contact, self._data.ncon
+        if not count:
+            return Contacts.from_rows([], 3)
+        force = np.zeros((count, 6))
+        for k in range(count):
+            self._mujoco.mj_contactForce(self._model, self._data, k, force[k])
+        frame = contact.frame.reshape(count, 3, 3)
         one_solve = self._settings["integrator"] != "RK4"
-        force, rows = np.zeros(6), []
-        for k in range(self._data.ncon):
-            contact = self._data.contact[k]
-            frame = contact.frame.reshape(3, 3)
-            self._mujoco.mj_contactForce(self._model, self._data, k, force)
-            impulse = self._dt * (force[:3] @ frame) if one_solve else np.full(3, np.nan)
-            a, b = (self._body_of_geom[int(g)] for g in contact.geom)
-            rows.append((a, b, contact.pos.copy(), frame[0].copy(), impulse, float(contact.dist)))
-        return Contacts.from_rows(rows, 3)
+        impulse = self._dt * (force[:, None, :3] @ frame)[:, 0] if one_solve else np.full((count, 3), np.nan)
+        first, second = self._body_of_geom[contact.geom].T
+        turned = np.where(first < second, 1.0, -1.0)[:, None]
+        pair = np.minimum(first, second), np.maximum(first, second)
+        return Contacts(*pair, contact.pos.copy(), turned * frame[:, 0], turned * impulse, contact.dist.copy())
 
     def readback(self) -> dict[str, Any]:
         """What the compiled model holds."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.run import Run, cross, scaled_along, twist_of
 from reference_solver.certification.audit.turning import changes_of_force
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
@@ -255,7 +255,7 @@ def integrated_turn(q: Array, before: Array, after: Array, moments: Array, lengt
     def rate(q: Array, share: float) -> Array:
         momentum = before + share * (after - before)
         turn = rotation(np.concatenate([np.zeros((len(q), 3)), q], axis=1))
-        w = np.einsum("sij,sj,skj,sk->si", turn, 1.0 / moments, turn, momentum)
+        w = scaled_along(turn, 1.0 / moments, momentum)
         scalar, vector = q[:, :1], q[:, 1:]
         return 0.5 * np.concatenate(
             [-(w * vector).sum(axis=1, keepdims=True), scalar * w + np.cross(w, vector)], axis=1

@@ -193,8 +193,7 @@ class Run:
         moments, w = self.moments[self.pieces.body], twist[:, self.d :]
         if self.d == 2:
             return moments * w
-        turn = rotation(pose)
-        return np.asarray(np.einsum("sij,sj,skj,sk->si", turn, moments, turn, w))
+        return scaled_along(rotation(pose), moments, w)
 
     @cached_property
     def pushed(self) -> tuple[Array, Array, Array, Array]:
@@ -250,6 +249,12 @@ class Run:
 def twist_of(body: Body) -> Array:
     """Twist of a body at the start, zeros where it has none."""
     return np.asarray(np.zeros(3 if body.dimension == 2 else 6) if body.twist is None else body.twist, dtype=float)
+
+
+def scaled_along(axes: Array, factor: Array, vector: Array) -> Array:
+    """Vectors (s, 3), each part along one of the own ``axes`` (s, 3, 3), which are columns, times its factor (s, 3)."""
+    own = factor * np.einsum("sij,si->sj", axes, vector)
+    return np.asarray(np.einsum("sij,sj->si", axes, own))
 
 
 def cross(a: Array, b: Array) -> Array:
