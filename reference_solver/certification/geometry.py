@@ -155,19 +155,23 @@ def rotation(pose: Array) -> Array:
 
     A quaternion need not have exactly the length one: the matrix is that of its direction.
     """
+    rows: tuple[tuple[Array, ...], ...]
     if pose.shape[-1] == 3:
         c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
-        return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
-    q = pose[..., 3:] / np.linalg.norm(pose[..., 3:], axis=-1, keepdims=True)
-    w, x, y, z = (q[..., k] for k in range(4))
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-        ],
-        -2,
-    )
+        rows = ((c, -s), (s, c))
+    else:
+        q = pose[..., 3:] / np.linalg.norm(pose[..., 3:], axis=-1, keepdims=True)
+        w, x, y, z = (q[..., k] for k in range(4))
+        rows = (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+    matrix = np.empty((*pose.shape[:-1], len(rows), len(rows)))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            matrix[..., i, j] = entry
+    return matrix
 
 
 def reach(shape: Any) -> float:
@@ -232,7 +236,7 @@ def core_of(shape: Any, pose: Array) -> Core:
         local, edge, radius = np.zeros((1, d)), np.zeros((0, 2), int), float(shape.radius)
     else:
         raise ValueError(f"shapes: {shape!r} is none of half-space, disc, sphere, box, capsule, polygon")
-    vertex = centre[:, None] + np.einsum("sij,kj->ski", axes, local)
+    vertex = centre[:, None] + local @ axes.swapaxes(1, 2)
     return Core(kind, vertex, edge, axes, centre, half, radius)
 
 
@@ -288,8 +292,9 @@ def _deepest(a: Core, b: Core) -> tuple[Array, Array]:
 
 def _parted(a: Core, b: Core, axes: Array) -> Array:
     """How far apart (s, m) cores are along directions (s, m, d) from A to B."""
-    low = np.einsum("ski,smi->smk", b.vertex - a.centre[:, None], axes).min(axis=2)
-    high = np.einsum("ski,smi->smk", a.vertex - a.centre[:, None], axes).max(axis=2)
+    directions = axes.swapaxes(1, 2)
+    low = ((b.vertex - a.centre[:, None]) @ directions).min(axis=1)
+    high = ((a.vertex - a.centre[:, None]) @ directions).max(axis=1)
     return np.asarray(low - high)
 
 
@@ -396,9 +401,9 @@ def _corners_to_edges(a: Core, b: Core, swap: bool = False) -> tuple[Array, Arra
 
 def _corners_to_box(a: Core, b: Core, swap: bool) -> tuple[Array, Array, Array]:
     """From each corner of A to the solid box B."""
-    local = np.einsum("ski,sij->skj", a.vertex - b.centre[:, None], b.axes)
+    local = (a.vertex - b.centre[:, None]) @ b.axes
     outside = local - np.clip(local, -b.half, b.half)
-    return _pairs(a.vertex, a.vertex - np.einsum("skj,sij->ski", outside, b.axes), swap)
+    return _pairs(a.vertex, a.vertex - outside @ b.axes.swapaxes(1, 2), swap)
 
 
 def _edges_to_edges(a: Core, b: Core) -> tuple[Array, Array, Array]:

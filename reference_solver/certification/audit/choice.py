@@ -67,11 +67,11 @@ def closes_sooner(run: Run, rows: Indices, shapes: Pair, poses: tuple[Array, Arr
 
 def _fastest(body: Core, twist: Array, axes: Array, noise: float) -> Array:
     """Speed (s, m) along ``axes`` (s, m, d) of the fastest of those corners that are farthest along them."""
-    d = axes.shape[2]
+    d, directions = axes.shape[2], axes.swapaxes(1, 2)
     arms = body.vertex - body.centre[:, None]
-    height = np.einsum("ski,smi->smk", arms, axes)
+    height = arms @ directions
     spin = np.repeat(twist[:, None, d:], arms.shape[1], axis=1).reshape(-1, twist.shape[1] - d)
     speeds = twist[:, None, :d] + turned(spin, arms.reshape(-1, d)).reshape(arms.shape)
-    along = np.einsum("ski,smi->smk", speeds, axes)
-    far = height >= height.max(axis=2, keepdims=True) - noise
-    return np.asarray(np.where(far, along, -np.inf).max(axis=2))
+    along = speeds @ directions
+    far = height >= height.max(axis=1, keepdims=True) - noise
+    return np.asarray(np.where(far, along, -np.inf).max(axis=1))
