@@ -33,6 +33,10 @@ LARGEST_TRIANGLE = 16_000_000
 #: the impulse, 45 units in the last place: what the sum over a tall column cannot be better than.
 IMPULSE_SHARE = 0.1
 
+#: Most contacts whose problem is solved by pivots (E45): a table of 4 c x (4 c + 2) numbers, 8 MB for these, and each
+#: pivot passes over all of it.
+PIVOTED_CONTACTS = 256
+
 CONTACT = np.dtype(
     [
         ("body", "i8", 2),  # A, B
@@ -88,6 +92,9 @@ class Problem(NamedTuple):
     upper: Array  # U above its diagonal, column by column from its first entry
     diagonal: Array  # (D n,): of U
     right: Array  # (D n,): right side, then solution
+    table: Array  # (r, r + 2): of the pivots, r = 4 of each contact, in the plane up to `PIVOTED_CONTACTS`
+    basic: Indices  # (r,): variable of each row of it
+    free: Indices  # (r + 1,): variable of each column
 
 
 def allocate_problem(dimension: int, bodies: int, contacts: int, used: bool) -> Problem:
@@ -105,7 +112,7 @@ def allocate_problem(dimension: int, bodies: int, contacts: int, used: bool) -> 
     velocities, rows = (3, 2) if dimension == 2 else (6, 3)
     if not used:
         bodies = contacts = 1
-    unknowns = velocities * bodies
+    unknowns, pivoted = velocities * bodies, 4 * min(contacts, PIVOTED_CONTACTS) if used and dimension == 2 else 0
     triangle = min(unknowns * (unknowns - 1) // 2, LARGEST_TRIANGLE)
     size = np.zeros(SIZES, np.int64)
     size[ROW_COUNT], size[VELOCITY_COUNT] = rows, velocities
@@ -120,6 +127,9 @@ def allocate_problem(dimension: int, bodies: int, contacts: int, used: bool) -> 
         upper=np.zeros(triangle),
         diagonal=np.zeros(unknowns),
         right=np.zeros(unknowns),
+        table=np.zeros((pivoted, pivoted + 2)),
+        basic=np.zeros(pivoted, np.int64),
+        free=np.zeros(pivoted + 1, np.int64),
     )
 
 
@@ -138,4 +148,7 @@ def problem_part(problem: Problem, count: int) -> Problem:
         problem.upper,
         problem.diagonal,
         problem.right,
+        problem.table,
+        problem.basic,
+        problem.free,
     )

@@ -7,6 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.newton import newton
 from reference_solver.direct.ordering import order_bodies
+from reference_solver.direct.pivoting import COVERINGS, find_by_pivots
 from reference_solver.direct.problem import (
     CONTACTS,
     FACTORISATIONS,
@@ -32,6 +33,9 @@ POLISH = 0.3
 STANDING = 0.9
 #: One that multiplies the residual by this has brought its own round-off, which goes with the stiffness.
 NOISY = 2.0
+#: Where more than this is left of the residual rounds have found no answer: far above round-off, and what a certificate
+#: refuses. Planar problems are then solved by pivots (E45).
+UNFOUND = 1e-10
 #: Friction within this share of its limit slides, or is about to: it does not end that way.
 AT_LIMIT = 1e-9
 #: What the stiffness grows by after a round, and falls by where Newton's method fails. After each failure it grows by
@@ -81,6 +85,17 @@ def solve_problem(problem: Problem, tolerance: float, budget: int, fresh: bool) 
             keep(problem)
         if finished:
             break
+    for attempt in range(COVERINGS):
+        if best <= UNFOUND or problem.size[FACTORISATIONS] == 0:
+            break
+        withdraw(problem)
+        if not find_by_pivots(problem, attempt):
+            break
+        commit(problem, 1.0)
+        residual = scaled_map(problem)
+        if residual < best:
+            best = residual
+            keep(problem)
     return best
 
 

@@ -79,9 +79,10 @@ class SteppedWorld:
         """Return a world of its own in the same state.
 
         Tables are shared: nothing writes to them, and a copy of one with strides of zero would be one number per pair,
-        and of another type, for which all kernels would be compiled anew.
+        and of another type, for which all kernels would be compiled anew. So is the table of pivots, up to 8 MB of
+        which nothing outlasts a solve.
         """
-        other, known = copy(self), {id(table): table for table in self._laws}
+        other, known = copy(self), {id(table): table for table in (*self._laws, self._problem.table)}
         for name, value in vars(self).items():
             setattr(other, name, _copied(value, known))
         return other

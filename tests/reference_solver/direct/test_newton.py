@@ -10,28 +10,12 @@ from reference_solver.exact_contact import coulomb_solutions
 SOLVED = 1e-13
 
 
-def random_problem(direct, seed, contacts, dimension=2, mu=0.5):
-    """Bodies of masses 0.1 to 10 with random contacts; the first contacts reach every body from the fixed one."""
-    rng = np.random.default_rng(seed)
-    rows, width = (2, 3) if dimension == 2 else (3, 6)
-    bodies = 1 + max(1, contacts // 2)
-    pairs = [(min(k, bodies - 2), min(k, bodies - 2) + 1) for k in range(contacts)]
-    normals = rng.normal(size=(contacts, rows, rows))
-    frames = np.linalg.qr(normals)[0]
-    jacobians = np.zeros((contacts, 2, rows, width))
-    jacobians[:, 1, :, :rows], jacobians[:, 0, :, :rows] = frames, -frames
-    jacobians[:, :, :, rows:] = rng.normal(size=(contacts, 2, rows, width - rows))
-    masses = 10.0 ** rng.uniform(-1.0, 1.0, (bodies, width))
-    twists = rng.normal(size=(bodies, width)) * (np.arange(bodies) > 0)[:, None]
-    return direct.problem(dimension, sorted(pairs), jacobians, masses, twists, mu, 0.0)
-
-
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("seed", range(30))
 def test_planar_problems_agree_with_enumeration(direct, seed, mu):
     """W p + q of the answer is one of the velocities that enumeration of all 4^c modes finds (O9)."""
     contacts = 1 + seed % 5
-    problem = random_problem(direct, seed, contacts, mu=mu)
+    problem = direct.random(seed, contacts, mu=mu)
     w, q = direct.delassus(problem)
     solutions = coulomb_solutions(w, q, [mu] * contacts)
     residual = direct.solve(problem, SOLVED, 500)
@@ -46,7 +30,7 @@ def test_planar_problems_agree_with_enumeration(direct, seed, mu):
 def test_spatial_answers_obey_the_law(direct, seed):
     """Signs, complementarity, disc, and friction against the slip, checked from W and q alone."""
     mu, contacts = 0.4, 1 + seed % 6
-    problem = random_problem(direct, seed, contacts, dimension=3, mu=mu)
+    problem = direct.random(seed, contacts, dimension=3, mu=mu)
     w, q = direct.delassus(problem)
     assert direct.solve(problem, SOLVED, 500) <= SOLVED
     p = problem.contact.best.copy()
@@ -62,22 +46,10 @@ def test_spatial_answers_obey_the_law(direct, seed):
     assert np.abs(power).max() <= 1e-11 * max(size, 1.0)
 
 
-def pressed_block(direct, points, mass=1.0):
-    """A block pressed on the floor at several points of one line: redundant beyond two."""
-    place = np.linspace(-1.0, 1.0, points)
-    jacobians = np.zeros((points, 2, 2, 3))
-    jacobians[:, 1, 0, 1], jacobians[:, 1, 0, 2] = 1.0, place
-    jacobians[:, 1, 1, 0], jacobians[:, 1, 1, 2] = -1.0, 0.5
-    jacobians[:, 0] = -jacobians[:, 1]
-    masses = np.array([[1.0] * 3, [mass, mass, mass / 3.0]])
-    twists = np.array([[0.0] * 3, [0.2, -1.0, 0.0]])
-    return direct.problem(2, [(0, 1)] * points, jacobians, masses, twists, 0.5, 0.0)
-
-
 @pytest.mark.parametrize("points", [2, 3, 10])
 def test_redundant_points_share_one_force(direct, points):
     """Single impulses are not unique; their sums, and the rest they bring about, are."""
-    problem = pressed_block(direct, points)
+    problem = direct.pressed_block(points)
     assert direct.solve(problem, SOLVED, 100) <= SOLVED
     assert problem.contact.best[:, 0].sum() == pytest.approx(1.0, rel=1e-14)
     assert problem.contact.best[:, 1].sum() == pytest.approx(0.2, rel=1e-13)
@@ -91,7 +63,7 @@ def test_points_out_of_line_leave_the_load_to_the_highest(direct, ratio):
     While all three are pressed, rounds move load at a pace that goes with the ratio; their number must not go with its
     inverse.
     """
-    problem = pressed_block(direct, 3)
+    problem = direct.pressed_block(3)
     problem.contact.target[1] = ratio
     # The pull along the floor is kept out: it would tilt the block.
     problem.body.twist[1, 0] = 0.0
@@ -103,7 +75,7 @@ def test_points_out_of_line_leave_the_load_to_the_highest(direct, ratio):
 
 def test_a_worse_answer_is_not_taken(direct):
     """Without a factorisation to spend nothing changes, and the residual is that of the start."""
-    problem = pressed_block(direct, 2)
+    problem = direct.pressed_block(2)
     before = direct.solve(problem, SOLVED, 0)
     assert before > 0.1
     assert np.abs(problem.contact.best).max() == 0.0
@@ -133,7 +105,7 @@ def test_a_fresh_start_forgets_the_impulses_and_nothing_else(direct):
     """From wrong impulses: the same velocities, and without a factorisation to spend those impulses stay the best."""
     twists = []
     for spoilt in (False, True):
-        problem = random_problem(direct, 7, 5)
+        problem = direct.random(7, 5)
         if spoilt:
             contact, body = problem.contact, problem.body
             contact.impulse[:, :2] = [1.0, 0.1]
@@ -153,7 +125,7 @@ def test_units_change_nothing_but_units(direct):
     length, mass, time = 2.0**7, 2.0**-5, 2.0**3
     answers = []
     for scaled in (False, True):
-        problem = random_problem(direct, 3, 6)
+        problem = direct.random(3, 6)
         if scaled:
             speed = length / time
             factor = np.array([1.0, 1.0, length])
