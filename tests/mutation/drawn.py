@@ -19,6 +19,8 @@ SHARED = 30.0
 #: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
 REST_OF, LONGEST = 2, 30.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
+#: What became of a mutant whose statements have changed since it was drawn.
+GONE = "gone"
 #: Verdicts that count as noticed: what only time ended is noticed as well.
 NOTICED = (KILLED, TIMED)
 
@@ -96,7 +98,7 @@ def table(rows: list[Drawn]) -> list[str]:
     lines += [
         "", f"Of the {len(missed)} that are not noticed {because} have a reason: they change words only, or nothing "
         "that can be seen. They count as not noticed all the same. *Since* is what tests that were written for them "
-        "make of the others:", "",
+        f"make of the others, *{GONE}* where the code is another:", "",
         "| function | change | verdict | since | reason |", "|---|---|---|---|---|",
     ]  # fmt: skip
     for row in rows:

@@ -7,7 +7,8 @@ each is written down when it ends, so a run that was stopped goes on where it wa
 whatever they are; ``--survivors`` runs only those of their mutants that survived last time. ``--check N`` runs N
 mutants of one subject, both chosen by the commit, writes nothing, and fails on a survivor that is not listed. It
 chooses among the subjects that are as they were when they ran: survivors of another are nobody's yet. Which those are
-is said, and more than half of all is a failure. ``--sample N --seed S`` asks about all modules (`sample`).
+is said, and more than half of all is a failure. ``--sample N --seed S`` asks about all modules (`sample`), ``--again``
+what the tests of now make of those that it missed.
 
 A survivor is listed by its function and its change, so that an edit elsewhere does not make it new. Its reason is
 written by hand, but for the few that `known_by_form` can tell; survivors without one are *open*. What only a time limit
@@ -30,7 +31,7 @@ from pathlib import Path
 
 from checkout import copy_of_the_checkout
 from lists import Change, Score, is_current, listed, stored, write_score, write_survivors, write_table
-from sample import sample
+from sample import again, sample
 from subjects import ROOT, SUBJECTS, hash_of, tests_of
 
 CONFIG = """
@@ -146,13 +147,16 @@ def main() -> None:
     parser.add_argument("--check", type=int, metavar="N", help="run N mutants of one subject, write nothing")
     parser.add_argument("--sample", type=int, metavar="N", help="draw N mutants of all modules, and run them")
     parser.add_argument("--seed", type=int, default=1, help="of what --sample draws")
-    parser.add_argument("--again", action="store_true", help="with --sample: what survived meets the tests of now")
+    parser.add_argument("--again", action="store_true", help="what the kept sample missed meets the tests of now")
     parser.add_argument("--table", action="store_true", help="only write the table, from the scores that are there")
     options = parser.parse_args()
     if unknown := [module for module in options.modules if module not in SUBJECTS]:
         raise SystemExit(f"{unknown[0]}: stands in SUBJECTS with no tests")
-    if options.sample:
-        sample(options.seed, options.sample, working_folder(), options.again)
+    if options.again or options.sample:
+        if options.again:
+            again(working_folder())
+        else:
+            sample(options.seed, options.sample, working_folder())
         write_table()
         return
     stale = [module for module in SUBJECTS if not is_current(module)]

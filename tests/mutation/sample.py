@@ -21,12 +21,13 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from checkout import copy_of_the_checkout
 from drawn import (
     APART,
+    GONE,
     KILLED,
     LONGEST,
     MEETS,
@@ -117,50 +118,83 @@ def change_of(tree: Module, mutation: Mutation) -> str:
     return f"{' '.join(old)} -> {' '.join(new)}"
 
 
-def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
+@dataclass(frozen=True)
+class Bench:
+    """What mutants meet: a copy of the checkout, and which tests reach which statements of it."""
+
+    copy: Path
+    known: Mapping[str, Record]
+    reach: Reach
+
+    @classmethod
+    def of(cls, folder: Path) -> Bench:
+        """Copy the checkout into ``folder``, and record every test file that has changed since."""
+        copy, records = folder / "copy", folder / "records"
+        copy_of_the_checkout(copy)
+        record(copy, records, RECORDED)
+        import_common()
+        (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
+        with chdir(folder):
+            config()  # read where it stands, and then remembered
+        known = recorded(records)
+        return cls(copy, known, by_block(known))
+
+    def verdict(self, module: str, tree: Module, function: str, mutation: Mutation) -> tuple[str, int, str]:
+        """Verdict over one mutant of ``tree``, how many tests were asked, and the one that failed."""
+        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
+        assert isinstance(spoilt, Module)
+        tests_of_it = reaching(self.reach, tree.code, spoilt.code, module, function)
+        shared = {name: each.shared for name, each in self.known.items()}
+        verdict, tests, failed = judged(self.copy, module, spoilt.code, in_turn(tests_of_it), shared)
+        if "::" in failed and asked(self.copy, [failed], 60.0)[0] != 0:
+            verdict = UNSHOWN  # it fails without the mutant as well
+        if verdict in (SURVIVED, UNREACHED) and not known_by_form(change_of(tree, mutation)):
+            rest = cut_short(self.known, module)
+            failed = by_the_rest(self.copy, module, spoilt.code, rest, self.known) or failed
+            verdict = KILLED if failed else verdict
+        return verdict, tests, failed
+
+
+def sample(seed: int, number: int, folder: Path) -> None:
     """Draw, run and write down; what is written already of this seed and these sources is not run again."""
-    copy, records = folder / "copy", folder / "records"
-    copy_of_the_checkout(copy)
-    record(copy, records, RECORDED)
-    known = recorded(records)
-    reach = by_block(known)
-    import_common()
-    (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
-    with chdir(folder):
-        config()  # read where it stands, and then remembered
+    bench = Bench.of(folder)
     each = counts(folder / "counts.json")
     total = sum(each.values())
     of = hashlib.sha256(b"".join((ROOT / module).read_bytes() for module in each)).hexdigest()[:12]
     found = {row.number: row for row in stored() if (row.seed, row.of) == (seed, of)}
-    last = ""
     for k, index in enumerate(draw(seed, number, total)):
-        if k in found and not (again and found[k].verdict not in NOTICED and found[k].now != KILLED):
+        if k in found:
             continue
         module, place = located(each, index)
-        if module != last:
-            tree, mutations = mutations_of(module)
-            last = module
+        tree, mutations = mutations_of(module)
         function, mutation = mutations[place]
-        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
-        assert isinstance(spoilt, Module)
-        tests_of_it = reaching(reach, tree.code, spoilt.code, module, function)
-        shared = {name: each.shared for name, each in known.items()}
-        verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it), shared)
-        if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
-            verdict = UNSHOWN  # it fails without the mutant as well
         change = change_of(tree, mutation)
-        why = known_by_form(change)
-        if verdict in (SURVIVED, UNREACHED) and not why:
-            failed = by_the_rest(copy, module, spoilt.code, cut_short(known, module), known) or failed
-            verdict = KILLED if failed else verdict
-        if k in found:
-            found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
-        else:
-            reason = "" if verdict in NOTICED else why
-            found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=MEETS)
-        print(f"{k + 1} of {number}: {verdict}, {found[k].function}: {found[k].change[:100]}", flush=True)
+        verdict, tests, failed = bench.verdict(module, tree, function, mutation)
+        reason = "" if verdict in NOTICED else known_by_form(change)
+        found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=MEETS)
+        print(f"{k + 1} of {number}: {verdict}, {function}: {change[:100]}", flush=True)
         write(list(found.values()))
-    return list(found.values())
+
+
+def again(folder: Path) -> None:
+    """Let what was not noticed of the sample that is kept meet the tests of now, in the sources of now.
+
+    A mutant is found by its function and its change; one whose statements have changed since is `GONE`.
+    """
+    rows, bench = stored(), Bench.of(folder)
+    for place, row in enumerate(rows):
+        if row.verdict in NOTICED or row.now in NOTICED:
+            continue
+        tree, mutations = mutations_of(row.module) if (ROOT / row.module).exists() else (None, [])
+        same = [mutation for function, mutation in mutations if function == row.function]
+        same = [mutation for mutation in same if tree and change_of(tree, mutation) == row.change]
+        if tree and same:
+            verdict, tests, failed = bench.verdict(row.module, tree, row.function, same[0])
+            rows[place] = replace(row, now=verdict, tests=tests, failed=failed)
+        else:
+            rows[place] = replace(row, now=GONE)
+        print(f"{row.function}: {rows[place].now}: {row.change[:100]}", flush=True)
+        write(rows)
 
 
 def located(each: dict[str, int], index: int) -> tuple[str, int]:
