@@ -17,6 +17,7 @@ import json
 import os
 import random
 import re
+import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,6 +32,9 @@ from drawn import (
     KILLED,
     LONGEST,
     MEETS,
+    MEETS_NEAR,
+    NEAR,
+    NEAR_SECONDS,
     NOTICED,
     RECORDED,
     REST_OF,
@@ -50,13 +54,15 @@ from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, PATIENCE, import_common, run
-from reach import PLUGIN, Reach, Record, block_of, by_block, dotted, environment, record, recorded
+from reach import PLUGIN, Reach, Record, block_of, by_block, dotted, environment, record, recorded, test_files
 from subjects import PACKAGES, ROOT
 
 #: Seconds of wall time that a whole file may take: what its tests start in processes of their own counts nowhere else.
 PATIENCE_WITH_FILES = 120.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
+#: Exit statuses where a test file cannot even be collected, or pytest itself ended in an error.
+BROKEN = (2, 3, NOT_FOUND)
 
 
 def modules() -> list[str]:
@@ -125,17 +131,14 @@ class Bench:
     copy: Path
     known: Mapping[str, Record]
     reach: Reach
+    met: str = MEETS
 
     @classmethod
     def of(cls, folder: Path) -> Bench:
         """Copy the checkout into ``folder``, and record every test file that has changed since."""
-        copy, records = folder / "copy", folder / "records"
-        copy_of_the_checkout(copy)
+        copy, records = copied(folder), folder / "records"
         record(copy, records, RECORDED)
         import_common()
-        (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
-        with chdir(folder):
-            config()  # read where it stands, and then remembered
         known = recorded(records)
         return cls(copy, known, by_block(known))
 
@@ -155,9 +158,61 @@ class Bench:
         return verdict, tests, failed
 
 
-def sample(seed: int, number: int, folder: Path) -> None:
+@dataclass(frozen=True)
+class NearBench:
+    """What mutants meet where nobody has the minutes to see which tests reach them: test files that name the module."""
+
+    copy: Path
+    met: str = MEETS_NEAR
+
+    @classmethod
+    def of(cls, folder: Path) -> NearBench:
+        """Copy the checkout into ``folder``, the recorder with it: it is what tells which test failed."""
+        copy = copied(folder)
+        shutil.copy2(Path(__file__).with_name("recording.py"), copy / f"{PLUGIN}.py")
+        import_common()
+        return cls(copy)
+
+    def verdict(self, module: str, tree: Module, function: str, mutation: Mutation) -> tuple[str, int, str]:
+        """Verdict over one mutant of ``tree``, how many test files were asked, and the test that failed."""
+        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
+        assert isinstance(spoilt, Module)
+        files = near(module)
+        for asked_so_far, name in enumerate(files, 1):
+            with spoilt_copy(self.copy, module, spoilt.code):
+                code, failed = asked(self.copy, [name], NEAR_SECONDS, PATIENCE_WITH_FILES, [name])
+            shown = [failed] if "::" in failed else [name] if code in BROKEN else []
+            if shown and asked(self.copy, shown, 60.0, PATIENCE_WITH_FILES, [name])[0] in (0, OUT_OF_TIME):
+                return KILLED, asked_so_far, failed or name
+        return SURVIVED if files else UNREACHED, len(files), ""
+
+
+def near(module: str) -> list[str]:
+    """Test files beside a module: those that import it first, then by its name and its folder's; at most `NEAR`."""
+    parent, _, stem = dotted(module).rpartition(".")
+    imports = re.compile(rf"{re.escape(dotted(module))}\b|from {re.escape(parent)} import [^\n]*\b{re.escape(stem)}\b")
+    words = re.compile(rf"\b{re.escape(stem)}\b")
+    met, folder = dict[str, tuple[bool, bool, bool, int]](), parent.rpartition(".")[2]
+    for name in test_files():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        rank = imports.search(text) is not None, stem in Path(name).stem, folder in name, len(words.findall(text))
+        if any(rank):
+            met[name] = rank
+    return sorted(met, key=lambda name: met[name], reverse=True)[:NEAR]
+
+
+def copied(folder: Path) -> Path:
+    """Copy the checkout into ``folder``; mutmut's configuration beside it, read where it stands and then remembered."""
+    copy_of_the_checkout(folder / "copy")
+    (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
+    with chdir(folder):
+        config()
+    return folder / "copy"
+
+
+def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
     """Draw, run and write down; what is written already of this seed and these sources is not run again."""
-    bench = Bench.of(folder)
+    bench = NearBench.of(folder) if by_name else Bench.of(folder)
     each = counts(folder / "counts.json")
     total = sum(each.values())
     of = hashlib.sha256(b"".join((ROOT / module).read_bytes() for module in each)).hexdigest()[:12]
@@ -171,17 +226,17 @@ def sample(seed: int, number: int, folder: Path) -> None:
         change = change_of(tree, mutation)
         verdict, tests, failed = bench.verdict(module, tree, function, mutation)
         reason = "" if verdict in NOTICED else known_by_form(change)
-        found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=MEETS)
+        found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=bench.met)
         print(f"{k + 1} of {number}: {verdict}, {function}: {change[:100]}", flush=True)
         write(list(found.values()))
 
 
-def again(folder: Path) -> None:
+def again(folder: Path, by_name: bool) -> None:
     """Let what was not noticed of the sample that is kept meet the tests of now, in the sources of now.
 
     A mutant is found by its function and its change; one whose statements have changed since is `GONE`.
     """
-    rows, bench = stored(), Bench.of(folder)
+    rows, bench = stored(), NearBench.of(folder) if by_name else Bench.of(folder)
     for place, row in enumerate(rows):
         if row.verdict in NOTICED or row.now in NOTICED:
             continue

@@ -50,7 +50,7 @@ def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tool
         return "killed", 2, "tests/test_toy.py::test_twice"
 
     monkeypatch.setattr(sample.Bench, "of", lambda folder: SimpleNamespace(verdict=verdict))
-    sample.again(Path("nowhere"))
+    sample.again(Path("nowhere"), False)
     assert met == [("toy.py", "toy.x_twice", "return 2 * x -> return 3 * x")]
     found = drawn.stored()
     assert [row.now for row in found] == ["", "killed", "gone", "gone", "killed"]
