@@ -54,11 +54,11 @@ MEETS = (
     f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
     f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"
 )
-#: Without a record: test files that are asked because they name a module, and seconds of CPU of each.
-NEAR, NEAR_SECONDS = 5, 25.0
+#: Without a record: test files that are asked because they name its module, and seconds of CPU of each.
+NEAR, NEAR_SECONDS = 8, 20.0
 MEETS_NEAR = (
-    f"up to {NEAR} test files that name its module, nearest first, one case of every test first, for "
-    f"{NEAR_SECONDS:g} s of CPU each, whether or not they reach it"
+    f"up to {NEAR} test files that name its module or function, nearest first and kept tables last, for "
+    f"{NEAR_SECONDS:g} s of CPU each, one case of every test first, whether or not they reach it"
 )
 
 

@@ -61,6 +61,8 @@ from subjects import PACKAGES, ROOT
 PATIENCE_WITH_FILES = 120.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
+#: Package -> the kept tables that hold something of most that it does.
+TABLES = {"validation": ("scenes", "results"), "adapters": ("engines", "laws"), "reports": ("commands", "pages")}
 #: Exit statuses where a test file cannot even be collected, or pytest itself ended in an error.
 BROKEN = (2, 3, NOT_FOUND)
 
@@ -177,7 +179,7 @@ class NearBench:
         """Verdict over one mutant of ``tree``, how many test files were asked, and the test that failed."""
         spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
         assert isinstance(spoilt, Module)
-        files = near(module)
+        files = near(module, function)[: 2 if known_by_form(change_of(tree, mutation)) else NEAR]  # words: no more
         for asked_so_far, name in enumerate(files, 1):
             with spoilt_copy(self.copy, module, spoilt.code):
                 code, failed = asked(self.copy, [name], NEAR_SECONDS, PATIENCE_WITH_FILES, [name])
@@ -187,18 +189,26 @@ class NearBench:
         return SURVIVED if files else UNREACHED, len(files), ""
 
 
-def near(module: str) -> list[str]:
-    """Test files beside a module: those that import it first, then by its name and its folder's; at most `NEAR`."""
+def near(module: str, function: str) -> list[str]:
+    """Test files beside a function: those that import its module first, then by names of both; at most `NEAR`.
+
+    The kept tables of its package are the last of them, for they hold something of most that it does.
+    """
     parent, _, stem = dotted(module).rpartition(".")
     imports = re.compile(rf"{re.escape(dotted(module))}\b|from {re.escape(parent)} import [^\n]*\b{re.escape(stem)}\b")
-    words = re.compile(rf"\b{re.escape(stem)}\b")
-    met, folder = dict[str, tuple[bool, bool, bool, int]](), parent.rpartition(".")[2]
+    own = function.removeprefix(f"{dotted(module)}.").removeprefix("xǁ").removeprefix("x_").split("ǁ")
+    names = {stem, stem.partition("_")[0], *own}
+    words = re.compile("|".join(rf"\b{re.escape(name)}\b" for name in sorted(names)))
+    met, folder = dict[str, tuple[bool, bool, int, int]](), parent.rpartition(".")[2]
     for name in test_files():
         text = (ROOT / name).read_text(encoding="utf-8")
-        rank = imports.search(text) is not None, stem in Path(name).stem, folder in name, len(words.findall(text))
+        said = words.findall(text)
+        rank = imports.search(text) is not None, stem in Path(name).stem, len(set(said)) + (folder in name), len(said)
         if any(rank):
             met[name] = rank
-    return sorted(met, key=lambda name: met[name], reverse=True)[:NEAR]
+    tables = [f"tests/tables/test_of_{name}.py" for name in TABLES[module.partition("/")[0]]]
+    others = sorted((name for name in met if name not in tables), key=lambda name: met[name], reverse=True)
+    return [*others[: NEAR - len(tables)], *tables]
 
 
 def copied(folder: Path) -> Path:
