@@ -58,3 +58,18 @@ def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tool
     assert (found[1].tests, found[1].failed) == (2, "tests/test_toy.py::test_twice")
     assert [found[k] for k in (0, 4)] == [rows[k] for k in (0, 4)]
     assert "**1 of 5 are noticed, 20.0 %" in "\n".join(drawn.table(found))
+
+
+def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(tools, monkeypatch, tmp_path):
+    sample, _ = tools
+    texts = {
+        "tests/test_words.py": "they pile up where walls turn", "tests/test_other.py": "nothing of it",
+        "tests/test_walls.py": "", "tests/test_deep.py": "from adapters.toy import (x, walls)",
+    }  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sample, "test_files", lambda: list(texts))
+    found = sample.near("adapters/toy/walls.py", "adapters.toy.walls.x_pile")
+    tables = [f"tests/tables/test_of_{name}.py" for name in sample.TABLES["adapters"]]
+    assert found == ["tests/test_deep.py", "tests/test_walls.py", "tests/test_words.py", *tables]
