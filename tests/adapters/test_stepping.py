@@ -308,6 +308,19 @@ def test_a_quaternion_without_length_is_no_orientation(planar: bool) -> None:
     assert toy.built[0].closed == 1
 
 
+@pytest.mark.parametrize(("length", "is_turn"), [(0.5, True), (0.499, False)])
+def test_a_quaternion_of_half_its_length_still_says_how_a_body_is_turned(length: float, is_turn: bool) -> None:
+    def short(flight: Flight) -> None:
+        flight._pose[0, 3:] = (0.0, 0.0, -length, 0.0) if flight.steps == 4 else (0.0, 0.0, -1.0, 0.0)
+
+    if is_turn:
+        found = run(Toy({3}, short), scene(), 0.1, {})
+        assert found.finish == "completed" and abs(found.pose[4, 0, 2]) == pytest.approx(math.pi)
+    else:
+        with pytest.raises(EngineError, match="no length"):
+            run(Toy({3}, short), scene(), 0.1, {})
+
+
 def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def sideways(flight: Flight) -> None:
         flight._pose[0, 1] = 0.125 if flight.steps == 2 else 0.0

@@ -19,6 +19,8 @@ SHARED = 30.0
 #: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
 REST_OF, LONGEST = 2, 30.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
+#: What became of a mutant whose statements have changed since it was drawn.
+GONE = "gone"
 #: Verdicts that count as noticed: what only time ended is noticed as well.
 NOTICED = (KILLED, TIMED)
 
@@ -51,6 +53,12 @@ MEETS = (
     f"the tests that reach its statements, the cheapest case of each first, for up to {SPENT:g} s of CPU, of those "
     f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
     f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"
+)
+#: Without a record: test files that are asked because they name its module, and seconds of CPU of each.
+NEAR, NEAR_SECONDS = 8, 20.0
+MEETS_NEAR = (
+    f"up to {NEAR} test files that name its module or function, nearest first and kept tables last, for "
+    f"{NEAR_SECONDS:g} s of CPU each, one case of every test first, whether or not they reach it"
 )
 
 
@@ -96,7 +104,7 @@ def table(rows: list[Drawn]) -> list[str]:
     lines += [
         "", f"Of the {len(missed)} that are not noticed {because} have a reason: they change words only, or nothing "
         "that can be seen. They count as not noticed all the same. *Since* is what tests that were written for them "
-        "make of the others:", "",
+        f"make of the others, *{GONE}* where the code is another:", "",
         "| function | change | verdict | since | reason |", "|---|---|---|---|---|",
     ]  # fmt: skip
     for row in rows:

@@ -17,19 +17,24 @@ import json
 import os
 import random
 import re
+import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from checkout import copy_of_the_checkout
 from drawn import (
     APART,
+    GONE,
     KILLED,
     LONGEST,
     MEETS,
+    MEETS_NEAR,
+    NEAR,
+    NEAR_SECONDS,
     NOTICED,
     RECORDED,
     REST_OF,
@@ -49,13 +54,17 @@ from mutmut.configuration import config
 from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
 from mutmut.mutation.trampoline_templates import mangle_function_name
 from pytest_apart import OUT_OF_TIME, PATIENCE, import_common, run
-from reach import PLUGIN, Reach, Record, block_of, by_block, dotted, environment, record, recorded
+from reach import PLUGIN, Reach, Record, block_of, by_block, dotted, environment, record, recorded, test_files
 from subjects import PACKAGES, ROOT
 
 #: Seconds of wall time that a whole file may take: what its tests start in processes of their own counts nowhere else.
 PATIENCE_WITH_FILES = 120.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
+#: Package -> the kept tables that hold something of most that it does.
+TABLES = {"validation": ("scenes", "results"), "adapters": ("engines", "laws"), "reports": ("commands", "pages")}
+#: Exit statuses where a test file cannot even be collected, or pytest itself ended in an error.
+BROKEN = (2, 3, NOT_FOUND)
 
 
 def modules() -> list[str]:
@@ -117,50 +126,140 @@ def change_of(tree: Module, mutation: Mutation) -> str:
     return f"{' '.join(old)} -> {' '.join(new)}"
 
 
-def sample(seed: int, number: int, folder: Path, again: bool) -> list[Drawn]:
-    """Draw, run and write down; what is written already of this seed and these sources is not run again."""
-    copy, records = folder / "copy", folder / "records"
-    copy_of_the_checkout(copy)
-    record(copy, records, RECORDED)
-    known = recorded(records)
-    reach = by_block(known)
-    import_common()
+@dataclass(frozen=True)
+class Bench:
+    """What mutants meet: a copy of the checkout, and which tests reach which statements of it."""
+
+    copy: Path
+    known: Mapping[str, Record]
+    reach: Reach
+    met: str = MEETS
+
+    @classmethod
+    def of(cls, folder: Path) -> Bench:
+        """Copy the checkout into ``folder``, and record every test file that has changed since."""
+        copy, records = copied(folder), folder / "records"
+        record(copy, records, RECORDED)
+        import_common()
+        known = recorded(records)
+        return cls(copy, known, by_block(known))
+
+    def verdict(self, module: str, tree: Module, function: str, mutation: Mutation) -> tuple[str, int, str]:
+        """Verdict over one mutant of ``tree``, how many tests were asked, and the one that failed."""
+        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
+        assert isinstance(spoilt, Module)
+        tests_of_it = reaching(self.reach, tree.code, spoilt.code, module, function)
+        shared = {name: each.shared for name, each in self.known.items()}
+        verdict, tests, failed = judged(self.copy, module, spoilt.code, in_turn(tests_of_it), shared)
+        if "::" in failed and asked(self.copy, [failed], 60.0)[0] != 0:
+            verdict = UNSHOWN  # it fails without the mutant as well
+        if verdict in (SURVIVED, UNREACHED) and not known_by_form(change_of(tree, mutation)):
+            rest = cut_short(self.known, module)
+            failed = by_the_rest(self.copy, module, spoilt.code, rest, self.known) or failed
+            verdict = KILLED if failed else verdict
+        return verdict, tests, failed
+
+
+@dataclass(frozen=True)
+class NearBench:
+    """What mutants meet where nobody has the minutes to see which tests reach them: test files that name the module."""
+
+    copy: Path
+    met: str = MEETS_NEAR
+
+    @classmethod
+    def of(cls, folder: Path) -> NearBench:
+        """Copy the checkout into ``folder``, the recorder with it: it is what tells which test failed."""
+        copy = copied(folder)
+        shutil.copy2(Path(__file__).with_name("recording.py"), copy / f"{PLUGIN}.py")
+        import_common()
+        return cls(copy)
+
+    def verdict(self, module: str, tree: Module, function: str, mutation: Mutation) -> tuple[str, int, str]:
+        """Verdict over one mutant of ``tree``, how many test files were asked, and the test that failed."""
+        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
+        assert isinstance(spoilt, Module)
+        files = near(module, function)[: 2 if known_by_form(change_of(tree, mutation)) else NEAR]  # words: no more
+        for asked_so_far, name in enumerate(files, 1):
+            with spoilt_copy(self.copy, module, spoilt.code):
+                code, failed = asked(self.copy, [name], NEAR_SECONDS, PATIENCE_WITH_FILES, [name])
+            shown = [failed] if "::" in failed else [name] if code in BROKEN else []
+            if shown and asked(self.copy, shown, 60.0, PATIENCE_WITH_FILES, [name])[0] in (0, OUT_OF_TIME):
+                return KILLED, asked_so_far, failed or name
+        return SURVIVED if files else UNREACHED, len(files), ""
+
+
+def near(module: str, function: str) -> list[str]:
+    """Test files beside a function: those that import its module first, then by names of both; at most `NEAR`.
+
+    The kept tables of its package are the last of them, for they hold something of most that it does.
+    """
+    parent, _, stem = dotted(module).rpartition(".")
+    imports = re.compile(rf"{re.escape(dotted(module))}\b|from {re.escape(parent)} import [^\n]*\b{re.escape(stem)}\b")
+    own = function.removeprefix(f"{dotted(module)}.").removeprefix("xǁ").removeprefix("x_").split("ǁ")
+    names = {stem, stem.partition("_")[0], *own}
+    words = re.compile("|".join(rf"\b{re.escape(name)}\b" for name in sorted(names)))
+    met, folder = dict[str, tuple[bool, bool, int, int]](), parent.rpartition(".")[2]
+    for name in test_files():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        said = words.findall(text)
+        rank = imports.search(text) is not None, stem in Path(name).stem, len(set(said)) + (folder in name), len(said)
+        if any(rank):
+            met[name] = rank
+    tables = [f"tests/tables/test_of_{name}.py" for name in TABLES[module.partition("/")[0]]]
+    others = sorted((name for name in met if name not in tables), key=lambda name: met[name], reverse=True)
+    return [*others[: NEAR - len(tables)], *tables]
+
+
+def copied(folder: Path) -> Path:
+    """Copy the checkout into ``folder``; mutmut's configuration beside it, read where it stands and then remembered."""
+    copy_of_the_checkout(folder / "copy")
     (folder / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["copy"]\n', encoding="utf-8")
     with chdir(folder):
-        config()  # read where it stands, and then remembered
+        config()
+    return folder / "copy"
+
+
+def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
+    """Draw, run and write down; what is written already of this seed and these sources is not run again."""
+    bench = NearBench.of(folder) if by_name else Bench.of(folder)
     each = counts(folder / "counts.json")
     total = sum(each.values())
     of = hashlib.sha256(b"".join((ROOT / module).read_bytes() for module in each)).hexdigest()[:12]
     found = {row.number: row for row in stored() if (row.seed, row.of) == (seed, of)}
-    last = ""
     for k, index in enumerate(draw(seed, number, total)):
-        if k in found and not (again and found[k].verdict not in NOTICED and found[k].now != KILLED):
+        if k in found:
             continue
         module, place = located(each, index)
-        if module != last:
-            tree, mutations = mutations_of(module)
-            last = module
+        tree, mutations = mutations_of(module)
         function, mutation = mutations[place]
-        spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node)
-        assert isinstance(spoilt, Module)
-        tests_of_it = reaching(reach, tree.code, spoilt.code, module, function)
-        shared = {name: each.shared for name, each in known.items()}
-        verdict, tests, failed = judged(copy, module, spoilt.code, in_turn(tests_of_it), shared)
-        if "::" in failed and asked(copy, [failed], 60.0)[0] != 0:
-            verdict = UNSHOWN  # it fails without the mutant as well
         change = change_of(tree, mutation)
-        why = known_by_form(change)
-        if verdict in (SURVIVED, UNREACHED) and not why:
-            failed = by_the_rest(copy, module, spoilt.code, cut_short(known, module), known) or failed
-            verdict = KILLED if failed else verdict
-        if k in found:
-            found[k] = replace(found[k], now=verdict, tests=tests, failed=failed)
-        else:
-            reason = "" if verdict in NOTICED else why
-            found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=MEETS)
-        print(f"{k + 1} of {number}: {verdict}, {found[k].function}: {found[k].change[:100]}", flush=True)
+        verdict, tests, failed = bench.verdict(module, tree, function, mutation)
+        reason = "" if verdict in NOTICED else known_by_form(change)
+        found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=bench.met)
+        print(f"{k + 1} of {number}: {verdict}, {function}: {change[:100]}", flush=True)
         write(list(found.values()))
-    return list(found.values())
+
+
+def again(folder: Path, by_name: bool) -> None:
+    """Let what was not noticed of the sample that is kept meet the tests of now, in the sources of now.
+
+    A mutant is found by its function and its change; one whose statements have changed since is `GONE`.
+    """
+    rows, bench = stored(), NearBench.of(folder) if by_name else Bench.of(folder)
+    for place, row in enumerate(rows):
+        if row.verdict in NOTICED or row.now in NOTICED:
+            continue
+        tree, mutations = mutations_of(row.module) if (ROOT / row.module).exists() else (None, [])
+        same = [mutation for function, mutation in mutations if function == row.function]
+        same = [mutation for mutation in same if tree and change_of(tree, mutation) == row.change]
+        if tree and same:
+            verdict, tests, failed = bench.verdict(row.module, tree, row.function, same[0])
+            rows[place] = replace(row, now=verdict, tests=tests, failed=failed)
+        else:
+            rows[place] = replace(row, now=GONE)
+        print(f"{row.function}: {rows[place].now}: {row.change[:100]}", flush=True)
+        write(rows)
 
 
 def located(each: dict[str, int], index: int) -> tuple[str, int]:

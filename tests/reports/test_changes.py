@@ -265,6 +265,28 @@ def test_a_file_that_cannot_be_read_is_refused_with_its_name_and_why(tmp_path):
         )
 
 
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("", "run: a side is empty; `.` is the folder that you are in"),
+        ("before/run", "run: there is no folder before/run; crosscheck compare --help says what a side may be"),
+        ("before:latest", "run: there is no folder before; crosscheck compare --help says what a side may be"),
+    ],
+)
+def test_a_side_that_is_no_id_of_a_run_is_refused_as_what_it_was_meant_to_be(tmp_path, argument, said):
+    with pytest.raises(MissingError) as caught:
+        load_side(argument, tmp_path)
+    assert str(caught.value) == said
+
+
+def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
+    folder = tmp_path / "rows.jsonl"
+    folder.mkdir()
+    with pytest.raises(MissingError) as caught:
+        load_side(str(folder), tmp_path)
+    assert str(caught.value) == f"run: cannot read {folder}: it is not a regular file"
+
+
 def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
     with pytest.raises(MissingError):
         load_side("nothing", tmp_path / "not there")

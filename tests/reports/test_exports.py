@@ -95,6 +95,21 @@ def test_markdown_of_an_engine_that_did_not_run_has_no_version():
     assert exports.as_markdown(plain(row)).startswith("| scene | another/tuned<br> |\n|---|---|\n")
 
 
+def test_markdown_says_who_is_in_no_ranking_and_who_leaves_the_plane_between_legend_and_findings():
+    """Each a paragraph of its own, in one line: what stands there must end no list or cell."""
+    matched = replace(PASS, engine="mujoco", engine_version="3.3", profile="matched")
+    out = replace(ROW, engine="mujoco", engine_version="3.3", metric="out_of_plane", value=0.25, truth=0.0,
+                  standing="known", scene="im|pact")  # fmt: skip
+    lines = exports.as_markdown(plain(PASS, matched, out)).split("\n")
+    start = lines.index(legend().replace("|", "\\|"))
+    assert lines[start + 1] == lines[start + 3] == lines[start + 5] == ""
+    assert lines[start + 2].startswith("mujoco/matched: the textbook's law")
+    assert lines[start + 4] == (
+        "Planar cells that leave their plane in space: mujoco/tuned 1 of 1 (most of all im\\|pact, by 0.25 m)"
+    )
+    assert lines[start + 6].startswith("**FAIL known**")
+
+
 # ---- JUnit ---------------------------------------------------------------------------------------------------------
 
 

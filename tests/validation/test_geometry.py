@@ -212,6 +212,17 @@ def test_a_pose_that_gives_no_distance_is_neither_apart_nor_shallow(shapes):
     assert [math.isnan(value) for value, _ in invariants.deepest(scene, trajectory)] == [True, True]
 
 
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_a_turn_that_is_no_number_gives_no_depth_though_its_place_says_how_deep_it_may_be():
+    """Lower bounds of what is round ask for no turn: seventy samples are apart enough to be asked for in turn."""
+    pose_a, pose_b = np.zeros((70, 3)), np.zeros((70, 3))
+    pose_b[:, 1] = np.linspace(0.1, 2.0, 70)
+    assert deepest(ROD, pose_a, ROD, pose_b) == pytest.approx(0.2)  # 0.1 m apart, two radii of 0.15 m
+    pose_b[1, 2] = math.nan
+    assert np.isfinite(least_gap(ROD, pose_a, ROD, pose_b)).all()
+    assert math.isnan(deepest(ROD, pose_a, ROD, pose_b))
+
+
 def test_a_tilted_half_space_is_measured_along_its_normal():
     face, box = HalfSpace((-math.sin(0.3), math.cos(0.3)), 0.25), Box((0.5, 0.5))
     centre = 0.75 * np.array(face.normal)

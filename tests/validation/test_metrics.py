@@ -517,3 +517,56 @@ def test_the_largest_relative_error_is_told_and_a_missing_value_with_its_reason(
     assert metrics.relative_error(found, truth, ["a", "b"]) == (pytest.approx(0.2, rel=1e-12), "")
     assert metrics.relative_error(found, truth, ["a"]) == (pytest.approx(0.1, rel=1e-12), "")
     assert metrics.relative_error(found, truth, ["a", "lost", "later"]) == (None, "it never touched")
+
+
+# ---- what is no number ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_the_largest_of_values_is_none_where_one_of_them_is_no_number(place):
+    values = [1.0, 3.0, 2.0]
+    assert metrics.largest(iter(values)) == 3.0
+    values[place] = math.nan
+    assert math.isnan(metrics.largest(values))
+
+
+@pytest.mark.parametrize("lost", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", range(3))
+def test_one_sample_that_is_no_number_refuses_a_search_for_events(lost, place):
+    t, fine, broken = np.arange(3.0), np.array([-1.0, 0.5, 1.0]), np.array([-1.0, 0.5, 1.0])
+    broken[place] = lost
+    metrics.numbers()
+    metrics.numbers(fine, fine)
+    asked = (metrics.numbers, lambda a, b: metrics.apexes(t, a, b), lambda a, b: metrics.crossing(t, a, b, 0.0))
+    for ask in asked:
+        for series in ((broken, fine), (fine, broken)):
+            with pytest.raises(ArithmeticError, match=r"^a sample is not a finite number$"):
+                ask(*series)
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_speed_that_is_no_number_has_no_last_motion(place):
+    speed = np.array([3.0, 0.0, 0.0])
+    assert metrics.last_motion(np.arange(3.0), speed, 1.0) == (1.0, "")
+    speed[place] = math.nan
+    assert metrics.last_motion(np.arange(3.0), speed, 1.0) == (None, "a speed is not a number")
+
+
+@pytest.mark.parametrize("pair", range(2))
+def test_an_overlap_of_a_pair_whose_pose_is_no_number_is_none(pair):
+    """Whichever pair comes first: the other one overlaps by .5 m."""
+    bodies = tuple(Body(name, Disc(0.5), 1.0, 0.125) for name in "abcd")
+    pose = np.zeros((1, 4, 3))
+    pose[0, :, 0] = 0.0, 0.5, 10.0, 10.5
+    found = Trajectory(np.zeros(1), pose, np.zeros_like(pose), None, 1.0, "completed")
+    scene = Scene("s", 1, 2, bodies, (), (0.0, 0.0), 1.0)
+    assert metrics.deepest_overlap(scene, found, [(0, 1), (2, 3)]) == 0.5
+    pose[0, 2 * pair, 0] = math.nan
+    assert math.isnan(metrics.deepest_overlap(scene, found, [(0, 1), (2, 3)]))
+
+
+def test_the_largest_relative_error_is_no_number_where_one_value_is_none():
+    truth = {"a": 2.0, "b": 4.0}
+    for found in ({"a": (math.nan, ""), "b": (5.0, "")}, {"a": (1.0, ""), "b": (math.nan, "")}):
+        value, why = metrics.relative_error(found, truth, ["a", "b"])
+        assert math.isnan(value) and why == ""

@@ -189,6 +189,8 @@ def test_the_skill_of_a_row_is_that_of_its_cell():
            "truth": 0.5, "value": 0.105}  # fmt: skip
     assert skill_of(row) == (pytest.approx(1.0 - 0.395 / 0.5), "did nothing")
     assert skill_of(row | {"value": None})[0] is None
+    across = {"metric": "out_of_plane", "truth": 0.0, "value": 0.1}
+    assert skill_of(row | across) == (None, "a null is computed in the plane and cannot leave it")
 
 
 def judged(*slots):

@@ -238,6 +238,24 @@ def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
         assert predictions_of(other) == []
 
 
+def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law, monkeypatch):
+    listed = judged(slot=OWN)
+    law.clear()
+    monkeypatch.setattr(rows, "is_file", lambda scene: scene == "incline")
+    row = judged(slot=OWN)
+    assert (row.physics, row.standing, law) == ("fail", None, [])
+    assert listed.standing == "explained" and predictions_of(listed) == [] and law == []
+
+
+@pytest.mark.parametrize(("promised", "standing"), [("soft", "new"), ("hard", None)])
+def test_of_your_own_model_nothing_is_listed_and_a_promise_holds(monkeypatch, promised, standing):
+    monkeypatch.setattr(rows, "is_model", lambda scene: scene == "incline")
+    monkeypatch.setattr(rows, "solutions_of", lambda engine: {promised} if engine == "nameless" else set())
+    row = judged(slot=OWN)
+    assert (row.physics, row.standing, row.alarming) == ("fail", standing, standing is not None)
+    assert row.reason.endswith("not listed: your own model")
+
+
 def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
     def gone(*row):
         raise EngineError("nameless: its laws cannot be had: no such file")

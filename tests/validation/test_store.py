@@ -59,7 +59,7 @@ def test_a_run_of_moved_starts_is_the_latest_only_if_there_is_nothing_else(tmp_p
     first, _ = store.start("quick: impact", SLOTS)
     store.finish(first)
     second, _ = store.start(f"{SCATTER_TITLE}{first.id}", SLOTS)
-    assert store.run().id == first.id
+    assert store.run().id == first.id != second.id
     assert store.run(second.id).id == second.id
 
 
@@ -69,6 +69,17 @@ def test_missing_results_and_runs_are_said_in_one_line(tmp_path):
     store = Store(tmp_path)
     with pytest.raises(StoreError, match="no run 'x'"):
         store.run("x")
+    there, _ = store.start("test", SLOTS)
+    with pytest.raises(StoreError, match=f"no run 'x' in .*; it has {there.id}$"):
+        store.run("x")  # not the one that is there
+
+
+def test_each_of_some_runs_is_had_by_its_id_and_the_last_one_without(tmp_path):
+    store = Store(tmp_path)
+    ids = [store.start(title, SLOTS, fresh=True)[0].id for title in ("one", "two", "three")]
+    assert len(set(ids)) == 3
+    assert [store.run(run).id for run in ids] == ids and store.run().id == store.run("latest").id == ids[-1]
+    assert [store.run(run).title for run in ids] == ["one", "two", "three"]
 
 
 def test_a_file_that_is_no_store_is_said_in_one_line(tmp_path):

@@ -159,6 +159,12 @@ def test_the_apex_error_is_the_largest_of_those_that_are_resolved_relative_to_th
     assert bounce.apex_error(made, 1 / 256, missing) == (0.125, "")
 
 
+def test_an_apex_that_is_no_number_leaves_no_error():
+    for heights in ((math.nan, 0.0625, 0.0, 0.0, 0.0), (0.25, math.nan, 0.0, 0.0, 0.0)):
+        value, why = bounce.apex_error(scene(), 1 / 256, apexes(*heights))
+        assert math.isnan(value) and why == ""
+
+
 @pytest.mark.parametrize(("apex", "e"), [(0.5, 0.5), (2.0, 1.0), (0.0, 0.0), (-0.1, 0.0)])
 def test_an_apex_shows_a_restitution(apex, e):
     assert bounce.rebound({"height": 2.0}, apex) == e

@@ -113,6 +113,16 @@ def test_times_fail_from_a_step_on_and_a_ball_that_is_not_thrown_back_has_none()
     assert canonical.measure(scene, lost)["time[1]"][0] is None
 
 
+@pytest.mark.parametrize("place", range(2), ids=["place", "speed"])
+def test_a_ball_that_is_lost_for_one_sample_is_thrown_back_at_no_time(place):
+    """Beside the blows it would pass: turns and speeds are looked for at other samples."""
+    canonical, scene = made("closing_wall")
+    found = thrown(scene, swept=True)
+    (found.pose, found.twist)[place][3, 2, 0] = math.nan
+    with pytest.raises(ArithmeticError, match="not a finite number"):
+        canonical.measure(scene, found)
+
+
 # ---- a box on its edge ----
 
 

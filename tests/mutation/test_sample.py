@@ -1,0 +1,75 @@
+"""A sample that is kept: what it missed is asked again where it stands today, and the estimate stays what it was."""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+SOURCE = "def twice(x):\n    return 2 * x\n"
+
+
+@pytest.fixture
+def tools(monkeypatch, tmp_path):
+    """`sample` over one module of its own, and `drawn`, whose sample is kept in a file of the test's own."""
+    pytest.importorskip("mutmut")
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    kept = set(sys.modules)
+    sample, drawn = importlib.import_module("sample"), importlib.import_module("drawn")
+    (tmp_path / "toy.py").write_text(SOURCE)
+    (tmp_path / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["toy.py"]\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sample, "ROOT", tmp_path)
+    monkeypatch.setattr(drawn, "DRAWN", tmp_path / "sample.csv")
+    yield sample, drawn
+    for name in set(sys.modules) - kept:
+        if name in ("sample", "drawn", "checkout", "lists", "reach", "subjects", "pytest_apart"):
+            del sys.modules[name]
+
+
+def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tools, monkeypatch):
+    sample, drawn = tools
+    tree, mutations = sample.mutations_of("toy.py")
+    changes = [sample.change_of(tree, mutation) for _, mutation in mutations]
+    assert "return 2 * x -> return 2 / x" in changes and "return 2 * x -> return 3 * x" in changes
+    first = drawn.Drawn(7, 0, "other", "toy.py", "toy.x_twice", "return 2 * x -> return 2 / x", "killed", 1, "t")
+    rows = [
+        first,
+        replace(first, number=1, change="return 2 * x -> return 3 * x", verdict="survived"),
+        replace(first, number=2, change="return x + x -> return x - x", verdict="survived"),
+        replace(first, number=3, module="gone.py", function="gone.x_f", verdict="unreached"),
+        replace(first, number=4, change="return 2 * x -> return 2 / x", verdict="survived", now="killed", failed="s"),
+    ]
+    drawn.write(rows)
+    met = []
+
+    def verdict(module, tree, function, mutation):
+        met.append((module, function, sample.change_of(tree, mutation)))
+        return "killed", 2, "tests/test_toy.py::test_twice"
+
+    monkeypatch.setattr(sample.Bench, "of", lambda folder: SimpleNamespace(verdict=verdict))
+    sample.again(Path("nowhere"), False)
+    assert met == [("toy.py", "toy.x_twice", "return 2 * x -> return 3 * x")]
+    found = drawn.stored()
+    assert [row.now for row in found] == ["", "killed", "gone", "gone", "killed"]
+    assert [row.verdict for row in found] == [row.verdict for row in rows]  # what was drawn stays as it was found
+    assert (found[1].tests, found[1].failed) == (2, "tests/test_toy.py::test_twice")
+    assert [found[k] for k in (0, 4)] == [rows[k] for k in (0, 4)]
+    assert "**1 of 5 are noticed, 20.0 %" in "\n".join(drawn.table(found))
+
+
+def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(tools, monkeypatch, tmp_path):
+    sample, _ = tools
+    texts = {
+        "tests/test_words.py": "they pile up where walls turn", "tests/test_other.py": "nothing of it",
+        "tests/test_walls.py": "", "tests/test_deep.py": "from adapters.toy import (x, walls)",
+    }  # fmt: skip
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sample, "test_files", lambda: list(texts))
+    found = sample.near("adapters/toy/walls.py", "adapters.toy.walls.x_pile")
+    tables = [f"tests/tables/test_of_{name}.py" for name in sample.TABLES["adapters"]]
+    assert found == ["tests/test_deep.py", "tests/test_walls.py", "tests/test_words.py", *tables]
