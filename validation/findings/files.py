@@ -25,6 +25,8 @@ FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
 #: What stands in the column ``value`` of a cell that ended in numbers that are none.
 DIVERGED = "diverged"
+#: Between the two ends of a band that is not as wide on both sides.
+TO = ".."
 
 
 @cache
@@ -159,12 +161,16 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
     if value in ("", DIVERGED):
         return key, Finding(family, None, diverged=value == DIVERGED, text=(value, band))
     try:
-        found, width = float(value), float(band)
+        found, *widths = map(float, (value, *band.split(TO, 1)))
     except ValueError:
         raise FindingsError(f"{label}: value {value!r} and band {band!r} must be numbers") from None
-    if not (math.isfinite(found) and math.isfinite(width) and width > 0.0):
+    if not all(map(math.isfinite, (found, *widths))) or (len(widths) == 1 and widths[0] <= 0.0):
         raise FindingsError(f"{label}: value {value} and band {band} must be finite, the band above 0")
-    return key, Finding(family, found, width, text=(value, band))
+    if len(widths) == 1:
+        return key, Finding(family, found, widths[0], text=(value, band))
+    if not widths[0] <= found <= widths[1] or widths[0] == widths[1]:
+        raise FindingsError(f"{label}: value {value} must lie between the ends of its band, {band}")
+    return key, Finding(family, found, ends=(widths[0], widths[1]), text=(value, band))
 
 
 def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
@@ -181,8 +187,26 @@ def _line(key: Key, finding: Finding) -> tuple[str, ...]:
     profile, _scene, *cell = key
     value, band = finding.text or (DIVERGED if finding.diverged else "", "")
     if finding.value is not None and finding.text is None:
-        value, band = _digits(finding.value, finding.band), f"{finding.band:.1e}"
+        value, band = _texts(finding.value, finding)
     return (finding.family.id, profile, *cell, value, band)
+
+
+def _texts(value: float, finding: Finding) -> tuple[str, str]:
+    """Value and band: ends outwards to two digits more than a band has, and the value between them."""
+    if finding.ends is None:
+        return _digits(value, finding.band), f"{finding.band:.1e}"
+    nearest = min(value - finding.ends[0], finding.ends[1] - value)
+    told = _digits(value, max(nearest, 1e-6 * abs(value)))
+    low, high = (outwards(end, way) for end, way in zip(finding.ends, (-1, 1), strict=True))
+    return told, f"{min(low, told, key=float)}{TO}{max(high, told, key=float)}"
+
+
+def outwards(value: float, way: int) -> str:
+    """Three digits of ``value`` that are not below it (``way`` is 1) or not above it (-1)."""
+    text = f"{value:.2e}"
+    if (float(text) - value) * way >= 0.0:
+        return text
+    return f"{value + way * 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - 2):.2e}"
 
 
 def _digits(value: float, band: float) -> str:
