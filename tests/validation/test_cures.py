@@ -82,6 +82,10 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     assert told_cure(row) == cure_text(CURE)
     other = told_cure({**row, "metric": "out_of_plane"})
     assert other == f"none is known of this check; of creep, turned in this scene: {cure_text(CURE)}"
+    # What is told is mended in the cell that is told, though the same check fails elsewhere with the cure.
+    listed["pinch", 2] = replace(CURE, mends=("turned",))
+    assert told_cure({**row, "metric": "creep", "params": {"margin": 1.05, "g": 9.81}}) == cure_text(CURE)
+    assert "none is known" in told_cure({**row, "metric": "creep", "params": {"margin": 100.0}})
     assert told_cure({**row, "dimension": 3}) == told_cure({**row, "profile": "tuned"}) == ""
     assert told_cure({**row, "engine_version": "4.0.2"}) == ""
     listed["pinch", 2] = CURE  # a table of before kinds were written down: what it tells is of its own metric

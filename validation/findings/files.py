@@ -192,21 +192,20 @@ def _line(key: Key, finding: Finding) -> tuple[str, ...]:
 
 
 def _texts(value: float, finding: Finding) -> tuple[str, str]:
-    """Value and band: ends outwards to two digits more than a band has, and the value between them."""
+    """Value and band; ends are rounded outwards, by a twentieth of what lies between them at most."""
     if finding.ends is None:
         return _digits(value, finding.band), f"{finding.band:.1e}"
-    nearest = min(value - finding.ends[0], finding.ends[1] - value)
-    told = _digits(value, max(nearest, 1e-6 * abs(value)))
-    low, high = (outwards(end, way) for end, way in zip(finding.ends, (-1, 1), strict=True))
-    return told, f"{min(low, told, key=float)}{TO}{max(high, told, key=float)}"
+    low, high = finding.ends
+    told = _digits(value, min(value - low, high - value) or high - low)
+    ends = [_outwards(end, way, 0.05 * (high - low)) for end, way in ((low, -1), (high, 1))]
+    return told, TO.join((min(ends[0], told, key=float), max(ends[1], told, key=float)))
 
 
-def outwards(value: float, way: int) -> str:
-    """Three digits of ``value`` that are not below it (``way`` is 1) or not above it (-1)."""
-    text = f"{value:.2e}"
-    if (float(text) - value) * way >= 0.0:
-        return text
-    return f"{value + way * 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - 2):.2e}"
+def _outwards(value: float, way: int, room: float) -> str:
+    """Shortest decimal that is ``value`` or lies on its side ``way``, no farther away than ``room``."""
+    shifted = value + 0.5 * way * room
+    texts = (f"{number:.{n}g}" for n in range(1, 18) for number in (value, shifted))
+    return next((text for text in texts if 0.0 <= (float(text) - value) * way <= room), repr(value))
 
 
 def _digits(value: float, band: float) -> str:
