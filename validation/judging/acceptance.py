@@ -20,8 +20,8 @@ How wide a band is
     Of values multiplied by e^.4, one standard deviation, one in 110 leaves it; of the band of four, which holds the
     truth, one in 150. The logarithm of four moves would not do: it holds a nineteenth and nineteen times the value.
     What then still reaches the tolerance is a row that some starts on the same machine pass or come near to passing, or
-    whose draws lie on both sides of the truth: no single run can see it drift. Of 86 rows of DART with such bands
-    (columns, piles, grips) 8 saw that they pass, and with bands of sixteen starts 40 do; 24 pass from some of them.
+    whose draws lie on both sides of the truth: no single run can see it drift. Of 86 rows of columns, piles and
+    grips with such bands 8 saw that they pass, and with bands of sixteen starts 40 do; 24 pass from some of them.
 """
 
 from __future__ import annotations
