@@ -114,9 +114,15 @@ def told_cure(row: Mapping[str, Any]) -> str:
     if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
         return ""
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
-    if not cure.helps or row["metric"].partition("[")[0] in kinds:
+    told = row["metric"] == cure.metric and _minimal(row) == _minimal({**row, "params": cure.params})
+    if not cure.helps or told or row["metric"].partition("[")[0] in kinds:
         return cure_text(cure)
     return f"none is known of this check; of {', '.join(kinds)} in this scene: {cure_text(cure)}"
+
+
+def _minimal(row: Mapping[str, Any]) -> object:
+    """Parameters of a row, as what differs from its scene's defaults."""
+    return resolve(row["scene"]).minimal(row.get("params", {}))
 
 
 def cure_text(cure: Cure, where: str = "") -> str:

@@ -21,7 +21,16 @@ from reports.wording import number, plural
 from validation.cells import Observation, prepare
 from validation.findings import Family, Findings, FindingsError, Key, files
 from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
-from validation.judging.acceptance import Change, Proposal, accepted, propose, slots_to_move
+from validation.judging.acceptance import (
+    Change,
+    Draws,
+    Proposal,
+    accepted,
+    draws_of,
+    propose,
+    slots_to_move,
+    slots_to_move_further,
+)
 from validation.judging.rows import Row, rows_of, with_floors
 from validation.records.store import SCATTER_TITLE, Store
 
@@ -39,7 +48,8 @@ SHOWN = 12
 def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
     """List rows of RUN that do not pass as findings, each with its value and band, each family with its reason.
 
-    Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Shows
+    Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Where
+    that is too wide to see a finding pass, or come nearer to a third, twelve more starts are asked. Shows
     every family that would change. Those named by --family are accepted; for the others a terminal is asked.
     Without one, families that are not named stay as they are listed, and no cell is run again for them. Rows that a
     deviation law covers and misses, rows whose receipts do not hold and rows of a profile that promises a solution
@@ -53,7 +63,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     console = terminal(stderr=True)
     findings = findings_of(engine)
     about = _about(families, findings)
-    proposal = propose(_rows_with_scatter(out, run, engine, jobs, console, about), engine, findings, about)
+    rows, draws = _rows_with_scatter(out, run, engine, jobs, console, about)
+    proposal = propose(rows, engine, findings, about, draws)
     unknown = set(families) - {change.family.id for change in proposal.changes}
     if unknown:
         raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such family of {engine} in {FAMILIES}")
@@ -100,8 +111,8 @@ def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key]
 
 def _rows_with_scatter(
     out: Path, run: str, engine: str, jobs: int, console: Console, about: Callable[[Key], bool]
-) -> list[Row]:
-    """Rows of the engine with their scatter, which is measured here where the store does not have it."""
+) -> tuple[list[Row], dict[Key, Draws]]:
+    """Rows of the engine with their scatter, measured here where the store does not have it, and their draws."""
     store = Store(out, create=False, write=True)
     try:
         chosen = store.run(run)
@@ -116,10 +127,15 @@ def _rows_with_scatter(
             own += filter(_is_of_this_code, store.observations(earlier))
         rows = rows_of(chosen.id, own)  # once: laws may take a while, and moved starts are not judged
         moves = slots_to_move(rows, engine, about)
-        if not moves:
-            return rows
-        console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
-        return with_floors(rows, own + store.observations(run_plan(store, title, moves, console, jobs)))
+        if moves:
+            console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
+            own += store.observations(run_plan(store, title, moves, console, jobs))
+            rows = with_floors(rows, own)
+        further = slots_to_move_further(rows, engine, draws_of(own), about)
+        if further:
+            console.print(f"{plural(len(further), 'cell')} with further starts, where a band hides what it should show")
+            own += store.observations(run_plan(store, title, further, console, jobs))
+        return rows, draws_of(own)
     finally:
         store.close()
 
@@ -131,11 +147,11 @@ def _is_of_this_code(observation: Observation) -> bool:
 
 def _table(engine: str, changes: Sequence[Change]) -> Table:
     table = Table(title=f"Findings of {engine}: rows per family", title_justify="left")
-    for name in ("family", "listed", "new", "drifted", "gone", "why"):
-        table.add_column(name, justify="right" if name in ("listed", "new", "drifted", "gone") else "left")
+    for name in ("family", "listed", "new", "drifted", "gone", "bands", "why"):
+        table.add_column(name, justify="left" if name in ("family", "why") else "right")
     for change in changes:
-        listed = len(change.same) + len(change.drifted) + len(change.gone)
-        counts = (listed, len(change.new), len(change.drifted), len(change.gone))
+        listed = len(change.same) + len(change.drifted) + len(change.gone) + len(change.bands)
+        counts = (listed, len(change.new), len(change.drifted), len(change.gone), len(change.bands))
         table.add_row(change.family.id, *map(str, counts), change.family.reason or "nobody has said why yet")
     return table
 
@@ -168,7 +184,8 @@ def _on_a_terminal() -> bool:
 def _details(change: Change) -> str:
     """What is new, drifted and gone in a family, kind of metric by kind."""
     lines = [f"family {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
-    for name, entries in (("new", change.new), ("drifted", change.drifted), ("gone", change.gone)):
+    for name, entries in (("new", change.new), ("drifted", change.drifted), ("gone", change.gone),
+                          ("with another band", change.bands)):  # fmt: skip
         kinds = Counter(f"{key[0]} {key[6].partition('[')[0]}" for key in entries)
         lines += [f"  {name}: {count} x {kind}" for kind, count in kinds.items()]
     for key, (old, now) in list(change.drifted.items())[:3]:

@@ -45,7 +45,9 @@ def _show(found: list[Finding], commands: bool) -> None:
         table.add_column(heading, overflow="fold")
     for each in found:
         note = each.note
-        who = f"{note.source}\n{note.about}" + ("" if note.about == note.engine else f", asked of {note.engine}")
+        who = f"{_broken(note.source, console.width // 3)}\n{note.about}" + (
+            "" if note.about == note.engine else f", asked of {note.engine}"
+        )
         table.add_row(Text(who), Text(note.symptom), Text(_said(each)))
         table.add_row("", "", "")
     console.print(table, highlight=False)
@@ -53,6 +55,11 @@ def _show(found: list[Finding], commands: bool) -> None:
         console.print(Text(f"{each.note.source}: {reproduce(each.note.slot.as_dict())}"), soft_wrap=True)
     if not commands:
         console.print(Text("--commands prints the command of every note", style="dim"))
+
+
+def _broken(source: str, width: int) -> str:
+    """``owner/repository#number``, on two lines if it is wider than its column: a number in halves finds nothing."""
+    return source if len(source) < width else source.replace("/", "/\n", 1)
 
 
 def _said(each: Finding) -> str:

@@ -186,7 +186,7 @@ def findings(
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, terminal())
+    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails")
 
 
 def _grid(*headings: str) -> Table:
@@ -196,9 +196,9 @@ def _grid(*headings: str) -> Table:
     return table
 
 
-def _print_families(found: Sequence[Family], console: Console) -> None:
+def _print_families(found: Sequence[Family], console: Console, nothing: str) -> None:
     if not found:
-        console.print("no such row fails")
+        console.print(nothing)
         return
     for mark in dict.fromkeys(family.mark for family in found):
         own = [family for family in found if family.mark == mark]

@@ -45,6 +45,8 @@ def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own
     # Names and numbers aside: what engines cannot be asked, and how often.
     print(Counter((o.slot.engine, re.sub(r"^[^:]*: |[0-9.+-]+", "", o.reason)) for o in found
                   if o.outcome is Outcome.UNSUPPORTED))  # fmt: skip
+    print(Counter((o.slot.engine, o.slot.profile, re.sub(r"[0-9.e+-]+", "", o.reason)) for o in found
+                  if o.outcome is Outcome.INVALID))  # fmt: skip
     allowed = (Outcome.OK, Outcome.UNSUPPORTED, Outcome.INVALID, Outcome.DIVERGED)
     ended = [(o.slot.engine, o.slot.profile, o.slot.scene, o.reason) for o in found if o.outcome not in allowed]
     assert not ended, ended[:5]

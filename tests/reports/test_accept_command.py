@@ -108,8 +108,8 @@ def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
 
 
 def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_another():
-    """Listed are those that stay, those that drifted and those that are gone."""
-    counts = {"one": (111, 2, 30, 4), "another": (0, 12345, 0, 0)}
+    """Listed are those that stay, those that drifted, those that are gone and those with another band."""
+    counts = {"one": (111, 2, 30, 4, 5), "another": (0, 12345, 0, 0, 0)}
     changes = [
         Change(SimpleNamespace(id=name, reason="four sweeps" if name == "one" else ""),
                *(dict.fromkeys(range(number)) for number in each)) for name, each in counts.items()
@@ -120,12 +120,29 @@ def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_anothe
     assert title.strip() == "Findings of toy: rows per family"
     cells = [re.split(r"[│┃]", line)[1:-1] for line in (header, first, second)]
     assert [[cell.strip() for cell in line] for line in cells] == [
-        ["family", "listed", "new", "drifted", "gone", "why"],
-        ["one", "145", "2", "30", "4", "four sweeps"],
-        ["another", "0", "12345", "0", "0", "nobody has said why yet"],
+        ["family", "listed", "new", "drifted", "gone", "bands", "why"],
+        ["one", "150", "2", "30", "4", "5", "four sweeps"],
+        ["another", "0", "12345", "0", "0", "0", "nobody has said why yet"],
     ]
     for line in cells:
-        assert all(cell[-2] != " " for cell in line[1:5]) and all(cell[1] != " " for cell in (line[0], line[5]))
+        assert all(cell[-2] != " " for cell in line[1:6]) and all(cell[1] != " " for cell in (line[0], line[6]))
+
+
+def test_a_band_that_hides_something_is_measured_from_further_starts_and_listed_again_once_it_is_asked(out, findings):
+    findings.mkdir()
+    (findings / files.FAMILIES).write_text(FAMILY)
+    accept(out, "--family", "starved")
+    path = findings / files.MEMBERS
+    kept = path.read_text()
+    place, line = next((k, line) for k, line in enumerate(kept.splitlines()) if files.TO in line)
+    *cell, value, _ends = line.split(",")
+    lines = kept.splitlines()
+    lines[place] = ",".join((*cell, value, f"{3.0 * abs(float(value)):.1e}"))
+    path.write_text("\n".join(lines) + "\n")
+    files.findings_of.cache_clear()
+    asked = accept(out)  # a band as wide as this one holds the truth
+    assert asked.exit_code == 1 and "not accepted: starved" in asked.stderr and path.read_text() != kept
+    assert accept(out, "--family", "starved").exit_code == 0 and path.read_text() == kept
 
 
 def test_the_table_has_the_families_that_would_change_and_no_others(out, findings):
@@ -165,7 +182,8 @@ def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findi
     path = findings / files.MEMBERS
     lines = path.read_text().splitlines()
     fields = lines[1].split(",")
-    fields[7] = str(float(fields[7]) + 3.0 * float(fields[8]))
+    low, high = map(float, fields[8].split(files.TO))
+    fields[7:] = [str(high + (high - low)), str(0.1 * (high - low))]
     path.write_text("\n".join([lines[0], ",".join(fields), *lines[2:]]) + "\n")
     files.findings_of.cache_clear()
     assert call(*CELL, "--out", out).exit_code == 1  # drifted

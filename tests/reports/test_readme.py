@@ -85,7 +85,7 @@ SAID = {
     "show": "default 2-D",
     "findings --engine mujoco": "mujoco/default bounce",
     "findings --scene bounce --profile default": "mujoco/default bounce",
-    "findings --new": "no such row fails",
+    "findings --new": "no row is new or drifted",
     "findings --all": "mujoco/default bounce",
     "explain mujoco/default/bounce": "crosscheck run bounce --param",
     "compare latest crosscheck-out": "nothing changed",

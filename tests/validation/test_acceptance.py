@@ -1,5 +1,6 @@
 """Listing findings: nothing becomes known without somebody's reason, and what must not be listed is refused."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -204,6 +205,128 @@ def test_a_band_is_the_scatter_but_no_less_than_what_matters_and_what_round_off_
     assert band(value, tolerance, scatter) == pytest.approx(expected)
 
 
+#: Seventeen values of a row of truth 0 and tolerance .1: as it is posed, and from sixteen moved starts.
+TWO_WAYS = (3.0, *(3.0, 2.0) * 8)
+
+
+def wide(values, **fields):
+    """A row with the scatter of its first five values, and what is listed of it."""
+    floor = max(abs(value - values[0]) for value in values[1:5])
+    row = row_of(**{"truth": 0.0, "tolerance": 0.1, "value": values[0], "physics": "fail", "floor": floor, **fields})
+    return row, acceptance._entry(row, values)[1]
+
+
+def test_a_band_that_would_hold_the_truth_is_drawn_from_sixteen_starts_and_holds_one_more_draw():
+    row, (value, _, _, ends) = wide(TWO_WAYS)
+    assert acceptance.hides(row, (3.0 - 4.0, 3.0 + 4.0)) and not acceptance.hides(row, ends)
+    values, logs, widths = np.array(TWO_WAYS), np.log(TWO_WAYS), 4.015 * math.sqrt(18 / 17)
+    near = math.exp(logs.mean() - widths * logs.std(ddof=1))
+    assert (value, *ends) == pytest.approx((3.0, near, values.mean() + widths * values.std(ddof=1)))
+    assert 0.7 < ends[0] < 2.0 and 3.0 < ends[1] < 6.0
+    below = wide(tuple(-each for each in TWO_WAYS))[1]
+    assert below[3] == pytest.approx((-ends[1], -ends[0]))
+    shifted = wide(tuple(each + 7.0 for each in TWO_WAYS), truth=7.0)[1]
+    assert shifted[3] == pytest.approx((7.0 + ends[0], 7.0 + ends[1]))
+
+
+def test_student_is_what_it_is():
+    from scipy.stats import t
+
+    assert {n: round(float(t.ppf(1.0 - 0.0005, n)), 4) for n in acceptance.STUDENT} == acceptance.STUDENT
+    assert 1 + len(MOVES) + len(acceptance.MORE_MOVES) == 1 + max(acceptance.STUDENT)
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.4, 1.0])
+def test_one_more_draw_leaves_a_band_as_rarely_as_it_says(spread):
+    """Of 4000 rows whose values are multiplied at random, 4 come nearer, on average; no more go away than of four."""
+    dice = np.random.default_rng(2026)
+    draws = np.exp(spread * dice.normal(size=(4000, 18)))
+    bands = [acceptance.one_more(tuple(row[:17]), 0.0) for row in draws]
+    assert sum(row[17] < low for (low, _), row in zip(bands, draws, strict=True)) <= 12
+    beyond = sum(row[17] > high for (_, high), row in zip(bands, draws, strict=True))
+    assert beyond <= 1.5 * sum(row[17] > row[0] + 4.0 * abs(row[1:5] - row[0]).max() for row in draws) + 10
+    assert all(low <= row[:17].min() and row[:17].max() <= high for (low, high), row in zip(bands, draws, strict=True))
+
+
+def test_draws_on_both_sides_of_the_truth_have_no_logarithm_and_a_band_that_holds_it():
+    draws = (1.0, *(1.0, -1.0) * 8)
+    row, (_, _, _, (low, high)) = wide(draws)
+    assert low < -1.0 < 1.0 < high and acceptance.hides(row, (low, high))
+    half = 4.015 * math.sqrt(18 / 17) * np.std(draws, ddof=1)
+    assert (low, high) == pytest.approx((np.mean(draws) - half, np.mean(draws) + half))
+
+
+def test_one_start_that_differs_is_held_and_the_least_of_bands_is_kept():
+    assert wide((3.0, *(1.0,) * 16))[1][3][1] > 3.0
+    ends = wide((3.0, *(3.0,) * 16))[1][3]
+    assert ends == pytest.approx((3.0 - 1e-3, 3.0 + 1e-3))
+    assert wide(TWO_WAYS[:11])[1][3] is None  # too few of the moved starts had a value: half a width, as from four
+
+
+@pytest.mark.parametrize(
+    ("ends", "physics", "hidden"),
+    [
+        ((0.3, 2.0), "fail", True),  # a third of the distance, and nearer
+        ((0.34, 2.0), "fail", False),
+        ((-1.0, 3.0), "fail", True),
+        ((-1.0, 3.0), "pass", True),
+        ((0.5, 2.0), "fail", False),
+    ],
+)
+def test_what_a_band_hides(ends, physics, hidden):
+    row = row_of(truth=0.0, tolerance=0.1, value=1.0, physics=physics)
+    assert acceptance.hides(row, ends) is hidden
+    assert acceptance.hides(replace(row, value=-1.0), (-ends[1], -ends[0])) is hidden
+
+
+def test_a_band_that_reaches_the_tolerance_hides_that_a_row_passes():
+    row = row_of(truth=0.0, tolerance=0.1, value=0.11, physics="fail")
+    assert acceptance.hides(row, (0.1, 0.12)) and not acceptance.hides(row, (0.101, 0.12))
+    assert not acceptance.hides(replace(row, value=0.09, physics="pass"), (0.08, 0.1))
+    assert not acceptance.hides(replace(row, tolerance=None), (0.1, 0.12))
+
+
+def scattered(*values):
+    """Observations of a cell and its moved starts, in the order in which they are asked."""
+    ulps = (0, *MOVES, *acceptance.MORE_MOVES)
+    return [observed(replace(SLOT, ulp=n), creep=value) for n, value in zip(ulps, values, strict=False)]
+
+
+def test_only_cells_whose_band_hides_something_are_moved_further_and_once():
+    def further(values, about=lambda key: True):
+        seen = scattered(*values)
+        return acceptance.slots_to_move_further(rows_of("run", seen), "nameless", acceptance.draws_of(seen), about)
+
+    asked = [replace(SLOT, ulp=n) for n in acceptance.MORE_MOVES]
+    assert further((0.5, 0.5, 0.5, 0.4, 0.4)) == asked
+    assert further((0.5, 0.5, 0.5, 0.49, 0.49)) == []
+    assert further((0.5, 0.5, 0.5, 0.4, 0.4), lambda key: False) == []
+    assert further(tuple(each / 6.0 for each in TWO_WAYS)) == []  # they have been
+    assert further((0.5,)) == []  # their first moves come first
+
+
+def test_draws_stand_in_the_order_of_moves_and_only_of_sound_cells():
+    seen = scattered(*range(1, 18))
+    seen[2] = replace(seen[2], outcome=Outcome.DIVERGED)
+    assert acceptance.draws_of(reversed(seen)) == {KEY: (1, 2, *range(4, 18))}
+    assert acceptance.draws_of(seen[1:]) == {}
+
+
+def test_a_listed_row_with_a_band_that_hides_gets_another_once_its_family_is_accepted_again():
+    seen = scattered(*(each / 6.0 for each in TWO_WAYS))
+    draws, judged = acceptance.draws_of(seen), rows_of("run", seen)
+    old = Finding(FAMILY, 0.5, 0.6)
+    proposal = propose(judged, "nameless", listed(FAMILY, creep=old), draws=draws)
+    (change,) = proposal.changes
+    assert change.asks and list(change.bands) == [KEY] and not change.same and not change.drifted
+    assert accepted(proposal, []) == {KEY: old}
+    found = accepted(proposal, ["creeps"])[KEY]
+    assert found.ends == acceptance.one_more(draws[KEY], 0.0) and found.holds(0.4) and not found.holds(0.1)
+    narrow = Finding(FAMILY, 0.5, 0.1)
+    assert not propose(judged, "nameless", listed(FAMILY, creep=narrow), draws=draws).changes[0].asks
+    assert not propose(judged, "nameless", listed(FAMILY, creep=found), draws=draws).changes[0].asks
+
+
 def test_cells_that_fail_or_nearly_fail_are_moved_and_no_others():
     cells = [observed(SLOT, creep=0.5), observed(replace(SLOT, dimension=3), creep=0.0)]
     moved = slots_to_move(rows_of("run", cells), "nameless")
@@ -383,14 +506,14 @@ def row_of(**fields):
     [
         # 0.0625 off and 4 x 0.015625 of scatter: within a tolerance of 0.125, to the last bit
         ({"value": 1.0625, "physics": "pass", "floor": 0.015625}, ("", None)),
-        ({"value": 1.0625, "physics": "pass", "floor": 0.0157}, ("", (1.0625, 0.0628, False))),
-        ({"value": 0.9375, "physics": "pass", "floor": 0.0157}, ("", (0.9375, 0.0628, False))),
+        ({"value": 1.0625, "physics": "pass", "floor": 0.0157}, ("", (1.0625, 0.0628, False, None))),
+        ({"value": 0.9375, "physics": "pass", "floor": 0.0157}, ("", (0.9375, 0.0628, False, None))),
         ({"value": 1.0624, "physics": "pass", "floor": 1.0}, ("", None)),
         ({"tolerance": None, "physics": None}, ("", None)),
         ({"truth": None, "physics": None}, ("", None)),
         ({"standing": "explained"}, ("", None)),
-        ({"value": None, "physics": None}, ("", (None, 0.0, False))),
-        ({"outcome": "diverged", "value": None}, ("", (None, 0.0, True))),
+        ({"value": None, "physics": None}, ("", (None, 0.0, False, None))),
+        ({"outcome": "diverged", "value": None}, ("", (None, 0.0, True, None))),
         ({"floor": None}, ("its scatter is not known: the cell has not been run from moved starts", None)),
         ({"engine": "reference", "profile": "reference"},
          ("its profile promises a solution: what fails there is mended, not listed", None)),
@@ -403,7 +526,7 @@ def test_what_a_row_would_be_listed_as_or_why_it_is_refused(fields, entry):
     if entry[1] is None or entry[1][0] is None:
         assert found == entry[1]
     else:
-        assert found == (entry[1][0], pytest.approx(entry[1][1], rel=1e-12), entry[1][2])
+        assert found == (entry[1][0], pytest.approx(entry[1][1], rel=1e-12), *entry[1][2:])
 
 
 def test_the_reasons_of_refusals_in_full(monkeypatch):
@@ -421,7 +544,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
 
 def test_a_study_has_no_scatter_and_the_least_of_bands():
     study = CATALOGUE["incline"].studies[0]
-    why, (value, width, _) = acceptance._entry(row_of(metric=study.name, floor=None, truth=1.0, tolerance=0.125))
+    why, (value, width, *_) = acceptance._entry(row_of(metric=study.name, floor=None, truth=1.0, tolerance=0.125))
     assert (why, value, width) == ("", 0.5, pytest.approx(0.00125))
 
 

@@ -8,9 +8,11 @@ import pytest
 from click.testing import CliRunner
 
 from adapters.engine_folder import CURES, inside
-from adapters.registry import find, names
+from adapters.registry import facts, find, names
 from reports.command import main
 from reports.cures import cure_paste, cure_text, decided_by, told_cure, told_cures
+from validation.cells import Observation, Outcome, Slot
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 from validation.settings import cures
 from validation.settings.cures import Cure, Unsearched, _best, _Trials, asked_of, cures_of, read, search, write
@@ -82,6 +84,10 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     assert told_cure(row) == cure_text(CURE)
     other = told_cure({**row, "metric": "out_of_plane"})
     assert other == f"none is known of this check; of creep, turned in this scene: {cure_text(CURE)}"
+    # What is told is mended in the cell that is told, though the same check fails elsewhere with the cure.
+    listed["pinch", 2] = replace(CURE, mends=("turned",))
+    assert told_cure({**row, "metric": "creep", "params": {"margin": 1.05, "g": 9.81}}) == cure_text(CURE)
+    assert "none is known" in told_cure({**row, "metric": "creep", "params": {"margin": 100.0}})
     assert told_cure({**row, "dimension": 3}) == told_cure({**row, "profile": "tuned"}) == ""
     assert told_cure({**row, "engine_version": "4.0.2"}) == ""
     listed["pinch", 2] = CURE  # a table of before kinds were written down: what it tells is of its own metric
@@ -129,8 +135,6 @@ class Toy:
 
 def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
     """Trials on one cell of which the first checks are off by ``off(settings)`` tolerances, the others by 0."""
-    from validation.cells import Observation, Outcome, Slot
-
     slot = Slot("pinch", (), 2, "toy", "default", 1 / 240)
 
     def observe(slots, jobs=1):
@@ -249,6 +253,25 @@ def test_the_committed_tables_are_of_the_installed_release_and_of_scenes_that_ex
         assert bool(cure.changes) == cure.helps and cure.left <= cure.failing
         assert [dict(cell) for cell in cure.cells] == [dict(cell) for cell in asked_of(cure.scene, cure.dimension)]
         assert find(engine).engine is None or cure.version == find(engine).version, "make cures"
+
+
+def stated(engine, cure):
+    """Checks that the cells of a cure state today, the plane of a lifted scene among them."""
+    lifted = cure.dimension == 2 and 3 in facts(engine).dimensions
+    metrics = {OUT_OF_PLANE: (0.0, "")} if lifted else {}
+    slots = [Slot(cure.scene, tuple(sorted(c.items())), cure.dimension, engine, "default", 1 / 240) for c in cure.cells]
+    return [each for slot in slots for each in readings(Observation(slot, "", 1, "", Outcome.OK, metrics=metrics))]
+
+
+@pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
+def test_a_committed_cure_was_measured_with_the_checks_that_its_scene_states_today(engine):
+    """A check that came later may fail with a cure that is told as one of all checks: so it was with `out_of_plane`."""
+    for cure in read(inside(engine, CURES)):
+        known = stated(engine, cure)
+        assert cure.judged == len(known), (
+            f"{cure.scene} {cure.dimension}-D: crosscheck cure {engine} {cure.scene} --keep"
+        )
+        assert set(cure.mends) <= {each.check.metric.partition("[")[0] for each in known}
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])

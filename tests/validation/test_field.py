@@ -3,10 +3,12 @@
 import re
 
 import pytest
+from click.testing import CliRunner
 
 from adapters.registry import find
+from reports.command import main
 from validation.cells import Observation, Outcome
-from validation.field import ABSENT, CURED, NOT_SEEN, REPRODUCED, Note, ask, matching, notes
+from validation.field import ABSENT, CURED, NOT_SEEN, REPRODUCED, Finding, Note, ask, matching, notes
 from validation.posed import resolve
 from validation.settings.switching import readings
 
@@ -68,3 +70,14 @@ def test_an_engine_that_is_not_here_makes_no_note_false(monkeypatch):
 def test_notes_are_chosen_by_words():
     assert {note.source for note in matching(["pymunk"])} == {"viblo/pymunk#231"}
     assert len(matching(["mujoco"])) >= 8 and matching([]) == list(notes())
+
+
+def test_a_source_is_never_cut_within_its_number_at_80_columns(monkeypatch):
+    """Folded by the width alone, 3328 was shown as 33 and 28."""
+    found = [Finding(note, note.said) for note in notes()]
+    monkeypatch.setattr("reports.command.asking.ask", lambda notes, jobs: found)
+    shown = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["field"]).stdout
+    assert max(map(len, shown.splitlines())) <= 80
+    words = shown.split()
+    for note in notes():
+        assert note.source in words or note.source.partition("/")[2] in words

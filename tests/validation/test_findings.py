@@ -194,6 +194,11 @@ def test_a_planned_cell_without_an_observation_has_its_rows_and_is_an_alarm(find
         (FAMILY, HEAD + MEMBER.replace(",creep,", ",acceleration,"), "does not speak about default acceleration"),
         (FAMILY, HEAD + MEMBER.replace("1e-3", ""), "must be numbers"),
         (FAMILY, HEAD + MEMBER.replace("1e-3", "inf"), "must be finite"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0.4.."), "must be numbers"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0.4..0.6..0.7"), "must be numbers"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0.4..inf"), "must be finite"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0.51..0.6"), "between the ends of its band"),
+        (FAMILY, HEAD + MEMBER.replace("1e-3", "0.5..0.5"), "between the ends of its band"),
         (FAMILY, HEAD + MEMBER.replace("1e-3", "0"), "the band above 0"),
         (FAMILY, HEAD + "creeps,default\n", "has 2 fields"),
     ],
@@ -293,6 +298,42 @@ def test_what_is_written_is_read_again_within_a_twentieth_of_its_band(findings):
         else:
             assert abs(again[key].value - finding.value) <= 0.05 * finding.band
             assert again[key].band == pytest.approx(finding.band, rel=0.05)
+
+
+def test_a_band_with_two_ends_is_read_and_holds_what_lies_between_them(findings):
+    (found,) = files.read("nameless", findings(FAMILY, HEAD + MEMBER.replace("1e-3", "0.45..6e-1"))).members.values()
+    assert (found.value, found.ends) == (0.5, (0.45, 0.6))
+    assert [found.holds(value) for value in (0.449, 0.45, 0.6, 0.601, float("nan"))] == [
+        False,
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert found.band_text == "0.5, from 0.45 to 0.6"
+    assert replace(found, ends=None, band=0.1).band_text == "0.5 +- 0.1"
+    assert not replace(found, value=None).holds(0.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "ends", "text"),
+    [
+        (0.0096432, (0.0071349, 0.0151123), "0.0096,0.007..0.0153"),
+        (-0.0096432, (-0.0151123, -0.0071349), "-0.0096,-0.0153..-0.007"),
+        (3.0, (2.99901, 3.00099), "3,2.999..3.001"),
+        (1.23456789, (1.2345, 2.0), "1.23457,1.2..2"),
+        (0.0, (0.0, 0.5), "0,0..0.5"),
+        (-0.25, (-0.25, 0.996), "-0.2,-0.3..1"),
+    ],
+)
+def test_ends_are_written_outwards_with_the_value_between_them(findings, value, ends, text):
+    folder = findings()
+    family = files.read("nameless", folder).families["creeps"]
+    files.write_members(folder, {row_key(SLOT, "creep"): Finding(family, value, ends=ends)})
+    assert (folder / files.MEMBERS).read_text().splitlines()[1].partition(",creep,")[2] == text
+    (again,) = files.read("nameless", folder).members.values()
+    wide = 1.11 * (ends[1] - ends[0])
+    assert again.ends[0] <= ends[0] < ends[1] <= again.ends[1] <= again.ends[0] + wide and again.holds(value)
 
 
 def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):

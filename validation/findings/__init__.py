@@ -4,7 +4,9 @@
     member    one row of the standard suite: the value that was found, and the band within which it is the same finding
 
 A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and
-whether it passes or fails. A member without a value says that the check has none on this row, and its family why.
+whether it passes or fails. A band is a half width, or two ends about the value where it is not as wide on both sides
+(`validation.judging.acceptance` says how both are measured, and when a band is too wide to see anything drift). A
+member without a value says that the check has none on this row, and its family why.
 Rows outside the standard suite have no members: a family says what they are like, it gives them no standing.
 
 They stand in the engine's folder (`validation.findings.files` reads them). An engine without findings is *unlisted*:
@@ -115,6 +117,8 @@ class Finding:
         It is the same finding as long as it is this close.
     diverged
         The cell ended in numbers that are none.
+    ends
+        Least and largest value of the same finding, where that is not ``band`` on both sides.
     text
         Value and band as they stand in the file, which writing it again must not change.
     """
@@ -123,7 +127,21 @@ class Finding:
     value: float | None
     band: float = 0.0
     diverged: bool = False
+    ends: tuple[float, float] | None = None
     text: tuple[str, str] | None = field(default=None, compare=False)
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is the same finding; none is where nothing was found."""
+        if self.value is None:
+            return False
+        return abs(value - self.value) <= self.band if self.ends is None else self.ends[0] <= value <= self.ends[1]
+
+    @property
+    def band_text(self) -> str:
+        """Value and band as people read them; for a member that has a value."""
+        if self.ends is not None:
+            return f"{self.value:.6g}, from {self.ends[0]:.3g} to {self.ends[1]:.3g}"
+        return f"{self.value:.6g} +- {self.band:.1g}"
 
 
 @dataclass(frozen=True)

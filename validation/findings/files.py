@@ -25,6 +25,8 @@ FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
 #: What stands in the column ``value`` of a cell that ended in numbers that are none.
 DIVERGED = "diverged"
+#: Between the two ends of a band that is not as wide on both sides.
+TO = ".."
 
 
 @cache
@@ -159,12 +161,16 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
     if value in ("", DIVERGED):
         return key, Finding(family, None, diverged=value == DIVERGED, text=(value, band))
     try:
-        found, width = float(value), float(band)
+        found, *widths = map(float, (value, *band.split(TO, 1)))
     except ValueError:
         raise FindingsError(f"{label}: value {value!r} and band {band!r} must be numbers") from None
-    if not (math.isfinite(found) and math.isfinite(width) and width > 0.0):
+    if not all(map(math.isfinite, (found, *widths))) or (len(widths) == 1 and widths[0] <= 0.0):
         raise FindingsError(f"{label}: value {value} and band {band} must be finite, the band above 0")
-    return key, Finding(family, found, width, text=(value, band))
+    if len(widths) == 1:
+        return key, Finding(family, found, widths[0], text=(value, band))
+    if not widths[0] <= found <= widths[1] or widths[0] == widths[1]:
+        raise FindingsError(f"{label}: value {value} must lie between the ends of its band, {band}")
+    return key, Finding(family, found, ends=(widths[0], widths[1]), text=(value, band))
 
 
 def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
@@ -181,8 +187,25 @@ def _line(key: Key, finding: Finding) -> tuple[str, ...]:
     profile, _scene, *cell = key
     value, band = finding.text or (DIVERGED if finding.diverged else "", "")
     if finding.value is not None and finding.text is None:
-        value, band = _digits(finding.value, finding.band), f"{finding.band:.1e}"
+        value, band = _texts(finding.value, finding)
     return (finding.family.id, profile, *cell, value, band)
+
+
+def _texts(value: float, finding: Finding) -> tuple[str, str]:
+    """Value and band; ends are rounded outwards, by a twentieth of what lies between them at most."""
+    if finding.ends is None:
+        return _digits(value, finding.band), f"{finding.band:.1e}"
+    low, high = finding.ends
+    told = _digits(value, min(value - low, high - value) or high - low)
+    ends = [_outwards(end, way, 0.05 * (high - low)) for end, way in ((low, -1), (high, 1))]
+    return told, TO.join((min(ends[0], told, key=float), max(ends[1], told, key=float)))
+
+
+def _outwards(value: float, way: int, room: float) -> str:
+    """Shortest decimal that is ``value`` or lies on its side ``way``, no farther away than ``room``."""
+    shifted = value + 0.5 * way * room
+    texts = (f"{number:.{n}g}" for n in range(1, 18) for number in (value, shifted))
+    return next((text for text in texts if 0.0 <= (float(text) - value) * way <= room), repr(value))
 
 
 def _digits(value: float, band: float) -> str:

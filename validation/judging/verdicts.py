@@ -117,7 +117,7 @@ def _without_value(known: Known, why: str) -> Verdict:
 
 
 def _against_finding(physics: Physics | None, value: float, finding: Finding) -> Verdict:
-    if finding.value is None or not abs(value - finding.value) <= finding.band:
+    if not finding.holds(value):
         passes = "passes, but " if physics is Physics.PASS else ""
         return Verdict(physics, Standing.DRIFTED, f"{passes}{_listed_as(finding)}")
     marginal = "passes within the band of what is listed as failing: " if physics is Physics.PASS else ""
@@ -127,7 +127,7 @@ def _against_finding(physics: Physics | None, value: float, finding: Finding) ->
 def _listed_as(finding: Finding) -> str:
     if finding.value is None:
         return f"is listed as {'diverging' if finding.diverged else 'having no value'}: {finding.family.reason}"
-    return f"is listed with {finding.value:.6g} +- {finding.band:.1g}: {finding.family.reason}"
+    return f"is listed with {finding.band_text}: {finding.family.reason}"
 
 
 def _unlisted(physics: Physics | None, known: Known, why: str) -> Verdict:

@@ -179,7 +179,7 @@ def mended(row: Row) -> bool:
     finding = finding_of(row)
     if finding is None or row.physics != Physics.PASS.value or finding.family.holds_for(row.engine_version):
         return False
-    return finding.value is None or row.value is None or abs(row.value - finding.value) > finding.band
+    return row.value is None or not finding.holds(row.value)
 
 
 def finding_of(row: Row) -> Finding | None:

@@ -10,6 +10,7 @@ from reference_solver.certification.audit.contact import reduced_mass
 from reference_solver.certification.audit.motion import swings
 from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.audit.turning import turned_contacts
+from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 
 #: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.
@@ -83,8 +84,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     before, after = (_kinetic(run, k) for k in range(2))
     way = pieces.pose_after[:, : run.d] - pieces.pose_before[:, : run.d]
     load = (run.force[body] * way).sum(axis=1)
-    mean = 0.5 * (pieces.twist_before[:, run.d :] + pieces.twist_after[:, run.d :])
-    turn = pieces.pose_after[:, 2:] - pieces.pose_before[:, 2:] if run.d == 2 else run.length[:, None] * mean
+    turn = pieces.pose_after[:, 2:] - pieces.pose_before[:, 2:] if run.d == 2 else _turn(run)
     load += (run.torque[body] * turn).sum(axis=1)
     gained = np.zeros(len(pieces))
     np.add.at(gained, owner, np.where(free, after - before - load, 0.0))
@@ -101,6 +101,26 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     lawful = (run.model.restitution[a, b] > 0.0) & (run.model.friction[a, b] > 0.0)
     mixed[run.contact_owner[lawful]] = True
     return gained, run.is_release | (run.is_impact & mixed), unseen, max(float(most.max()), usual)
+
+
+def _turn(run: Run) -> Array:
+    """Turn (m, 3) about fixed axes, the integral of the spin [rad]: a constant torque does work by it.
+
+    The spin of a body with unequal moments bends, whether or not a torque acts: half the sum of both ends leaves
+    h^3/12 of its second derivative. Euler's equations tell its first at both ends, and Hermite's formula is of fourth
+    order. A piece whose impulses act at one end has no such derivatives.
+    """
+    pieces, time = run.pieces, run.length[:, None]
+    spins = [twist[:, run.d :] for twist in (pieces.twist_before, pieces.twist_after)]
+    _, moment, pushed, _ = run.pushed
+    acting = run.torque[pieces.body] + moment / np.where(time > 0.0, time, np.inf)
+    rates = []
+    for pose, spin, momentum in zip((pieces.pose_before, pieces.pose_after), spins, run.spin, strict=True):
+        axes, inverse = rotation(pose), 1.0 / run.moments[pieces.body]
+        rates.append(np.einsum("sij,sj,skj,sk->si", axes, inverse, axes, acting - np.cross(spin, momentum)))
+    bends = (pushed == 0.0) | ~run.is_frozen[run.owner]
+    bend = np.where(bends[:, None], time**2 * (rates[0] - rates[1]) / 12.0, 0.0)
+    return np.asarray(0.5 * time * (spins[0] + spins[1]) + bend)
 
 
 def _kinetic(run: Run, late: int) -> Array:
