@@ -56,6 +56,7 @@ from reference_solver.stepping.impacts import (
     SERIES_ENDS,
     STRUCK,
     drifts_aside,
+    is_lowest,
     turns_aside,
 )
 from reference_solver.stepping.iteration import solve_velocities
@@ -300,7 +301,8 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             rate = row_turn(bodies, rows, sub, c, min(lasts / length, 1.0))
             aside += turns_aside(leaves, lasts, rate, options.dt)
             extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
-            if aside > SERIES_DRIFT * extent and is_patient(sub.clock):
+            lowest = is_lowest(leaves, pull, gap_noise(bodies, rows, c), e)
+            if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub.clock):
                 continue
             rows.integer[c, ENDING] = SERIES_ENDS
             new = True

@@ -29,10 +29,11 @@ from reference_solver.stepping.impacts import (
     STRUCK,
     TURNED,
     drifts_aside,
+    is_lowest,
     turns_aside,
 )
 from reference_solver.stepping.iteration import solve_velocities
-from reference_solver.stepping.noise import NOISE, PASSED_ON, SPEED_SHARE, UNSOLVED
+from reference_solver.stepping.noise import COORDINATE_NOISE, NOISE, PASSED_ON, ROUND_OFF, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
@@ -79,6 +80,15 @@ def speed_of_parts(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> floa
     parts += length(row(bodies.twist, a, 3)) * length(row(manifolds.arm_a[m], p, 0))
     parts += length(row(bodies.twist, b, 3)) * length(row(manifolds.arm_b[m], p, 0))
     return parts
+
+
+@inner_kernel
+def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
+    """Gap of a point that is round-off, not geometry [m]."""
+    point = row(manifolds.point[m], p, 0)
+    place = max(abs(point[0]), abs(point[1]), abs(point[2]))
+    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
+    return ROUND_OFF * extent + COORDINATE_NOISE * place
 
 
 @inner_kernel
@@ -218,7 +228,8 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 rate = row_turn(bodies, manifolds, m, math.hypot(u[0], u[1]), min(lasts / time, 1.0))
                 aside += turns_aside(leaves, lasts, rate, options.dt)
                 extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-                if aside > SERIES_DRIFT * extent and is_patient(sub_step.clock):
+                lowest = is_lowest(leaves, pull, gap_noise(bodies, manifolds, m, p), e)
+                if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub_step.clock):
                     continue
                 manifolds.ending[m, p] = SERIES_ENDS
                 new = True

@@ -17,7 +17,7 @@ from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.features import follow, name_features
 from reference_solver.spatial.flight import place_at, reach_of
-from reference_solver.spatial.impact import clear_point, doubt, set_reference_speed
+from reference_solver.spatial.impact import clear_point, doubt, gap_noise, set_reference_speed
 from reference_solver.spatial.kinematics import apply_wrench, relative_twist, velocity_at
 from reference_solver.spatial.manifolds import set_frame
 from reference_solver.spatial.motion import (
@@ -35,7 +35,7 @@ from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.sequential_impulses import sweep_points
 from reference_solver.spatial.state import FIXED, FREE, HALF_SPACE, POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.sticking import prepare_wrenches
-from reference_solver.spatial.touching import closed_gap, gap_noise
+from reference_solver.spatial.touching import closed_gap
 from reference_solver.spatial.vector import (
     add,
     add_scaled,

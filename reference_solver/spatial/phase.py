@@ -12,12 +12,11 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.features import follow, name_features
-from reference_solver.spatial.impact import carries
+from reference_solver.spatial.impact import carries, gap_noise
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate, momentum_of, put_orientation
 from reference_solver.spatial.operations import Spatial, displace
 from reference_solver.spatial.state import FIXED, FREE, POINTS, Bodies, Manifolds, SubStep
-from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import dot, length, row, sub, times_transposed
 from reference_solver.stepping import accounting
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, OUTCOME

@@ -8,13 +8,12 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
-from reference_solver.spatial.impact import clear_point, doubt, set_reference_speed
+from reference_solver.spatial.impact import clear_point, doubt, gap_noise, set_reference_speed
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
 from reference_solver.spatial.motion import accelerate
 from reference_solver.spatial.phase import is_exact
 from reference_solver.spatial.prepare import still_speed, warm_start
 from reference_solver.spatial.state import Bodies, Manifolds, SubStep
-from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector
 from reference_solver.stepping.clock import BRIEF
 from reference_solver.stepping.iteration import solve_velocities

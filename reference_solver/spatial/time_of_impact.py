@@ -8,12 +8,11 @@ from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.spatial.box_box import EXACT_ADVANTAGE
 from reference_solver.spatial.broadphase import find_overlaps
 from reference_solver.spatial.flight import axis_drift, bound_flight, copy_body, curvature, place_at
-from reference_solver.spatial.impact import soft_speed
+from reference_solver.spatial.impact import gap_noise, soft_speed
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import set_world_points
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import CANDIDATES, Bodies, Detection, Manifolds, SubStep
-from reference_solver.spatial.touching import gap_noise
 from reference_solver.spatial.vector import Vector, dot, row, sub
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options

@@ -6,7 +6,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.box_box import EDGE_ADVANTAGE, EXACT_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
-from reference_solver.spatial.impact import soft_speed
+from reference_solver.spatial.impact import gap_noise, soft_speed
 from reference_solver.spatial.kinematics import point_velocity
 from reference_solver.spatial.manifolds import (
     friction_of,
@@ -21,7 +21,7 @@ from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
-from reference_solver.stepping.noise import COORDINATE_NOISE, LATE, NEARLY, NO_GAP, ROUND_OFF
+from reference_solver.stepping.noise import LATE, NEARLY, NO_GAP
 from reference_solver.stepping.options import Options
 
 
@@ -72,15 +72,6 @@ def detect_touching(
             m += 1
     detection.found[MANIFOLDS] = m
     return m
-
-
-@inner_kernel
-def gap_noise(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
-    """Gap of a point that is round-off, not geometry [m]."""
-    point = row(manifolds.point[m], p, 0)
-    place = max(abs(point[0]), abs(point[1]), abs(point[2]))
-    extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
-    return ROUND_OFF * extent + COORDINATE_NOISE * place
 
 
 @inner_kernel

@@ -21,6 +21,9 @@ DRIFT_STEPS = 1e4
 #: An impact is soft that closes no more than this share of the smaller half width in a step. Without loads all others
 #: are hard, and of bodies caught between others they have no end, each slower than the one before.
 CREEP = 1e-6
+#: A rebound is seen to be back once it has fallen through the noise of its gap, and is lifted out of it again (E24):
+#: none of a series gets lower than e^2/(1 - e^2) times that, and from twice its speed there on none is followed.
+LOWEST = 4.0
 #: Passes that mark ending series of rebounds; each marks at least one row more.
 SERIES_PASSES = 4
 
@@ -34,6 +37,12 @@ def turns_aside(leaves: float, lasts: float, rate: float, dt: float) -> float:
     ``leaves * rate * lasts``, counts over `DRIFT_STEPS` steps, or until bodies have turned.
     """
     return leaves * lasts * min(DRIFT_STEPS * dt * rate, 1.0)
+
+
+@kernel
+def is_lowest(leaves: float, pull: float, noise: float, e: float) -> bool:
+    """Whether rebounds hardly get lower: the noise [m] of their gap gives back what each of them loses."""
+    return leaves * leaves * (1.0 - e * e) <= LOWEST * 2.0 * pull * noise * e * e
 
 
 @kernel

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from reference_solver.certification import Gate
-from reference_solver.certification.known import blows, crossing, edges, planar, rubbing, spatial
+from reference_solver.certification.known import blows, corners, crossing, edges, planar, rubbing, spatial
 from reference_solver.certification.known.motion import TRUTH, Miss, Motion, miss
 from reference_solver.certification.space import SPACES
 
@@ -35,6 +35,7 @@ MOTIONS: dict[str, Draw] = {
             "box off the end of a table": edges.off_the_table,
             "slabs that slide on each other": rubbing.slabs,
             "rod that slides in a V": rubbing.rod_in_a_v,
+            "box that rebounds on a corner": corners.falls_on_a_corner,
         }.items()
         for space in SPACES
     },
