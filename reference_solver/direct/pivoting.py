@@ -5,7 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import CONTACTS, VELOCITY_COUNT, Problem
 
-#: Pivots per row of the table before a search is given up: 19 contacts that jam take 1.1.
+#: Pivots per row of the table before a search is given up: what ends takes one or two.
 PIVOTS = 20
 #: An entry below this share of the largest of its column is round-off, and no pivot.
 NO_PIVOT = 1e-12

@@ -132,7 +132,8 @@ class SteppedWorld:
 def _copied(value: Any, known: dict[int, Array]) -> Any:
     """Structures of arrays with arrays of their own, once each; ``known``: what stands for an array, by its identity.
 
-    `copy.deepcopy` takes four times as long, and a run whose pieces are recorded is copied for each part of it.
+    `copy.deepcopy`, which asks each entry what it is, takes longer, and a run whose pieces are recorded is copied for
+    each part of it.
     """
     if isinstance(value, np.ndarray):
         if id(value) not in known:

@@ -1,10 +1,7 @@
 """Which mutants run again: those of functions that have changed, where tests have only been added, and else all."""
 
 import hashlib
-import importlib
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -13,12 +10,9 @@ TESTS = "def test_twice():\n    assert twice(2) == 4\n"
 
 
 @pytest.fixture
-def changed(monkeypatch, tmp_path):
+def changed(imported, monkeypatch, tmp_path):
     """`changed(module, tests)`: what `run.changed_since` says of these texts, of others that were committed and ran."""
-    pytest.importorskip("mutmut")
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    kept = set(sys.modules)
-    run = importlib.import_module("run")
+    run = imported("run")
     monkeypatch.setattr(run, "ROOT", tmp_path)
     monkeypatch.setattr(run, "tests_of", lambda module: ["test_toy.py"])
 
@@ -39,10 +33,7 @@ def changed(monkeypatch, tmp_path):
         write(module, tests)
         return run.changed_since("toy.py", of)
 
-    yield ask
-    for name in set(sys.modules) - kept:
-        if name in ("run", "sample", "drawn", "checkout", "lists", "reach", "subjects", "pytest_apart"):
-            del sys.modules[name]
+    return ask
 
 
 def test_functions_that_changed_are_named_and_tests_that_came_change_none(changed):

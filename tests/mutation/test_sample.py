@@ -1,7 +1,5 @@
 """A sample that is kept: what it missed is asked again where it stands today, and the estimate stays what it was."""
 
-import importlib
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,21 +10,15 @@ SOURCE = "def twice(x):\n    return 2 * x\n"
 
 
 @pytest.fixture
-def tools(monkeypatch, tmp_path):
+def tools(imported, monkeypatch, tmp_path):
     """`sample` over one module of its own, and `drawn`, whose sample is kept in a file of the test's own."""
-    pytest.importorskip("mutmut")
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    kept = set(sys.modules)
-    sample, drawn = importlib.import_module("sample"), importlib.import_module("drawn")
+    sample, drawn = imported("sample"), imported("drawn")
     (tmp_path / "toy.py").write_text(SOURCE)
     (tmp_path / "pyproject.toml").write_text('[tool.mutmut]\nsource_paths = ["toy.py"]\n')
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sample, "ROOT", tmp_path)
     monkeypatch.setattr(drawn, "DRAWN", tmp_path / "sample.csv")
-    yield sample, drawn
-    for name in set(sys.modules) - kept:
-        if name in ("sample", "drawn", "checkout", "lists", "reach", "subjects", "pytest_apart"):
-            del sys.modules[name]
+    return sample, drawn
 
 
 def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tools, monkeypatch):

@@ -1,12 +1,14 @@
 """Steps with more events than are located go on by the fixed-step law, certified and counted (E28)."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate import LOCATED_OVERLAP, reasons
+from reference_solver.certification.piles import planar_pile
 from reference_solver.stepping.clock import (
     CLOCK_SIZE,
     EVENTS,
@@ -242,3 +244,19 @@ def test_a_block_that_slides_past_the_end_of_another_stays_on_it_until_its_centr
         simulation.advance(1)
         assert simulation.pose[2, 1:] == pytest.approx([1.1, 0.0], abs=1e-12)
     assert simulation.certificate["penetration"] < 1e-14
+
+
+def test_a_pile_of_masses_one_to_a_hundred_is_solved_to_its_end():
+    """Eleven bodies, mu = .8: in the 323rd step Newton's rounds go in circles, and the run ended there (E45)."""
+    rng = np.random.default_rng(1005)
+    count, mixed = int(rng.integers(8, 16)), float(rng.choice([0.0, 0.5, 1.0]))
+    drawn, bodies = planar_pile(5, count, mixed), []
+    for body in drawn.bodies:
+        heavier = 10.0 ** rng.uniform(-1.0, 1.0)
+        if body.motion == "free":
+            body = replace(body, mass=heavier * body.mass, inertia=heavier * body.inertia)
+        bodies.append(body)
+    simulation = Simulation(Model(2, bodies, drawn.gravity, 0.0, 0.8), Settings.reference(DT))
+    simulation.advance(400)
+    assert simulation.certificate["reasons"] == ()
+    assert simulation.certificate["natural"] <= 1e-10

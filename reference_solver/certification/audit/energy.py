@@ -8,7 +8,7 @@ import numpy as np
 
 from reference_solver.certification.audit.contact import reduced_mass
 from reference_solver.certification.audit.motion import swings
-from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.run import Run, cross, scaled_along, twist_of
 from reference_solver.certification.audit.turning import turned_contacts
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
@@ -117,7 +117,7 @@ def _turn(run: Run) -> Array:
     rates = []
     for pose, spin, momentum in zip((pieces.pose_before, pieces.pose_after), spins, run.spin, strict=True):
         axes, inverse = rotation(pose), 1.0 / run.moments[pieces.body]
-        rates.append(np.einsum("sij,sj,skj,sk->si", axes, inverse, axes, acting - np.cross(spin, momentum)))
+        rates.append(scaled_along(axes, inverse, acting - np.cross(spin, momentum)))
     bends = (pushed == 0.0) | ~run.is_frozen[run.owner]
     bend = np.where(bends[:, None], time**2 * (rates[0] - rates[1]) / 12.0, 0.0)
     return np.asarray(0.5 * time * (spins[0] + spins[1]) + bend)

@@ -69,10 +69,12 @@ def jammed(direct):
 
 @pytest.mark.parametrize("budget", [20, 100])
 def test_where_rounds_stand_still_pivots_end(direct, budget):
-    """Rounds alone are left at 5e-2 after 20 factorisations, and at 1e-3 after 100 or 200."""
+    """A table without room leaves it to rounds alone."""
     problem = jammed(direct)
+    alone = jammed(direct)._replace(table=np.zeros((0, 2)))
+    assert direct.solve(alone, SOLVED, budget) > 1e-4
     assert direct.solve(problem, SOLVED, budget) <= SOLVED
-    assert problem.size[FACTORISATIONS] >= budget
+    assert problem.size[FACTORISATIONS] == alone.size[FACTORISATIONS] >= budget
 
 
 def test_problems_that_are_not_for_pivots_are_left_alone(direct):
