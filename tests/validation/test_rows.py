@@ -10,7 +10,7 @@ from adapters.law import Deviation
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import FindingsError
-from validation.judging import rows
+from validation.judging import predicting, rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
 
 #: A box below the edge of the friction cone: one check, its creep.
@@ -205,7 +205,7 @@ def law(monkeypatch):
         return 0.5, 1e-3
 
     own = Deviation("nameless", ("soft",), "incline", "creep", predict, "it is soft", "its manual", ("1.2",))
-    monkeypatch.setattr(rows, "covering", lambda *row: [own] if own.covers(*row) else [])
+    monkeypatch.setattr(predicting, "covering", lambda *row: [own] if own.covers(*row) else [])
     return given
 
 
@@ -233,8 +233,8 @@ def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
     assert law == GIVEN
     asked = {**row.slot, "iterations": 7}
     for other in (replace(row, physics="pass"), replace(row, iterations=7, slot=asked), replace(row, cells=["a", "b"]),
-                  replace(row, engine_version="1.3"), replace(row, engine="other"), replace(row, profile="hard"),
-                  replace(row, metric="acceleration")):  # fmt: skip
+                  replace(row, engine_version="1.3"), replace(row, slot={**row.slot, "engine": "other"}),
+                  replace(row, slot={**row.slot, "profile": "hard"}), replace(row, metric="acceleration")):  # fmt: skip
         assert predictions_of(other) == []
 
 
@@ -260,7 +260,7 @@ def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
     def gone(*row):
         raise EngineError("nameless: its laws cannot be had: no such file")
 
-    monkeypatch.setattr(rows, "covering", gone)
+    monkeypatch.setattr(predicting, "covering", gone)
     row = judged(slot=OWN)
     said = "read late; the engine has no list of findings; nameless: its laws cannot be had: no such file"
     assert (row.physics, row.reason) == ("fail", said)

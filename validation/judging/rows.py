@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pandas as pd
 
 from adapters.engine import EngineError
-from adapters.engine_folder import covering
 from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
 from validation.findings import Findings, FindingsError, Known, known_of, solutions_of
 from validation.findings.files import brought_by_ours, findings_of
+from validation.judging.predicting import Asked, foretold, predictions
 from validation.judging.studies import StudyResult, results, study_of
 from validation.judging.verdicts import (
     Physics,
@@ -26,7 +26,6 @@ from validation.judging.verdicts import (
     judge,
     judge_divergence,
     judge_physics,
-    predicted,
 )
 from validation.posed import is_file, is_model, resolve
 
@@ -35,6 +34,8 @@ ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
 #: Why a row of a model has no standing.
 OWN_MODEL = "not listed: your own model"
+#: What laws say about rows, asked ahead of the others.
+Ready = Mapping[Asked, list[Prediction]]
 #: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
 TRUTH_SHARE = 0.1
 
@@ -98,7 +99,9 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
     observations = list(observations)
     seen = {observation.slot for observation in observations}
     observations += [_missing(slot) for slot in plan if slot not in seen]
-    rows = [row for o in observations if not o.slot.ulp for row in _cell_rows(run, o)]
+    judged = [(o, *checks_of(o)) for o in observations if not o.slot.ulp]
+    ready = foretold([_asked(o, check) for o, _, checks in judged for check in checks if _is_asked(o, check)])
+    rows = [_row(run, o, scene, check, ready) for o, scene, checks in judged for check in checks]
     return with_floors(rows, observations) + [_study_row(run, result) for result in results(observations)]
 
 
@@ -136,31 +139,28 @@ def _difference(value: float | None, other: float | None) -> float | None:
     return value - other
 
 
-def _cell_rows(run: str, observation: Observation) -> list[Row]:
-    scene, checks = checks_of(observation)
-    return [_row(run, observation, scene, check) for check in checks]
-
-
-def _row(run: str, observation: Observation, scene: Scene, check: Check) -> Row:
+def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: Ready) -> Row:
     value, why = observation.metrics.get(check.metric, (None, "it was not measured"))
     doubt = _doubt(observation, check)
     if doubt:
         observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
-    verdict = _verdict(observation, scene, check, value, why)
+    verdict = _verdict(observation, scene, check, value, why, ready)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
 
 
-def _verdict(observation: Observation, scene: Scene, check: Check, value: float | None, why: str) -> Verdict:
+def _verdict(
+    observation: Observation, scene: Scene, check: Check, value: float | None, why: str, ready: Ready
+) -> Verdict:
     """What was observed, judged; cells without an answer have no physics, and unsupported ones must be known ones."""
     slot, outcome = observation.slot, observation.outcome
     if outcome is Outcome.OK:
-        known, predictions = _known(observation, slot, check), []
+        known, said = _known(observation, slot, check), []
         try:
-            predictions = _predictions(observation, scene, check, value)
+            said = _predictions(observation, scene, check, ready)
         except EngineError as error:  # laws of another package, which say nothing then
             known = replace(known, remark="; ".join(filter(None, (known.remark, str(error)))))
-        return judge(value, check, predictions, known, why)
+        return judge(value, check, said, known, why)
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
@@ -214,16 +214,27 @@ def _certificate(observation: Observation, check: Check) -> str:
     return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
 
 
-def _predictions(observation: Observation, scene: Scene, check: Check, value: float | None) -> list[Prediction]:
-    """What laws say about a FAIL; at iterations asked for those alone that follow an engine's sweeps.
+def _is_asked(observation: Observation, check: Check) -> bool:
+    """Whether laws are asked about a row: a FAIL of a cell of the catalogue.
 
-    They are of the catalogue's scenes: a file that has the name of one of them is another scene.
+    A file that has the name of a scene is another scene. At iterations asked for those laws alone answer that follow
+    an engine's sweeps.
     """
-    slot = observation.slot
-    if judge_physics(value, check) is not Physics.FAIL or is_file(slot.scene):
+    if observation.outcome is not Outcome.OK or is_file(observation.slot.scene):
+        return False
+    return judge_physics(observation.metrics.get(check.metric, (None, ""))[0], check) is Physics.FAIL
+
+
+def _asked(observation: Observation, check: Check) -> Asked:
+    return observation.slot, observation.engine_version, check.metric
+
+
+def _predictions(observation: Observation, scene: Scene, check: Check, ready: Ready) -> list[Prediction]:
+    """What laws say about a FAIL, asked now where it is not ready."""
+    if not _is_asked(observation, check):
         return []
-    laws = covering(slot.engine, observation.engine_version, slot.profile, scene.name, check.metric)
-    return predicted(laws, scene, slot, resolve(slot.scene).measure)
+    asked = _asked(observation, check)
+    return ready[asked] if asked in ready else predictions(*asked, scene)
 
 
 def predictions_of(row: Row) -> list[Prediction]:
@@ -231,11 +242,9 @@ def predictions_of(row: Row) -> list[Prediction]:
     if row.physics != Physics.FAIL.value or len(row.cells) > 1 or is_file(row.scene):
         return []
     slot = slot_from_dict(row.slot)
-    canonical = resolve(slot.scene)
-    scene = canonical.scene(slot.dimension, dict(slot.params))
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     try:
-        laws = covering(row.engine, row.engine_version, row.profile, scene.name, row.metric)
-        return predicted(laws, scene, slot, canonical.measure)
+        return predictions(slot, row.engine_version, row.metric, scene)
     except EngineError:  # laws of another package; their row says what is wrong
         return []
 
