@@ -16,6 +16,8 @@ BEARABLE = 0.4
 #: Share of what the more yielding body does that the other one does, below which what holds it still is asked for: that
 #: is a solve of all rows. Above it c is ten times too large at most, and how fast a slow slip settles hangs on it only.
 FAR_LIGHTER = 0.1
+#: Rounds, at most, in search of a slip's direction or of its speed; change of a direction at which it is found.
+ROUNDS, SETTLED = 16, 1e-12
 #: An acceleration turns a slip no more than round-off does if this share of it is across.
 STRAIGHT = 1e-6
 
@@ -41,10 +43,11 @@ def follow_slip(lasting: Lasting, k: int) -> None:
 def steady_slip(lasting: Lasting, k: int) -> bool:
     """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
 
-    With f the tangential acceleration but for the contact's own friction c, a slip u obeys ``u' = f - c u/|u|``: across
-    f it dies out at the rate c/|u|, which has no bound where a slip begins (or ends) with f near c. Below the speed at
-    which that rate is what the step can bear the direction is that of u a moment later under f alone: exact where the
-    slip does not turn, and off by no more than it turns in that moment. What accelerates along its direction keeps it.
+    With f the tangential acceleration but for the contact's own friction, a slip u obeys ``u' = f - C u/|u|``: across
+    f it dies out at the rate |C|/|u|, which has no bound where a slip begins (or ends) with f near what friction can
+    do. Below the speed at which that rate is what the step can bear the direction is that of a backward step over a
+    moment (`implicit_slip`): exact where the slip does not turn, and off by no more than it turns in that moment. What
+    accelerates along its direction keeps it.
     """
     speed, force, size, onward = 0.0, 0.0, 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
@@ -72,18 +75,88 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
         return False
     if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
         return False
-    size = onward = 0.0
-    for t in range(lasting.size[TANGENTS]):
-        moment = BEARABLE * lasting.length[0] - speed / force
-        lasting.wanted[t] = lasting.speed[k, 1 + t] + moment * lasting.wanted[t]
-        size += lasting.wanted[t] ** 2
-        onward += lasting.wanted[t] * lasting.direction[k, t]
-    size = math.sqrt(size)
-    if onward < TURNED * size:  # it has come to its end
+    moment = BEARABLE * lasting.length[0] - speed / force
+    x, y = 0.0, 0.0
+    if has_light_body(lasting, k):
+        x = lasting.speed[k, 1] + moment * lasting.wanted[0]
+        y = lasting.speed[k, 2] + moment * lasting.wanted[1]
+    else:
+        x, y = implicit_slip(lasting, k, moment)
+    size = math.sqrt(x**2 + y**2)
+    if size == 0.0 or lasting.direction[k, 0] * x + lasting.direction[k, 1] * y < TURNED * size:  # it has ended
         return False
-    for t in range(lasting.size[TANGENTS]):
-        lasting.direction[k, t] = lasting.wanted[t] / size
+    lasting.direction[k, 0], lasting.direction[k, 1] = x / size, y / size
     return True
+
+
+@inner_kernel
+def implicit_slip(lasting: Lasting, k: int, moment: float) -> tuple[float, float]:
+    """Direction (not of unit length) of the slip of contact k a moment [s] later; (0, 0) if none is found.
+
+    A backward step of ``u' = a + p (k_tn - mu K_tt d)``, with the pressure p that keeps the contact held:
+    ``u + moment (a + p k_tn) = (r + moment p mu K_tt) d`` for the speed r >= 0 at which d is a unit vector, or r = 0
+    where friction stops the slip within the moment. What gives way along one tangent more than along the other (a box
+    on its corner) ends its slips along neither its acceleration nor its load.
+    """
+    mu = lasting.friction[k]
+    nn, n1, n2 = compliance(lasting, k, 0, 0), compliance(lasting, k, 0, 1), compliance(lasting, k, 0, 2)
+    c11, c12, c22 = compliance(lasting, k, 1, 1), compliance(lasting, k, 1, 2), compliance(lasting, k, 2, 2)
+    d1, d2, pressed = lasting.direction[k, 0], lasting.direction[k, 1], lasting.force[k, 0]
+    held = pressed * (nn - mu * (n1 * d1 + n2 * d2))
+    a1 = slip_gain(lasting, k, 0) - pressed * (n1 - mu * (c11 * d1 + c12 * d2))
+    a2 = slip_gain(lasting, k, 1) - pressed * (n2 - mu * (c12 * d1 + c22 * d2))
+    for _ in range(ROUNDS):
+        yields = nn - mu * (n1 * d1 + n2 * d2)
+        if yields <= 0.0 or held <= 0.0:
+            return 0.0, 0.0
+        p = held / yields
+        w1 = lasting.speed[k, 1] + moment * (a1 + p * n1)
+        w2 = lasting.speed[k, 2] + moment * (a2 + p * n2)
+        s = moment * p * mu
+        r = speed_after(w1, w2, s * c11, s * c12, s * c22)
+        m11, m12, m22 = r + s * c11, s * c12, r + s * c22
+        x, y = m22 * w1 - m12 * w2, m11 * w2 - m12 * w1
+        size = math.sqrt(x**2 + y**2)
+        if size == 0.0:
+            return 0.0, 0.0
+        change = abs(x / size - d1) + abs(y / size - d2)
+        d1, d2 = x / size, y / size
+        if change <= SETTLED:
+            break
+    return d1, d2
+
+
+@inner_kernel
+def speed_after(w1: float, w2: float, c11: float, c12: float, c22: float) -> float:
+    """Speed r >= 0 at which ``(r + C)^-1 w`` is a unit vector; 0 if it is shorter than one at every r.
+
+    C is positive definite, so that the length falls with r; Newton on its inverse rises to the answer [More, Sorensen
+    1983] from where C alone, at its largest, would leave it.
+    """
+    largest = 0.5 * (c11 + c22) + math.sqrt(0.25 * (c11 - c22) ** 2 + c12**2)
+    r = max(math.sqrt(w1**2 + w2**2) - largest, 0.0)
+    for _ in range(ROUNDS):
+        m11, m22 = r + c11, r + c22
+        det = m11 * m22 - c12**2
+        if det <= 0.0:
+            return r
+        x, y = (m22 * w1 - c12 * w2) / det, (m11 * w2 - c12 * w1) / det
+        size = math.sqrt(x**2 + y**2)
+        if size <= 1.0 + SETTLED:
+            return r
+        falls = (x * (m22 * x - c12 * y) + y * (m11 * y - c12 * x)) / det
+        r += size**2 / falls * (size - 1.0)
+    return r
+
+
+@inner_kernel
+def compliance(lasting: Lasting, k: int, row: int, other: int) -> float:
+    """Acceleration along one row of contact k by a unit of force along another, all else free [1/kg]."""
+    total = 0.0
+    for side in range(2):
+        for d in range(lasting.size[VELOCITIES]):
+            total += lasting.jacobian[k, side, row, d] * lasting.response[k, side, other, d]
+    return total
 
 
 @inner_kernel

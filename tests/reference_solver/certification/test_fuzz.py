@@ -18,7 +18,7 @@ from reference_solver.shapes import Polygon
 from reference_solver.simulation import Simulation
 
 #: Scenes that were refused, right as they were: hops by noise and ends of series (planar), slips that turn (in space).
-ONCE_REFUSED = [(2, 0), (2, 16), (2, 46), (2, 54), (2, 63), (2, 69), (3, 18), (3, 45), (3, 65), (3, 72)]
+ONCE_REFUSED = [(2, 0), (2, 16), (2, 46), (2, 54), (2, 63), (2, 69), (3, 18), (3, 45), (3, 53), (3, 65), (3, 72)]
 #: Seeds that are attacked here; the command attacks hundreds.
 SAMPLE = {2: range(100, 106), 3: range(100, 104)}
 
@@ -118,13 +118,6 @@ class TestAttack:
         drawn = scene(seed, dimension)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
         assert certificate.holds, certificate.reasons
-
-    def test_what_a_series_that_ends_early_leaves_is_refused(self):
-        """Refused again since rebounds end above their gaps' noise (E22): friction is 2e-8 off the line of a slip."""
-        drawn = scene(53, 3)
-        certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
-        assert {finding.name for finding in certificate.findings if not finding.holds} == {"friction"}
-        assert not certificate.holds
 
     @pytest.mark.parametrize("dimension", [2, 3])
     def test_a_variant_that_is_another_world_is_a_defect(self, monkeypatch, dimension):
