@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference_solver.certification.audit.contact import reduced_mass
-from reference_solver.certification.audit.motion import swings
-from reference_solver.certification.audit.run import Run, cross, scaled_along, twist_of
+from reference_solver.certification.audit.motion import swings, turned_by_momentum
+from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.space import rotation_vector
 from reference_solver.certification.audit.turning import turned_contacts
-from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 
 #: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.
@@ -106,21 +106,20 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
 def _turn(run: Run) -> Array:
     """Turn (m, 3) about fixed axes, the integral of the spin [rad]: a constant torque does work by it.
 
-    The spin of a body with unequal moments bends, whether or not a torque acts: half the sum of both ends leaves
-    h^3/12 of its second derivative. Euler's equations tell its first at both ends, and Hermite's formula is of fourth
-    order. A piece whose impulses act at one end has no such derivatives.
+    Where nothing pushes, or with an even force, angular momentum changes evenly and Euler's equations tell the spin
+    (`integrated_turn`). In a phase of fifth order forces change, by what no record says; but the body has turned by the
+    rotation vector psi, and by Magnus' series (W. Magnus, Commun. Pure Appl. Math. 7, 1954) the integral of the spin is
+    ``psi + h^2 (w_0 x w_1)/12`` but for the fifth order, ``(w h)^4/720`` of what the spin changes and less.
     """
-    pieces, time = run.pieces, run.length[:, None]
-    spins = [twist[:, run.d :] for twist in (pieces.twist_before, pieces.twist_after)]
-    _, moment, pushed, _ = run.pushed
-    acting = run.torque[pieces.body] + moment / np.where(time > 0.0, time, np.inf)
-    rates = []
-    for pose, spin, momentum in zip((pieces.pose_before, pieces.pose_after), spins, run.spin, strict=True):
-        axes, inverse = rotation(pose), 1.0 / run.moments[pieces.body]
-        rates.append(scaled_along(axes, inverse, acting - np.cross(spin, momentum)))
-    bends = (pushed == 0.0) | ~run.is_frozen[run.owner]
-    bend = np.where(bends[:, None], time**2 * (rates[0] - rates[1]) / 12.0, 0.0)
-    return np.asarray(0.5 * time * (spins[0] + spins[1]) + bend)
+    pieces, found = run.pieces, np.zeros((len(run.pieces.body), 3))
+    bends = (run.pushed[2] > 0.0) & ~run.is_frozen[run.owner]
+    asked = run.free[pieces.body] & (run.torque[pieces.body] != 0.0).any(axis=1) & (run.length > 0.0)
+    even, rows = np.flatnonzero(asked & ~bends), np.flatnonzero(asked & bends)
+    found[even] = turned_by_momentum(run, even)[1]
+    first, last = (twist[rows, run.d :] for twist in (pieces.twist_before, pieces.twist_after))
+    bend = run.length[rows][:, None] ** 2 / 12.0 * np.cross(first, last)
+    found[rows] = rotation_vector(pieces.pose_before[rows, 3:], pieces.pose_after[rows, 3:]) + bend
+    return found
 
 
 def _kinetic(run: Run, late: int) -> Array:

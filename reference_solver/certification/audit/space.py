@@ -85,7 +85,7 @@ def _path(run: Run, i: int, start: Array) -> Path:
         return Path(begin, length, poses, np.zeros((count, v)) + length[:, None] * twists, twists, twists)
     before, after = pieces.pose_before[rows], pieces.pose_after[rows]
     way = after[:, : run.d] - before[:, : run.d]
-    turn = (after - before)[:, 2:] if run.d == 2 else _rotation_vector(before[:, 3:], after[:, 3:])
+    turn = (after - before)[:, 2:] if run.d == 2 else rotation_vector(before[:, 3:], after[:, 3:])
     return Path(
         pieces.begin[run.owner[rows]],
         run.length[rows],
@@ -96,7 +96,7 @@ def _path(run: Run, i: int, start: Array) -> Path:
     )
 
 
-def _rotation_vector(q: Array, p: Array) -> Array:
+def rotation_vector(q: Array, p: Array) -> Array:
     """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
     # p times the conjugate of q
     scalar = (p * q).sum(axis=1)
