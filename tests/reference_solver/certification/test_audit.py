@@ -438,3 +438,23 @@ def test_work_of_a_torque_on_what_rolls_is_known_to_the_fourth_order():
     assert gained[0] * 12.0**2 < gained[1] * 12.0 < gained[2] < 5e-10
     wrong = [replace(model, bodies=(floor(3), replace(ball, torque=tuple(s * torque)))) for s in (0.999, 1.001)]
     assert any("gained" in {x.name for x in audit(other, record, dt) if not x.holds} for other in wrong)
+
+
+@pytest.mark.parametrize(("height", "met"), [(5e-3, False), (2e-4, True)])
+def test_a_rod_that_turns_by_radians_in_a_step_is_where_it_turns_to(height, met):
+    """It spins about its own axis, and keeps clear of a floor 5 mm below; one that its end dips into it has missed.
+
+    By the shorter way from one end of a step to the other it would be .6 of its radius in the former.
+    """
+    r, half, mass = 0.0175, 0.4585, 9.0
+    along, across = mass * 0.5 * r * r, mass * (0.25 * r * r + (half + r) ** 2 / 3.0)
+    place, twist = (0.0, 0.0, r + height, *UPRIGHT), (0.0, 0.0, 0.0, 400.0, 0.0, 5.0)
+    rod = Body(Capsule(half, r), mass, (along, across, across), place, twist)
+    model, dt = Model(3, (rod,), (0.0, 0.0, 0.0), 0.0, 0.0), 1.0 / 60.0
+    record = Simulation(model, Settings.reference(dt)).record(2, pieces=True)
+    under = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+    floored = Model(3, (rod, under), (0.0, 0.0, 0.0), 0.0, 0.0)
+    sample = np.repeat([[under.pose]], len(record.pose), axis=0)
+    record = replace(record, pose=np.concatenate([record.pose, sample], axis=1))
+    found = {finding.name for finding in audit(floored, record, dt) if not finding.holds}
+    assert found == ({"overlap"} if met else set())
