@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference_solver.certification.audit.contact import reduced_mass
-from reference_solver.certification.audit.motion import swings
-from reference_solver.certification.audit.run import Run, cross, scaled_along, twist_of
+from reference_solver.certification.audit.motion import swings, turned_by_momentum
+from reference_solver.certification.audit.run import Run, cross, twist_of
+from reference_solver.certification.audit.space import rotation_vector
 from reference_solver.certification.audit.turning import turned_contacts
-from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 
 #: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.
@@ -74,7 +74,7 @@ def _friction(run: Run) -> Array:
 def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     """Energy (p,) that each piece gained beyond what loads and surfaces gave, which pieces the law may, and a scale.
 
-    The third is what is not known of the work of surfaces.
+    The third is what is not known of the work of surfaces and torques.
 
     Newton's restitution with friction may create energy (E63), and so may the release of a held rebound: energy that
     was taken away before. Both are exempt and judged by their laws.
@@ -84,7 +84,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     before, after = (_kinetic(run, k) for k in range(2))
     way = pieces.pose_after[:, : run.d] - pieces.pose_before[:, : run.d]
     load = (run.force[body] * way).sum(axis=1)
-    turn = pieces.pose_after[:, 2:] - pieces.pose_before[:, 2:] if run.d == 2 else _turn(run)
+    turn, unknown = _turn(run)
     load += (run.torque[body] * turn).sum(axis=1)
     gained = np.zeros(len(pieces))
     np.add.at(gained, owner, np.where(free, after - before - load, 0.0))
@@ -92,6 +92,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     np.add.at(gained, run.contact_owner, -work)
     unseen = np.zeros(len(pieces))
     np.add.at(unseen, run.contact_owner, unseen_work)
+    np.add.at(unseen, owner, unknown * np.linalg.norm(run.torque[body], axis=1))
     most = np.zeros(len(pieces))
     np.add.at(most, owner, np.where(free, before + after + np.abs(load), 0.0))
     # What loads do to all free bodies in a step: at rest, all that there is of kinetic energy is round-off.
@@ -103,24 +104,35 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     return gained, run.is_release | (run.is_impact & mixed), unseen, max(float(most.max()), usual)
 
 
-def _turn(run: Run) -> Array:
-    """Turn (m, 3) about fixed axes, the integral of the spin [rad]: a constant torque does work by it.
+def _turn(run: Run) -> tuple[Array, Array]:
+    """Turn (m, 1 | 3) about fixed axes, the integral of the spin, and what is unknown (m,) of it [rad].
 
-    The spin of a body with unequal moments bends, whether or not a torque acts: half the sum of both ends leaves
-    h^3/12 of its second derivative. Euler's equations tell its first at both ends, and Hermite's formula is of fourth
-    order. A piece whose impulses act at one end has no such derivatives.
+    A constant torque works by it. Where nothing pushes, or with an even force, angular momentum changes evenly and
+    Euler's equations tell the spin (`integrated_turn`). In a phase of fifth order forces change, by what no record
+    says; but the body has turned by the rotation vector psi, and by Magnus' series (W. Magnus, Commun. Pure Appl. Math.
+    7, 1954) the integral of the spin is ``psi + h^2 (w_0 x w_1)/12`` but for the fifth order. With a_k the terms of
+    Taylor's series of the spin about the middle, times h, that is ``-([a_1, a_4]/120 + [a_3, a_2]/60 + [[a_1, a_2],
+    a_2]/240 + [a_1, [a_1, a_3]]/360 + [a_1, [a_1, [a_1, a_2]]]/720)`` (from the sixth order of the series: S. Blanes et
+    al., Phys. Rep. 470, 2009). Both ends tell a_1 to a_3; a_4 is a sixth of a_2 times the square of the share by which
+    accelerations change.
     """
-    pieces, time = run.pieces, run.length[:, None]
-    spins = [twist[:, run.d :] for twist in (pieces.twist_before, pieces.twist_after)]
-    _, moment, pushed, _ = run.pushed
-    acting = run.torque[pieces.body] + moment / np.where(time > 0.0, time, np.inf)
-    rates = []
-    for pose, spin, momentum in zip((pieces.pose_before, pieces.pose_after), spins, run.spin, strict=True):
-        axes, inverse = rotation(pose), 1.0 / run.moments[pieces.body]
-        rates.append(scaled_along(axes, inverse, acting - np.cross(spin, momentum)))
-    bends = (pushed == 0.0) | ~run.is_frozen[run.owner]
-    bend = np.where(bends[:, None], time**2 * (rates[0] - rates[1]) / 12.0, 0.0)
-    return np.asarray(0.5 * time * (spins[0] + spins[1]) + bend)
+    pieces, found, unknown = run.pieces, np.zeros((len(run.pieces.body), 3)), np.zeros(len(run.pieces.body))
+    if run.d == 2:
+        return pieces.pose_after[:, 2:] - pieces.pose_before[:, 2:], unknown
+    bends = (run.pushed[2] > 0.0) & ~run.is_frozen[run.owner]
+    asked = run.free[pieces.body] & (run.torque[pieces.body] != 0.0).any(axis=1) & (run.length > 0.0)
+    even, rows = np.flatnonzero(asked & ~bends), np.flatnonzero(asked & bends)
+    found[even] = turned_by_momentum(run, even)[1]
+    first, last = (run.length[rows][:, None] * x[rows, run.d :] for x in (pieces.twist_before, pieces.twist_after))
+    found[rows] = rotation_vector(pieces.pose_before[rows, 3:], pieces.pose_after[rows, 3:])
+    found[rows] += np.cross(first, last) / 12.0
+    one, two, three = (
+        np.linalg.norm(x, axis=1) for x in (found[rows], last - first, 3.0 * (first + last) - 6.0 * found[rows])
+    )
+    four = two * swings(run)[run.owner[rows]] ** 2 / 6.0
+    unknown[rows] = one * (four / 120.0 + two**2 / 240.0 + one * three / 360.0 + one**2 * two / 720.0)
+    unknown[rows] += two * three / 60.0
+    return found, unknown
 
 
 def _kinetic(run: Run, late: int) -> Array:

@@ -7,12 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit.run import Indices, Run, twist_of
+from reference_solver.certification.audit.motion import integrated_turn
+from reference_solver.certification.audit.run import Indices, Run, scaled_along, twist_of
 from reference_solver.certification.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Halvings of an interval in which two bodies might have met: sixteen parts of it.
 HALVINGS = 4
+#: Turn in a piece [rad] beyond which it is cut into parts, and that of a part: .1^4/384 is less than an overlap counts.
+FAR, PART, MOST_PARTS = 0.3, 0.1, 512
 
 
 class Path(NamedTuple):
@@ -83,20 +86,50 @@ def _path(run: Run, i: int, start: Array) -> Path:
         twists = np.tile(twist, (count, 1))
         poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
         return Path(begin, length, poses, np.zeros((count, v)) + length[:, None] * twists, twists, twists)
-    before, after = pieces.pose_before[rows], pieces.pose_after[rows]
+    begin, length, before, after, first, last = _parts(run, rows)
     way = after[:, : run.d] - before[:, : run.d]
-    turn = (after - before)[:, 2:] if run.d == 2 else _rotation_vector(before[:, 3:], after[:, 3:])
-    return Path(
-        pieces.begin[run.owner[rows]],
-        run.length[rows],
-        before,
-        np.concatenate([way, turn], axis=1),
-        pieces.twist_before[rows],
-        pieces.twist_after[rows],
-    )
+    turn = (after - before)[:, 2:] if run.d == 2 else rotation_vector(before[:, 3:], after[:, 3:])
+    return Path(begin, length, before, np.concatenate([way, turn], axis=1), first, last)
 
 
-def _rotation_vector(q: Array, p: Array) -> Array:
+def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
+    """Begin, length, poses and twists at both ends of rows of one body; those that turn far are cut into parts.
+
+    Between its ends a turn of more than a half is not to be told, and one of `FAR` known to its fourth power over 384.
+    Where forces are even it is integrated.
+    """
+    pieces, owner = run.pieces, run.owner[rows]
+    even = (run.pushed[2][rows] == 0.0) | run.is_frozen[owner]
+    even &= ~run.is_fixed[owner] & ~run.is_impulse_level[owner]
+    spin = np.maximum(*(np.linalg.norm(x[rows, 3:], axis=1) for x in (pieces.twist_before, pieces.twist_after)))
+    turns = np.where(even, np.nan_to_num(run.length[rows] * spin), 0.0)
+    count = np.where(turns > FAR, np.ceil(turns / PART), 1.0).clip(max=MOST_PARTS).astype(np.int64)
+    at, cuts, first = (np.repeat(x, count) for x in (rows, count, np.cumsum(count) - count))
+    part = np.arange(len(at)) - first
+    (pose, twist), (later, last) = (_state(run, at, (k / cuts)[:, None]) for k in (part, part + 1))
+    return pieces.begin[run.owner[at]] + part / cuts * run.length[at], run.length[at] / cuts, pose, later, twist, last
+
+
+def _state(run: Run, rows: Indices, share: Array) -> tuple[Array, Array]:
+    """Poses and twists after a ``share`` (s, 1) of rows; those that are cut are in space, and forces even."""
+    pieces = run.pieces
+    ends = (pieces.pose_before, pieces.pose_after), (pieces.twist_before, pieces.twist_after)
+    pose, twist = (np.where(share < 1.0, start[rows], end[rows]) for start, end in ends)
+    cut = np.flatnonzero((share > 0.0) & (share < 1.0))
+    if not len(cut):
+        return pose, twist
+    rows, share = rows[cut], share[cut]
+    time, moments, (first, last) = share[:, 0] * run.length[rows], run.moments[pieces.body[rows]], run.spin
+    momentum = (1.0 - share) * first[rows] + share * last[rows]
+    change = share * (pieces.twist_after[rows, :3] - twist[cut, :3])
+    pose[cut, :3] += time[:, None] * (twist[cut, :3] + 0.5 * change)
+    pose[cut, 3:], _ = integrated_turn(pose[cut, 3:], first[rows], momentum, moments, time)
+    twist[cut, :3] += change
+    twist[cut, 3:] = scaled_along(rotation(pose[cut]), 1.0 / moments, momentum)
+    return pose, twist
+
+
+def rotation_vector(q: Array, p: Array) -> Array:
     """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
     # p times the conjugate of q
     scalar = (p * q).sum(axis=1)

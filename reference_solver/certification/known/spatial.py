@@ -12,7 +12,7 @@ from reference_solver.certification.known.planar import STICKS
 from reference_solver.certification.rotation import rotation_matrix
 from reference_solver.certification.space import GRAVITY
 from reference_solver.model import Array, Body, Model
-from reference_solver.shapes import Box, HalfSpace, Sphere
+from reference_solver.shapes import Box, Capsule, HalfSpace, Sphere
 
 Rng = np.random.Generator
 
@@ -58,25 +58,51 @@ def turntable(rng: Rng) -> Motion:
     return Motion(_model([table, _ball(radius, 1.0, place, v, w)], STICKS), time, truth)
 
 
-def lopsided_ball(rng: Rng) -> Motion:
+def lopsided_ball(pushed: bool, rng: Rng) -> Motion:
     """Return a ball of unequal moments that rolls without slip, and wobbles: a nonholonomic motion.
 
-    With ``v = r w x up`` and moments about the point of contact, ``(I + m r^2 (1 - up up^T)) w' = -w x I w``.
+    With ``v = r w x up`` and moments about the point of contact, ``(I + m r^2 (1 - up up^T)) w' = T - w x I w``; the
+    torque T is none unless it is ``pushed``.
     """
     radius, time = rng.uniform(0.2, 0.4), rng.uniform(0.3, 0.7)
     moments = radius**2 * rng.uniform(0.25, 0.45, 3)
     q, w = _orientation(rng), rng.uniform(-3.0, 3.0, 3)
+    torque = moments * rng.uniform(-8.0, 8.0, 3) if pushed else np.zeros(3)
 
     def rate(state: Array) -> Array:
         turn = rotation_matrix(state[:4] / np.linalg.norm(state[:4]))
         inertia, w = turn @ np.diag(moments) @ turn.T, state[4:7]
-        bent = np.linalg.solve(inertia + radius**2 * (np.eye(3) - np.outer(UP, UP)), -np.cross(w, inertia @ w))
+        bent = np.linalg.solve(inertia + radius**2 * (np.eye(3) - np.outer(UP, UP)), torque - np.cross(w, inertia @ w))
         return np.concatenate([spun(state[:4], w), bent, radius * np.cross(w, UP)])
 
     state, _ = integrated(rate, np.concatenate([q, w, [0.0, 0.0, radius]]), time)
-    ball = Body(Sphere(radius), 1.0, tuple(moments), (0.0, 0.0, radius, *q), (*(radius * np.cross(w, UP)), *w))
+    place, twist = (0.0, 0.0, radius, *q), (*(radius * np.cross(w, UP)), *w)
+    ball = Body(Sphere(radius), 1.0, tuple(moments), place, twist, torque=tuple(torque))
     truth = np.concatenate([state[7:], state[:4] / np.linalg.norm(state[:4])])
     return Motion(_model([_plane(UP), ball], STICKS), time, truth)
+
+
+def rod_spun_up(rng: Rng) -> Motion:
+    """Return a thin rod that falls while a torque spins it up about its own axis, where it has hardly any inertia.
+
+    Its angular momentum grows by ``L' = T`` in the world, and ``q' = w q/2`` with ``w = I^-1 L`` of where it lies.
+    """
+    half, radius, time = rng.uniform(0.2, 0.5), rng.uniform(0.02, 0.05), rng.uniform(0.3, 0.6)
+    across = 0.25 * radius**2 + (half + radius) ** 2 / 3.0
+    moments, q, v = np.array([0.5 * radius**2, across, across]), _orientation(rng), rng.uniform(-2.0, 2.0, 3)
+    axes = rotation_matrix(q)
+    spin, torque = (axes @ (moments * rng.uniform(-1.0, 1.0, 3) * most) for most in ([9.0, 3.0, 3.0], [50.0, 5.0, 5.0]))
+
+    def rate(state: Array) -> Array:
+        turn = rotation_matrix(state[:4] / np.linalg.norm(state[:4]))
+        return np.concatenate([spun(state[:4], turn @ ((turn.T @ state[4:]) / moments)), torque])
+
+    # Four times as long, at a quarter of the speed: a step turns it by no more than .003 rad then.
+    state, _ = integrated(lambda state: 0.25 * rate(state), np.concatenate([q, spin]), 4.0 * time)
+    twist = (*v, *(axes @ ((axes.T @ spin) / moments)))
+    rod = Body(Capsule(half, radius), 1.0, tuple(moments), (0.0, 0.0, 0.0, *q), twist, torque=tuple(torque))
+    way = v * time - 0.5 * GRAVITY * time**2 * UP
+    return Motion(_model([rod], 0.0), time, np.concatenate([way, state[:4] / np.linalg.norm(state[:4])]))
 
 
 def _between(normals: Array, rng: Rng, moves: Array) -> Motion | None:

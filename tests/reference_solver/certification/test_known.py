@@ -64,7 +64,7 @@ def test_nothing_overlaps_at_the_start_and_the_truth_overlaps_nothing(name):
 
 
 def test_a_lopsided_ball_keeps_its_energy():
-    motion = spatial.lopsided_ball(np.random.default_rng(3))
+    motion = spatial.lopsided_ball(False, np.random.default_rng(3))
     ball = motion.model.bodies[-1]
     uniform = dataclasses.replace(ball, inertia=(0.4 * ball.shape.radius**2,) * 3)
     assert np.linalg.norm(motion.truth[:2]) > 0.05  # it has rolled
