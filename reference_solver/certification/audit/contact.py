@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
-from reference_solver.certification.audit.turning import SOLVED, turned_contacts
+from reference_solver.certification.audit.turning import SOLVED, turned_contacts, turns_beside
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 from reference_solver.shapes import Disc, Sphere
@@ -123,8 +123,11 @@ def _laws(run: Run) -> Iterator[float]:
     limit = mu * pressed.clip(min=0.0)
     wanted *= np.where(size > limit, limit / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
     # Where the direction of a slip turns within a piece, its friction is a mean of directions; in the plane there are
-    # but two, and the normal's turn is known.
-    swing = _angle(first, last) if run.d == 3 else np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
+    # but two, and the normal's turn is known. One that turns back has both its ends alike, not its neighbours.
+    if run.d == 3:
+        swing = turns_beside(run, _angle(first, last)).clip(max=2.0)
+    else:
+        swing = np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
     turned = swing + np.where(sure[:, 0], 0.0, _unsure_turn(run, slip))
     missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * turned) - leaning
     yield _worst(np.where(coarse, 0.0, missed), scale)

@@ -117,6 +117,30 @@ def changes_of_force(run: Run) -> Array:
     return found
 
 
+def turns_beside(run: Run, turned: Array) -> Array:
+    """Angles (c,) by which a direction turns in a piece, or would at the lower rate of its neighbours in time [rad].
+
+    ``turned`` (c,) are angles between both ends. Where a direction turns back within a piece they say nothing of the
+    way between; the pieces before and after do, which follow it, and in which it turns by less than one. Of pairs that
+    touch in one point.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    length, found = pieces.length[owner], turned.copy()
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    usable = _alone(owner, pairs) & (length > 0.0)
+    for pair in np.unique(pairs[usable]):
+        rows = np.flatnonzero(usable & (pairs == pair))
+        rows = rows[np.argsort(pieces.begin[owner[rows]], kind="stable")]
+        begin, taken = pieces.begin[owner[rows]], length[rows]
+        gap = np.abs(begin[1:] - begin[:-1] - taken[:-1])
+        follows = gap <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(begin[1:]))
+        rate = np.where(turned[rows] < 1.0, turned[rows], 0.0) / taken
+        before = np.concatenate([[0.0], np.where(follows, rate[:-1], 0.0)])
+        after = np.concatenate([np.where(follows, rate[1:], 0.0), [0.0]])
+        found[rows] = np.maximum(found[rows], taken * np.minimum(before, after))
+    return found
+
+
 def _largest_turn(run: Run, rows: Indices) -> Array:
     """How far (s,) a normal can turn in its piece [rad]: by spins, and by bodies that pass each other."""
     pieces = run.pieces
