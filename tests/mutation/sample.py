@@ -244,11 +244,12 @@ def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
 def again(folder: Path, by_name: bool) -> None:
     """Let what was not noticed of the sample that is kept meet the tests of now, in the sources of now.
 
-    A mutant is found by its function and its change; one whose statements have changed since is `GONE`.
+    A mutant is found by its function and its change; one whose statements have changed since is `GONE`. What has a
+    reason is not asked: no test can notice it.
     """
     rows, bench = stored(), NearBench.of(folder) if by_name else Bench.of(folder)
     for place, row in enumerate(rows):
-        if row.verdict in NOTICED or row.now in NOTICED:
+        if row.verdict in NOTICED or row.now in NOTICED or row.reason:
             continue
         tree, mutations = mutations_of(row.module) if (ROOT / row.module).exists() else (None, [])
         same = [mutation for function, mutation in mutations if function == row.function]
