@@ -66,3 +66,16 @@ def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(
     found = sample.near("adapters/toy/walls.py", "adapters.toy.walls.x_pile")
     tables = [f"tests/tables/test_of_{name}.py" for name in sample.TABLES["adapters"]]
     assert found == ["tests/test_deep.py", "tests/test_walls.py", "tests/test_words.py", *tables]
+
+
+def test_a_test_beside_the_code_is_asked_before_one_that_costs_nothing_once_a_page_is_made(imported):
+    sample = imported("sample")
+    tests = {
+        "page.py::test_words": 0.0,
+        "unit.py::test_sum[a]": 0.05,
+        "unit.py::test_sum[b]": 0.06,
+        "unit.py::test_z": 1,
+    }
+    order = [test for test, _ in sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})]
+    assert order == ["unit.py::test_sum[a]", "unit.py::test_z", "page.py::test_words", "unit.py::test_sum[b]"]
+    assert dict(sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})) == tests
