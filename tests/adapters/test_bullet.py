@@ -467,6 +467,21 @@ def test_worlds_built_side_by_side_do_not_share_anything():
         simulation.close()
 
 
+def test_loads_of_worlds_built_side_by_side_act_each_in_its_own():
+    def build(force, torque):
+        scene = scene_of(replace(ball(3.0, inertia=0.05), force=(force, 0.0, 0.0), torque=(0.0, torque, 0.0)))
+        return ENGINE.build(scene, DT, {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)})
+
+    worlds = {(1.0, 0.3): build(1.0, 0.3), (2.0, 0.1): build(2.0, 0.1)}  # [N], [N m], on 0.5 kg and 0.05 kg m^2
+    for simulation in worlds.values():
+        simulation.advance(10)
+    for (force, torque), simulation in worlds.items():
+        moved = simulation.twist()[0]
+        assert moved[0] == pytest.approx(force / 0.5 * 10 * DT, rel=1e-12)
+        assert moved[4] == pytest.approx(torque / 0.05 * 10 * DT, rel=1e-12)
+        simulation.close()
+
+
 # ---- refusals ----------------------------------------------------------------------------------------------------
 
 

@@ -507,6 +507,10 @@ def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, c
         ({"kappa_elastic": 0.1}, "kappa_elastic"),
         ({"surprise": 1}, "surprise"),
         ({"solref": "reflect"}, "kappa_elastic"),
+        ({"apart": [5]}, "apart"),
+        ({"apart": [(0, 1)]}, "apart"),
+        ({"apart": [(0, 1, (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), None, 0.0, 1)]}, "apart"),
+        ({"apart": ["0 1 .."]}, "apart"),
     ],
 )
 def test_bad_settings_are_refused_in_one_line(change: dict[str, Any], field: str) -> None:

@@ -150,7 +150,7 @@ class Bench:
         assert isinstance(spoilt, Module)
         tests_of_it = reaching(self.reach, tree.code, spoilt.code, module, function)
         shared = {name: each.shared for name, each in self.known.items()}
-        verdict, tests, failed = judged(self.copy, module, spoilt.code, in_turn(tests_of_it), shared)
+        verdict, tests, failed = judged(self.copy, module, spoilt.code, in_turn(tests_of_it, shared), shared)
         if "::" in failed and asked(self.copy, [failed], 60.0)[0] != 0:
             verdict = UNSHOWN  # it fails without the mutant as well
         if verdict in (SURVIVED, UNREACHED) and not known_by_form(change_of(tree, mutation)):
@@ -244,11 +244,12 @@ def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
 def again(folder: Path, by_name: bool) -> None:
     """Let what was not noticed of the sample that is kept meet the tests of now, in the sources of now.
 
-    A mutant is found by its function and its change; one whose statements have changed since is `GONE`.
+    A mutant is found by its function and its change; one whose statements have changed since is `GONE`. What has a
+    reason is not asked: no test can notice it.
     """
     rows, bench = stored(), NearBench.of(folder) if by_name else Bench.of(folder)
     for place, row in enumerate(rows):
-        if row.verdict in NOTICED or row.now in NOTICED:
+        if row.verdict in NOTICED or row.now in NOTICED or row.reason:
             continue
         tree, mutations = mutations_of(row.module) if (ROOT / row.module).exists() else (None, [])
         same = [mutation for function, mutation in mutations if function == row.function]
@@ -282,10 +283,16 @@ def reaching(reach: Reach, before: str, after: str, module: str, function: str) 
     }
 
 
-def in_turn(tests: dict[str, float]) -> list[tuple[str, float]]:
-    """Tests in the order in which they are asked: the cheapest case of each first, for different ones see more."""
+def in_turn(tests: dict[str, float], shared: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Tests in the order in which they are asked: the cheapest case of each first, for different ones see more.
+
+    ``shared`` are the seconds of CPU that a test file takes before its first test, and count as those of each of its
+    tests: else two files whose tests cost nothing once a page is made fill all the time that there is for fixtures,
+    and no test beside the code is asked.
+    """
     met, place = Counter[str](), dict[str, tuple[int, float, str]]()
-    for test, seconds in sorted(tests.items(), key=lambda item: (item[1], item[0])):
+    costs = {test: seconds + shared[test.partition("::")[0]] for test, seconds in tests.items()}
+    for test, seconds in sorted(costs.items(), key=lambda item: (item[1], item[0])):
         name = test.partition("[")[0]
         place[test], met[name] = (met[name], seconds, test), met[name] + 1
     return sorted(tests.items(), key=lambda item: place[item[0]])

@@ -33,6 +33,7 @@ def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tool
         replace(first, number=2, change="return x + x -> return x - x", verdict="survived"),
         replace(first, number=3, module="gone.py", function="gone.x_f", verdict="unreached"),
         replace(first, number=4, change="return 2 * x -> return 2 / x", verdict="survived", now="killed", failed="s"),
+        replace(first, number=5, change="return 2 * x -> return 3 * x", verdict="survived", reason="as true"),
     ]
     drawn.write(rows)
     met = []
@@ -45,11 +46,11 @@ def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tool
     sample.again(Path("nowhere"), False)
     assert met == [("toy.py", "toy.x_twice", "return 2 * x -> return 3 * x")]
     found = drawn.stored()
-    assert [row.now for row in found] == ["", "killed", "gone", "gone", "killed"]
+    assert [row.now for row in found] == ["", "killed", "gone", "gone", "killed", ""]
     assert [row.verdict for row in found] == [row.verdict for row in rows]  # what was drawn stays as it was found
     assert (found[1].tests, found[1].failed) == (2, "tests/test_toy.py::test_twice")
-    assert [found[k] for k in (0, 4)] == [rows[k] for k in (0, 4)]
-    assert "**1 of 5 are noticed, 20.0 %" in "\n".join(drawn.table(found))
+    assert [found[k] for k in (0, 4, 5)] == [rows[k] for k in (0, 4, 5)]
+    assert "**1 of 6 are noticed, 16.7 %" in "\n".join(drawn.table(found))
 
 
 def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(tools, monkeypatch, tmp_path):
@@ -65,3 +66,16 @@ def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(
     found = sample.near("adapters/toy/walls.py", "adapters.toy.walls.x_pile")
     tables = [f"tests/tables/test_of_{name}.py" for name in sample.TABLES["adapters"]]
     assert found == ["tests/test_deep.py", "tests/test_walls.py", "tests/test_words.py", *tables]
+
+
+def test_a_test_beside_the_code_is_asked_before_one_that_costs_nothing_once_a_page_is_made(imported):
+    sample = imported("sample")
+    tests = {
+        "page.py::test_words": 0.0,
+        "unit.py::test_sum[a]": 0.05,
+        "unit.py::test_sum[b]": 0.06,
+        "unit.py::test_z": 1,
+    }
+    order = [test for test, _ in sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})]
+    assert order == ["unit.py::test_sum[a]", "unit.py::test_z", "page.py::test_words", "unit.py::test_sum[b]"]
+    assert dict(sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})) == tests

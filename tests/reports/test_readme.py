@@ -211,3 +211,10 @@ def test_the_python_snippet_runs(tmp_path, monkeypatch, capsys):
 def test_the_shell_is_offered_scenes_and_engines(words, incomplete, offered):
     completion = ShellComplete(main, {}, "crosscheck", "_CROSSCHECK_COMPLETE")
     assert offered in [item.value for item in completion.get_completions(words, incomplete)]
+
+
+@pytest.mark.parametrize("words", [["run"], ["describe"]])
+def test_a_scene_is_offered_with_its_title(words):
+    completion = ShellComplete(main, {}, "crosscheck", "_CROSSCHECK_COMPLETE")
+    offered = {item.value: item.help for item in completion.get_completions(words, "bou")}
+    assert offered["bounce"] == CATALOGUE["bounce"].title

@@ -87,6 +87,12 @@ def test_a_work_point_has_the_worst_error_of_its_phases_and_the_cost_of_a_simula
     assert point["worst"] == dict(impact_slot("a", STEPS[0], 15).params)
     assert point["slot"] == impact_slot("a", STEPS[0], 0).as_dict()
     assert point["iterations"] is None and point["reason"] == ""
+    assert point["rounds"] == 3
+
+
+def test_a_work_point_that_nobody_timed_has_no_rounds_and_says_so(store):
+    (point,) = work_points(store, filled(store, {("a", STEPS[0]): 0.4}, {})).to_dict("records")
+    assert point["rounds"] == 0 and math.isnan(point["cost"]) and point["reason"] == "not timed"
 
 
 @pytest.mark.parametrize("outcome", [Outcome.INVALID, Outcome.DIVERGED, Outcome.CRASHED, Outcome.UNSUPPORTED])

@@ -65,7 +65,9 @@ def test_a_break_is_new_then_known_and_drifts_when_it_is_another(folder):
         (Change("boosted", refused="something is fixed"), None),
         (Change("moved", "speed", 0.0, 1e-9), None),
     ):
-        assert standing_of(slot(), "1.5", change)[0] is standing, change
+        found, why = standing_of(slot(), "1.5", change)
+        assert found is standing, change
+        assert bool(why) is (standing in (Standing.KNOWN, Standing.DRIFTED)), change  # only a list has a reason
 
 
 def test_an_answer_that_is_lost_is_listed_as_such(folder):

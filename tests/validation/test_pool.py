@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from adapters.foreign import Found
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.workers import limits, pool, run_cells
 from validation.workers.pool import Unwritten
@@ -120,3 +121,14 @@ def test_a_process_that_a_cell_changed_is_renewed_and_its_answer_stands(run):
     assert run(slots, {}, 2) == (slots, None) and run.begun == 1
     assert run(slots, {slots[0]: {"changed": "open files"}}, 2) == (slots, None) and run.begun == 2
     assert run([*slots, cell("mujoco", 1.0)], {}, 2) == ([*slots, cell("mujoco", 1.0)], None)
+
+
+def test_cells_of_a_plugin_that_ends_its_importer_reach_no_worker(monkeypatch):
+    reason = "the plugin ended its process: SIGABRT"
+    monkeypatch.setattr(pool.registry, "find", lambda name: Found(name, None, "6.6", reason, fatal=True))
+    monkeypatch.setattr(pool, "_started", lambda memory: pytest.fail("a worker was started"))
+    slots = [cell("ending", v) for v in (1.0, 2.0)]
+    told = list(run_cells(slots))
+    assert [answer.slot for answer in told] == slots
+    assert {(answer.outcome, answer.reason, answer.log) for answer in told} == {(Outcome.CRASHED, reason, "")}
+    assert {answer.engine_version for answer in told} == {"6.6"}
