@@ -183,6 +183,17 @@ def _main(
     serve(connection)
 
 
+def end_with(parent: int) -> None:
+    """Let this process be killed when the thread of ``parent`` ends that started it; end at once if it has.
+
+    For pools that a library makes: their processes notice that nobody waits for them after what they are doing.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
 def _guard(parent: int, connection: Connection) -> None:
     """Divide this process: its child returns and serves, itself it waits, and ends all that the child leaves behind.
 

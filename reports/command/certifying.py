@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import multiprocessing
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -18,6 +19,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
+from adapters.isolation import end_with
 from reference_solver.certification import Gate, piles
 from reference_solver.certification.orders import PHASES, RATES, orders
 from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, trials
@@ -142,7 +144,8 @@ def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: C
     results: dict[str, Any] = {}
     start = time.perf_counter()
     # A fresh interpreter each: compiled kernels and threads do not survive a fork on every platform.
-    with ProcessPoolExecutor(WORKERS, multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(WORKERS, context, end_with, (os.getpid(),)) as pool:
         jobs = {pool.submit(measure, part): part for part in parts}
         for job in as_completed(jobs):
             results[jobs[job]] = job.result()

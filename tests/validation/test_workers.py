@@ -113,10 +113,22 @@ if __name__ == "__main__":
 """
 
 
+POOL = """
+import multiprocessing, os, time
+from concurrent.futures import ProcessPoolExecutor
+from adapters.isolation import end_with
+if __name__ == "__main__":
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context, end_with, (os.getpid(),)) as pool:
+        pool.submit(time.sleep, 600.0).result()
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="the death signal of a parent is a Linux facility")
-def test_workers_die_with_a_parent_that_is_killed(plugins, tmp_path):
+@pytest.mark.parametrize("source", [PARENT, POOL], ids=["workers", "pool"])
+def test_workers_die_with_a_parent_that_is_killed(plugins, tmp_path, source):
     script = tmp_path / "parent.py"
-    script.write_text(PARENT)
+    script.write_text(source)
     parent = subprocess.Popen([sys.executable, str(script), str(plugins)])
     workers = []
     deadline = time.monotonic() + 60.0

@@ -10,12 +10,10 @@ every few rounds in any case: where memory happens to lie differs between proces
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
 import os
 import random
 import signal
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +21,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
+from adapters.isolation import end_with
 from adapters.registry import load_engines_here
 from validation.bench.statistics import spread
 from validation.bench.stopwatch import Lap, serve
@@ -137,10 +136,7 @@ class Lane:
 
 
 def _child(connection: Connection, parent: int) -> None:
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG <linux/prctl.h>: die with the parent
-    if os.getppid() != parent:
-        os._exit(1)
+    end_with(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     load_engines_here()
     serve(connection)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
 from adapters.engine import EngineError
 from adapters.engine_folder import covering, laws_of
+from adapters.isolation import end_with
 from adapters.registry import load_engines_here
 from adapters.scene import Scene
 from validation.cells import Slot
@@ -54,7 +56,7 @@ def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[P
     context = multiprocessing.get_context("spawn")
     found: dict[Asked, list[Prediction]] = {}
     try:
-        with ProcessPoolExecutor(processes or cores(), context, load_engines_here) as pool:
+        with ProcessPoolExecutor(processes or cores(), context, _begin, (os.getpid(),)) as pool:
             for part, answers in zip(parts, pool.map(_said, parts), strict=True):
                 for row, said in zip(part, answers, strict=True):
                     if said is not None:
@@ -63,6 +65,11 @@ def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[P
     except BrokenProcessPool:
         pass  # what is missing is asked where it is needed
     return found
+
+
+def _begin(parent: int) -> None:
+    end_with(parent)
+    load_engines_here()
 
 
 def _said(rows: Sequence[Asked]) -> list[list[Said] | None]:

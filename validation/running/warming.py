@@ -11,6 +11,7 @@ import contextlib
 import hashlib
 import json
 import multiprocessing
+import os
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from adapters.engine import Engine
+from adapters.isolation import end_with
 from adapters.registry import find
 from adapters.stepping import run
 from adapters.trajectory import Sampling
@@ -72,7 +74,7 @@ class Warming:
     def run(self, jobs: int) -> Iterator[str]:
         """Compile; yields the name of each part that is done. What fails here fails again, and is told, as a cell."""
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(max(1, min(jobs, len(self._tasks))), context) as pool:
+        with ProcessPoolExecutor(max(1, min(jobs, len(self._tasks))), context, end_with, (os.getpid(),)) as pool:
             running = {pool.submit(_compile, slots): (slots, mark) for slots, mark in self._tasks}
             for future in as_completed(running):
                 slots, mark = running[future]
