@@ -96,6 +96,19 @@ def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
     assert [name for name in asked if CHECKS[name](engine)] == seen
 
 
+def test_impulses_are_asked_of_each_profile_for_what_that_one_takes():
+    asked = set()
+
+    class Listening(ToyEngine):
+        def refuses(self, scene, profile):
+            asked.add(profile)
+            return super().refuses(scene, profile)
+
+    engine = Listening()
+    assert CHECKS["impulse"](engine) == ""
+    assert asked - {""} == set(engine.profiles)  # of no profile: whether it takes the scene at all
+
+
 def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
     class Idle(toy_class):
         def refuses(self, scene, profile):

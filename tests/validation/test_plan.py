@@ -52,6 +52,15 @@ def test_steps_that_are_asked_for_are_asked_of_all_variations():
     assert {slot.dt for slot in found} >= set(FULL_DT)
 
 
+def test_starts_are_moved_for_floors_at_the_quick_step_and_each_profile_s_own_iterations():
+    found = slots(Request(["stack"], ["chipmunk"], suite="full", floors=True))
+    moved = [slot for slot in found if slot.ulp]
+    assert {slot.iterations for slot in found} > {None}
+    assert {(slot.iterations, slot.dt) for slot in moved} == {(None, plan.QUICK_DT)}
+    for profile in {slot.profile for slot in found}:
+        assert sorted(slot.ulp for slot in moved if slot.profile == profile and slot.dimension == 2) == [1, 2]
+
+
 @pytest.mark.parametrize(("name", "profile"), [("chipmunk", "default"), ("reference", "classical")])
 def test_an_engine_that_is_not_here_has_its_rows_under_a_profile_that_it_has(monkeypatch, name, profile):
     monkeypatch.setattr(plan, "find", lambda engine: Found(engine, None, "", "nothing is called that"))
