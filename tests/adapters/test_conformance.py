@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from adapters import registry
-from adapters.conformance import CHECKS, check_adapter, items
+from adapters.conformance import CHECKS, check_adapter, items, worlds
 from adapters.conformance.faults import FAULTS
+from adapters.conformance.finding import NotAsked
 from adapters.conformance.mechanics import contacts
 from adapters.conformance.spoilt import Spoilt
 from adapters.conformance.toy import ToyEngine
@@ -94,6 +95,23 @@ def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
     engine = Broken(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Healthy()
     asked = ("momentum", "spin", "impulse", "sampling", "fresh")
     assert [name for name in asked if CHECKS[name](engine)] == seen
+
+
+def test_memory_that_grows_once_is_asked_again_and_what_no_system_tells_is_not_asked(toy, monkeypatch):
+    """An allocator takes a pool once; what leaks does so again."""
+
+    def growth(grown):
+        counts = iter(grown)
+        return lambda build: (build(1), next(counts))[1]
+
+    monkeypatch.setattr(worlds, "WARM", 1)
+    monkeypatch.setattr(worlds, "resident", lambda: 1e6)
+    for grown, leaks in (([0.0], False), ([2e9, 0.0], False), ([2e9, 1e9], True)):
+        monkeypatch.setattr(worlds, "_growth", growth(grown))
+        assert bool(CHECKS["memory"](toy())) == leaks
+    monkeypatch.setattr(worlds, "resident", lambda: None)
+    with pytest.raises(NotAsked, match="does not tell"):
+        CHECKS["memory"](toy())
 
 
 def test_impulses_are_asked_of_each_profile_for_what_that_one_takes():

@@ -48,6 +48,11 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     )
 
 
+def test_a_folder_below_one_that_is_not_there_is_made(tmp_path):
+    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path / "far" / "away")])
+    assert done.exit_code == 0 and (tmp_path / "far/away/mine/tests/test_conformance.py").is_file()
+
+
 def test_json_names_the_files_that_were_written(tmp_path):
     done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path), "--json"])
     told = json.loads(done.output)
