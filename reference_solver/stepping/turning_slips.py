@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.stepping.equalities import effect, list_rows, row_value, solve_rows
-from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
+from reference_solver.stepping.equalities import effect, list_rows, moves, row_value, solve_rows
+from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, OPEN, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 
 #: Cosine of the largest turn of a slip's direction between stages; one that turns farther comes to its end.
@@ -77,15 +77,28 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
         return False
     moment = BEARABLE * lasting.length[0] - speed / force
     x, y = 0.0, 0.0
-    if has_light_body(lasting, k):
+    if is_alone(lasting, k):
+        x, y = implicit_slip(lasting, k, moment)
+    else:
         x = lasting.speed[k, 1] + moment * lasting.wanted[0]
         y = lasting.speed[k, 2] + moment * lasting.wanted[1]
-    else:
-        x, y = implicit_slip(lasting, k, moment)
     size = math.sqrt(x**2 + y**2)
     if size == 0.0 or lasting.direction[k, 0] * x + lasting.direction[k, 1] * y < TURNED * size:  # it has ended
         return False
     lasting.direction[k, 0], lasting.direction[k, 1] = x / size, y / size
+    return True
+
+
+@inner_kernel
+def is_alone(lasting: Lasting, k: int) -> bool:
+    """Whether no other contact holds a body that moves of contact k: then its slip gives way as its own matrix says."""
+    for other in range(lasting.size[CONTACTS]):
+        if other == k or lasting.mode[other] == OPEN:
+            continue
+        for side in range(2):
+            for own in range(2):
+                if lasting.body[other, side] == lasting.body[k, own] and moves(lasting, k, own):
+                    return False
     return True
 
 

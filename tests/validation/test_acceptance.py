@@ -143,7 +143,7 @@ def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
-    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     (why,) = refusals(propose(rows(), "nameless", listed(FAMILY)))
     assert "a deviation law speaks about it and misses" in why
     # What the law predicts is explained and needs no entry.
@@ -158,7 +158,7 @@ def test_a_law_speaks_of_iterations_that_are_asked_for_only_where_it_follows_the
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.5, 0.01), "by design", "manual",
         asked=asked,
     )  # fmt: skip
-    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
 
     def explained(sweeps, creep):
         (row,) = rows(replace(SLOT, iterations=sweeps), moved=None, creep=creep)
@@ -351,7 +351,7 @@ def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
-    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
     assert not proposal.left_out
     assert all("misses" in why for _, why in proposal.refused) and proposal.refused
@@ -537,7 +537,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
-    monkeypatch.setattr("validation.judging.rows.covering", lambda *where: iter([law]))
+    monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     ((_, why),) = propose(rows(), "nameless", listed(FAMILY)).refused
     assert why == "a deviation law speaks about it and misses: the law or the engine has changed"
 

@@ -1,5 +1,6 @@
 """What is compiled ahead of the clock is all that cells need, and takes no more than their first steps."""
 
+import os
 import sys
 import time
 from concurrent.futures import Future
@@ -10,6 +11,7 @@ from types import MappingProxyType, SimpleNamespace
 import pytest
 
 from adapters.engine import Engine
+from adapters.isolation import end_with
 from validation.catalogue import OURS
 from validation.cells import Slot
 from validation.running import warming
@@ -95,8 +97,9 @@ def toy(monkeypatch, tmp_path):
     asked = []
 
     class Pool:
-        def __init__(self, workers, context):
+        def __init__(self, workers, context, begin, parent):
             asked.append(workers)
+            assert (begin, parent) == (end_with, (os.getpid(),))
 
         def __enter__(self):
             return self

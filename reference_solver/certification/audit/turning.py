@@ -127,7 +127,7 @@ def turns_beside(run: Run, turned: Array) -> Array:
     pieces, owner = run.pieces, run.contact_owner
     length, found = pieces.length[owner], turned.copy()
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    usable = _alone(owner, pairs) & (length > 0.0)
+    usable = np.logical_and(_alone(owner, pairs), length > 0.0)
     for pair in np.unique(pairs[usable]):
         rows = np.flatnonzero(usable & (pairs == pair))
         rows = rows[np.argsort(pieces.begin[owner[rows]], kind="stable")]
