@@ -28,18 +28,28 @@ def test_the_healthy_toy_conforms_and_every_check_is_told(toy):
     assert [finding.check for finding in findings] == [*CHECKS, *(f"receipt {q}" for q in QUANTITIES)]
 
 
+@pytest.fixture
+def few_worlds(monkeypatch):
+    """Memory is looked at over a tenth of the worlds, in tests of other checks: it takes eight seconds of each."""
+    monkeypatch.setattr(worlds, "WARM", 20)
+    monkeypatch.setattr(worlds, "BUILDS", 100)
+
+
+@pytest.mark.usefixtures("few_worlds")
 def test_findings_are_one_line_each(toy):
     for finding in check_adapter(toy("nothing read back")):
         assert len(str(finding).splitlines()) == 1
         assert finding.message
 
 
+@pytest.mark.usefixtures("few_worlds")
 def test_a_fault_that_no_receipt_sees_is_found(toy):
     found = failing(check_adapter(toy("world shared with another")))
     assert "fresh" in found
     assert not [name for name in found if name.startswith("receipt")]
 
 
+@pytest.mark.usefixtures("few_worlds")
 def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
     found = failing(check_adapter(toy("impulse of the wrong body")))
     assert "impulse" in found
@@ -47,6 +57,7 @@ def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
     assert receipts == {"receipt impulse"}
 
 
+@pytest.mark.usefixtures("few_worlds")
 def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
     class Broken(toy_class):
         def build(self, scene, dt, settings):
@@ -136,6 +147,7 @@ def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
     assert passed == {"packages", "facts", "profiles"}
 
 
+@pytest.mark.usefixtures("few_worlds")
 def test_expected_failures_are_told_and_an_unexpected_pass_is_a_failure(toy_class):
     class Known(Spoilt):
         expected = (Expected("states", "it starts late", "its manual"), Expected("contacts", "no", "nowhere"))

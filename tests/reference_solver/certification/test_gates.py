@@ -19,8 +19,8 @@ from reference_solver.certification import (
 from reference_solver.certification.space import SPACES
 from reference_solver.certification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 
-#: Piles of more than a minute of CPU each: `crosscheck certify` measures them, and `make test-long`.
-LONG = ("50 spheres", "8 spatial boxes")
+#: Piles of half a minute of CPU or more each: `crosscheck certify` measures them, and `make test-long`.
+LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),

@@ -18,7 +18,7 @@ PARTS = (
     "painleve",
     "kane",
     "slide_to_roll",
-    "rod_gas",
+    pytest.param("rod_gas", marks=pytest.mark.long),  # half a minute of CPU; `crosscheck certify` measures it
 )
 
 

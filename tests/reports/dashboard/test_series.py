@@ -217,6 +217,7 @@ def long_history(folder, runs=500):
     return store, len(keys)
 
 
+@pytest.mark.long
 def test_a_dashboard_of_500_runs_and_benches_takes_less_than_ten_seconds(tmp_path):
     store, count = long_history(tmp_path)
     begun = time.process_time()
