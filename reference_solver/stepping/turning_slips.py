@@ -46,7 +46,8 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     With f the tangential acceleration but for the contact's own friction, a slip u obeys ``u' = f - C u/|u|``: across
     f it dies out at the rate |C|/|u|, which has no bound where a slip begins (or ends) with f near what friction can
     do. Below the speed at which that rate is what the step can bear the direction is that of a backward step over a
-    moment (`implicit_slip`): exact where the slip does not turn, and off by no more than it turns in that moment. What
+    moment (`implicit_slip`) where no other contact holds its bodies, else that of u a moment later under f alone, as if
+    C were a number: exact where the slip does not turn, and off by no more than it turns in that moment. What
     accelerates along its direction keeps it.
     """
     speed, force, size, onward = 0.0, 0.0, 0.0, 0.0
@@ -76,7 +77,6 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
         return False
     moment = BEARABLE * lasting.length[0] - speed / force
-    x, y = 0.0, 0.0
     if is_alone(lasting, k):
         x, y = implicit_slip(lasting, k, moment)
     else:
@@ -104,7 +104,7 @@ def is_alone(lasting: Lasting, k: int) -> bool:
 
 @inner_kernel
 def implicit_slip(lasting: Lasting, k: int, moment: float) -> tuple[float, float]:
-    """Direction (not of unit length) of the slip of contact k a moment [s] later; (0, 0) if none is found.
+    """Direction, a unit vector, of the slip of contact k a moment [s] later; (0, 0) if none is found.
 
     A backward step of ``u' = a + p (k_tn - mu K_tt d)``, with the pressure p that keeps the contact held:
     ``u + moment (a + p k_tn) = (r + moment p mu K_tt) d`` for the speed r >= 0 at which d is a unit vector, or r = 0

@@ -30,7 +30,7 @@ def test_the_healthy_toy_conforms_and_every_check_is_told(toy):
 
 @pytest.fixture
 def few_worlds(monkeypatch):
-    """Memory is looked at over a tenth of the worlds, in tests of other checks: it takes eight seconds of each."""
+    """Memory is looked at over a tenth of the worlds, in tests of other checks: it takes the longest of all."""
     monkeypatch.setattr(worlds, "WARM", 20)
     monkeypatch.setattr(worlds, "BUILDS", 100)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed
 from reference_solver.certification.geometry import Nearest, nearest, rotation
@@ -82,7 +83,7 @@ def turned_contacts(run: Run) -> Turned:
     return Turned(normal, last_normal, point, last_point, lean, stray, change)
 
 
-def _alone(owner: Indices, pairs: Indices) -> Array:
+def _alone(owner: Indices, pairs: Indices) -> NDArray[np.bool_]:
     """Whether (c,) a contact is the only one of its pair in its piece."""
     keys = owner * (int(pairs.max(initial=0)) + 1) + pairs
     _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
@@ -106,8 +107,7 @@ def changes_of_force(run: Run) -> Array:
         np.add.at(total, first, pieces.impulse[rows])
         mean = total / pieces.length[at][:, None]
         force = np.linalg.norm(mean, axis=1)
-        begin, end = pieces.begin[at], pieces.begin[at] + pieces.length[at]
-        follows = np.abs(begin[1:] - end[:-1]) <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(end[:-1]))
+        follows = _follows(run, at)
         step = np.linalg.norm(np.diff(mean, axis=0), axis=1) * 2.0 / (pieces.length[at][1:] + pieces.length[at][:-1])
         step = np.where(follows, step, 0.0)
         known = np.concatenate([[False], follows]) & np.concatenate([follows, [False]])
@@ -127,18 +127,21 @@ def turns_beside(run: Run, turned: Array) -> Array:
     pieces, owner = run.pieces, run.contact_owner
     length, found = pieces.length[owner], turned.copy()
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    usable = np.logical_and(_alone(owner, pairs), length > 0.0)
+    usable = _alone(owner, pairs) & (length > 0.0)
     for pair in np.unique(pairs[usable]):
         rows = np.flatnonzero(usable & (pairs == pair))
-        rows = rows[np.argsort(pieces.begin[owner[rows]], kind="stable")]
-        begin, taken = pieces.begin[owner[rows]], length[rows]
-        gap = np.abs(begin[1:] - begin[:-1] - taken[:-1])
-        follows = gap <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(begin[1:]))
-        rate = np.where(turned[rows] < 1.0, turned[rows], 0.0) / taken
+        follows = _follows(run, owner[rows])
+        rate = np.where(turned[rows] < 1.0, turned[rows], 0.0) / length[rows]
         before = np.concatenate([[0.0], np.where(follows, rate[:-1], 0.0)])
         after = np.concatenate([np.where(follows, rate[1:], 0.0), [0.0]])
-        found[rows] = np.maximum(found[rows], taken * np.minimum(before, after))
+        found[rows] = np.maximum(found[rows], length[rows] * np.minimum(before, after))
     return found
+
+
+def _follows(run: Run, at: Indices) -> NDArray[np.bool_]:
+    """Whether (s - 1,) each of some pieces (s,), in the order of time, begins where the one before it ends."""
+    begin, end = run.pieces.begin[at], run.pieces.begin[at] + run.pieces.length[at]
+    return np.asarray(np.abs(begin[1:] - end[:-1]) <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(end[:-1])))
 
 
 def _largest_turn(run: Run, rows: Indices) -> Array:
