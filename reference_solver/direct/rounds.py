@@ -33,9 +33,9 @@ POLISH = 0.3
 STANDING = 0.9
 #: One that multiplies the residual by this has brought its own round-off, which goes with the stiffness.
 NOISY = 2.0
-#: Where more than this is left of the residual rounds have found no answer: far above round-off, and what a certificate
-#: refuses. Planar problems are then solved by pivots (E45).
-UNFOUND = 1e-10
+#: Where more than this times the tolerance is left of the residual, rounds have found no answer: what they end at is
+#: below the tolerance. Planar problems are then solved by pivots (E45).
+UNFOUND = 2.0
 #: Friction within this share of its limit slides, or is about to: it does not end that way.
 AT_LIMIT = 1e-9
 #: What the stiffness grows by after a round, and falls by where Newton's method fails. After each failure it grows by
@@ -86,7 +86,7 @@ def solve_problem(problem: Problem, tolerance: float, budget: int, fresh: bool) 
         if finished:
             break
     for attempt in range(COVERINGS):
-        if best <= UNFOUND or problem.size[FACTORISATIONS] == 0:
+        if best <= UNFOUND * tolerance or problem.size[FACTORISATIONS] == 0:
             break
         withdraw(problem)
         if not find_by_pivots(problem, attempt):

@@ -12,19 +12,20 @@ from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.options import MIDPOINT, Options
 
-#: Columns of `SubStep.gain` that hold the free bodies of a cluster, and its rows, until the flight begins.
-MEMBERS, ROWS = 0, 1
+#: Columns of `SubStep.gain` that hold the free bodies of a cluster, its rows, and its pairs that meet, until the flight
+#: begins.
+MEMBERS, ROWS, MEETINGS = 0, 1, 2
 
 
 @inner_kernel
 def join_clusters(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> None:
-    """Join all free bodies that touch, or whose gap loads can close within the step; count bodies and rows of each.
+    """Join all free bodies that touch, or whose gap loads can close within the step; count bodies, rows and meetings.
 
     Of flush faces no more rows count than hold two bodies together: all others follow from them.
     """
     label = sub.closing
     for i in range(len(bodies.kind)):
-        label[i], sub.gain[i, MEMBERS], sub.gain[i, ROWS] = i, 0.0, 0.0
+        label[i], sub.gain[i, MEMBERS], sub.gain[i, ROWS], sub.gain[i, MEETINGS] = i, 0.0, 0.0, 0.0
     for m in range(rows.counts[MANIFOLDS]):
         a, b = rows.integer[rows.manifold[m], A], rows.integer[rows.manifold[m], B]
         free = bodies.kind[a, MOTION] == FREE and bodies.kind[b, MOTION] == FREE
@@ -35,8 +36,10 @@ def join_clusters(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) ->
         sub.gain[first_of(label, i), MEMBERS] += 1.0 if bodies.kind[i, MOTION] == FREE else 0.0
     for m in range(rows.counts[MANIFOLDS]):
         a, b = rows.integer[rows.manifold[m], A], rows.integer[rows.manifold[m], B]
-        independent = min((1 + options.friction) * near_rows(bodies, rows, m, options), 2 + options.friction)
-        sub.gain[first_of(label, a if bodies.kind[a, MOTION] == FREE else b), ROWS] += independent
+        near = near_rows(bodies, rows, m, options)
+        cluster = first_of(label, a if bodies.kind[a, MOTION] == FREE else b)
+        sub.gain[cluster, ROWS] += min((1 + options.friction) * near, 2 + options.friction)
+        sub.gain[cluster, MEETINGS] += 1.0 if near > 0 else 0.0
 
 
 @inner_kernel
@@ -60,8 +63,8 @@ def weigh_clusters(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, t
         sub.clock[JAMMED] = 1.0
     for i in range(len(bodies.kind)):
         cluster = first_of(sub.closing, i)
-        members = int(sub.gain[cluster, MEMBERS])
-        if bodies.kind[i, MOTION] == FREE and jams(int(sub.gain[cluster, ROWS]), 3 * members, members):
+        members, met = int(sub.gain[cluster, MEMBERS]), int(sub.gain[cluster, MEETINGS])
+        if bodies.kind[i, MOTION] == FREE and jams(int(sub.gain[cluster, ROWS]), 3 * members, members, met):
             hurry(sub.clock)
             turns = turns or abs(bodies.twist[i, 2]) * options.dt > FROZEN
     if turns:

@@ -12,8 +12,9 @@ from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.noise import FROZEN
 from reference_solver.stepping.options import MIDPOINT, Options
 
-#: Columns of ``rate`` that hold the free bodies of a cluster, and its rows, until the flight begins.
-MEMBERS, ROWS = 0, 1
+#: Columns of ``rate`` that hold the free bodies of a cluster, its rows, and its pairs that meet, until the flight
+#: begins.
+MEMBERS, ROWS, MEETINGS = 0, 1, 2
 #: Freedoms of a body: what holds two bodies together has no more independent rows.
 FREEDOMS = 6
 
@@ -35,7 +36,7 @@ def weigh_clusters(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, opti
     """
     label = sub_step.held
     for i in range(len(bodies)):
-        label[i], bodies.rate[i, MEMBERS], bodies.rate[i, ROWS] = i, 0.0, 0.0
+        label[i], bodies.rate[i, MEMBERS], bodies.rate[i, ROWS], bodies.rate[i, MEETINGS] = i, 0.0, 0.0, 0.0
     for m in range(len(manifolds)):
         a, b = manifolds.body_a[m], manifolds.body_b[m]
         if bodies.motion[a] == FREE and bodies.motion[b] == FREE and near_rows(bodies, manifolds, m, options) > 0:
@@ -45,14 +46,16 @@ def weigh_clusters(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, opti
         bodies.rate[first_of(label, i), MEMBERS] += 1.0 if bodies.motion[i] == FREE else 0.0
     for m in range(len(manifolds)):
         a = manifolds.body_a[m] if bodies.motion[manifolds.body_a[m]] == FREE else manifolds.body_b[m]
-        bodies.rate[first_of(label, a), ROWS] += near_rows(bodies, manifolds, m, options)
+        near, cluster = near_rows(bodies, manifolds, m, options), first_of(label, a)
+        bodies.rate[cluster, ROWS] += near
+        bodies.rate[cluster, MEETINGS] += 1.0 if near > 0 else 0.0
     turns = False
     if options.scheme == MIDPOINT:
         sub_step.clock[JAMMED] = 1.0
     for i in range(len(bodies)):
         cluster = first_of(label, i)
-        members = int(bodies.rate[cluster, MEMBERS])
-        if bodies.motion[i] == FREE and jams(int(bodies.rate[cluster, ROWS]), FREEDOMS * members, members):
+        members, met = int(bodies.rate[cluster, MEMBERS]), int(bodies.rate[cluster, MEETINGS])
+        if bodies.motion[i] == FREE and jams(int(bodies.rate[cluster, ROWS]), FREEDOMS * members, members, met):
             hurry(sub_step.clock)
             turns = turns or length(row(bodies.twist, i, 3)) * options.dt > FROZEN
     if turns:

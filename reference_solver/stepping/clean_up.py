@@ -16,6 +16,10 @@ CONES, WITHIN = 24, 1e-12
 #: Share of an excess that may be left of it: where more is, loads of redundant contacts pass it to and fro.
 SHRINKS = 0.75
 
+#: Largest impulse, over all that friction was more than its limits, at which rows are held again with the friction that
+#: this brings along. Not far from one where levers are near each other's; more tells of a jam.
+BRINGS = 4.0
+
 
 @inner_kernel
 def give(bodies: Bodies, lasting: Lasting, k: int, row: int, size: float) -> None:
@@ -44,7 +48,7 @@ def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
     """Close the gaps of pressed contacts, and take out what velocities miss of their rows; both by M^-1 G^T."""
     evaluate(bodies, lasting)
     for _ in range(2):
-        if not project(bodies, lasting, True):
+        if not project(bodies, lasting, True, 0.0):
             return False
         evaluate(bodies, lasting)
     before = math.inf
@@ -55,10 +59,10 @@ def clean_up(bodies: Bodies, lasting: Lasting) -> bool:
         before = excess
         keep_cones(bodies, lasting)
         evaluate(bodies, lasting)
-        if not project(bodies, lasting, False):
+        if not project(bodies, lasting, False, BRINGS * excess):
             return False
         evaluate(bodies, lasting)
-    return project(bodies, lasting, False)
+    return project(bodies, lasting, False, 0.0)
 
 
 @inner_kernel
@@ -121,10 +125,22 @@ def turns_away(lasting: Lasting, k: int) -> bool:
 
 
 @inner_kernel
-def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
-    """Project poses on closed gaps, or velocities on the rows that are held (an orthogonal projection).
+def largest(lasting: Lasting, count: int) -> float:
+    """Largest answer of the rows, of either sign; inf where one is no number."""
+    most = 0.0
+    for i in range(count):
+        if not math.isfinite(lasting.answer[i]):
+            return math.inf
+        most = max(most, abs(lasting.answer[i]))
+    return most
 
-    Without the friction of slips: near a jam what that brings along has no bound.
+
+@inner_kernel
+def project(bodies: Bodies, lasting: Lasting, poses: bool, most: float) -> bool:
+    """Project poses on closed gaps, or velocities on the rows that are held.
+
+    With the friction of slips, that one which is pressed more also slips at its limit, as far as no impulse of that
+    exceeds ``most`` [N s]: near a jam what friction brings along has no bound. Else an orthogonal projection.
     """
     kept = list_rows(lasting)
     count = 0
@@ -137,15 +153,24 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool) -> bool:
         count += 1
     if count == 0:
         return True
-    solve_rows(lasting, count, False, 0.0)
+    sliding = most > 0.0
+    solve_rows(lasting, count, sliding, 0.0)
+    if sliding and largest(lasting, count) > most:
+        sliding = False
+        solve_rows(lasting, count, False, 0.0)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             lasting.acceleration[i, d] = 0.0
     for i in range(count):
-        k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-        push(lasting, lasting.acceleration, k, row, lasting.answer[i])
+        k, row, size = lasting.unknown[i, 0], lasting.unknown[i, 1], lasting.answer[i]
+        push(lasting, lasting.acceleration, k, row, size)
         if not poses:
-            give(bodies, lasting, k, row, lasting.answer[i])
+            give(bodies, lasting, k, row, size)
+        if sliding and row == 0 and lasting.mode[k] == SLIP:
+            for t in range(lasting.size[TANGENTS]):
+                rubbed = -lasting.friction[k] * lasting.direction[k, t] * size
+                push(lasting, lasting.acceleration, k, 1 + t, rubbed)
+                give(bodies, lasting, k, 1 + t, rubbed)
     for i in range(lasting.size[BODIES]):
         if not is_free(bodies, i):
             continue

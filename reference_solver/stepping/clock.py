@@ -42,7 +42,7 @@ MOST_SOFT = 128
 MOST_SOFT_IN_SPACE = 64
 #: Free bodies of a cluster from which on it may jam, and soft events that are located in a step of one that is.
 JAM_BODIES, JAM_PATIENCE = 4, 2
-#: Free bodies from which on a cluster jams however few its contacts.
+#: Free bodies from which on a cluster jams that has more meetings than bodies, however few its rows.
 MANY_BODIES = 8
 #: What a soft rebound counts: a step in which a series with e = .8 ends to within 1e-12 of its end has 60 of them.
 REBOUND = 0.25
@@ -74,12 +74,13 @@ def opens_step(clock: Array, dt: float) -> bool:
 
 
 @kernel
-def jams(rows: int, freedoms: int, bodies: int) -> bool:
+def jams(rows: int, freedoms: int, bodies: int, meetings: int) -> bool:
     """Whether a cluster of bodies that touch jams: it has more rows than freedoms.
 
-    Then whatever moves in it moves what it touches, and events have no end. Many bodies jam in any case.
+    Then whatever moves in it moves what it touches, and events have no end. So do many bodies that meet in loops: with
+    more ``meetings``, pairs that touch, than bodies. A stack that leans has none, and ends of its slides are few.
     """
-    return bodies >= MANY_BODIES or (bodies >= JAM_BODIES and rows > freedoms)
+    return (bodies >= MANY_BODIES and meetings > bodies) or (bodies >= JAM_BODIES and rows > freedoms)
 
 
 @kernel

@@ -371,7 +371,7 @@ def rises_first(bodies: Bodies, lasting: Lasting, which: int, what: int, length:
 
 @inner_kernel
 def stops_at_once(lasting: Lasting) -> bool:
-    """Whether a slip in space that is all but nothing ends: the projection that takes it out knows no cone.
+    """Whether a slip that is all but nothing ends: the projection that takes it out knows no cone.
 
     A frozen solve over an instant does (E54); where slip is left even after that, for rows that turn, it is round-off.
     """
@@ -379,7 +379,7 @@ def stops_at_once(lasting: Lasting) -> bool:
         return False
     for k in range(lasting.size[CONTACTS]):
         onward = lasting.monitor[LAST, k, ONWARD]
-        if lasting.size[TANGENTS] > 1 and lasting.mode[k] == SLIP and lasting.friction[k] > 0.0:
+        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0:
             if lasting.monitor[START, k, ONWARD] <= FORCE_NOISE and onward < -FORCE_NOISE:
                 return True
     return False

@@ -126,9 +126,24 @@ def test_rocking_that_has_ended_is_behind_when_it_is_settled_and_what_is_held_fo
         assert (clock[HELD], clock[UNSETTLED]) == (after, 0.0)
 
 
-def test_a_cluster_jams_where_contacts_have_more_rows_than_bodies_have_freedoms_or_bodies_are_many():
-    for rows, bodies, jammed in [(13, 4, True), (12, 4, False), (60, 3, False), (16, 8, True), (14, 7, False)]:
-        assert jams(rows, 3 * bodies, bodies) == jammed
+@pytest.mark.parametrize(
+    ("rows", "bodies", "meetings", "jammed"),
+    [
+        (13, 4, 4, True),
+        (12, 4, 4, False),
+        (60, 3, 9, False),
+        (18, 8, 9, True),
+        (24, 8, 8, False),  # a stack of eight
+        (14, 7, 9, False),
+    ],
+)
+def test_a_cluster_jams_where_rows_are_more_than_freedoms_or_where_many_bodies_meet_in_loops(
+    rows, bodies, meetings, jammed
+):
+    assert jams(rows, 3 * bodies, bodies, meetings) == jammed
+
+
+def test_few_soft_events_are_located_in_the_step_of_an_island_that_jams():
     clock = np.zeros(CLOCK_SIZE)
     open_step(clock, 8, DT, MOST_SOFT)
     hurry(clock)

@@ -31,7 +31,7 @@ def asked_by(command):
 @pytest.mark.parametrize(
     "line",
     [
-        "",
+        pytest.param("", marks=pytest.mark.long),  # plans every cell of every scene twice
         "--engine chipmunk --standard",
         "bounce --param e=0.8 --param height=1.03 --engine bullet --engine mujoco --profile tuned --dt 1/120 --dim 3",
         "impact stack --iterations 7 --ulp -1",

@@ -43,15 +43,22 @@ def test_a_run_that_cannot_be_solved_ends_and_says_where(monkeypatch):
     assert "no impulses keep bodies 0 and 1 apart" in observation.reason
 
 
-@pytest.mark.parametrize(("dimension", "refused"), [(2, {"cone"}), (3, set())])
-def test_a_box_on_one_1e5_times_lighter_is_right_and_in_the_plane_not_certified(dimension, refused):
-    """README lists it: what the certificate refuses there, how far off, and that every check would pass."""
-    canonical = CATALOGUE["heavy_on_light"]
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
+    """Rounds of Newton's method leave five times the goal there, by which the planar certificate refused a cone."""
     asked = {"ratio": 1e5}
-    found = execute(Slot("heavy_on_light", canonical.minimal(asked), dimension, "reference", "reference", 1 / 240))
-    assert found.outcome is (Outcome.INVALID if refused else Outcome.OK)
-    told = {reason.split(": ")[-1].split()[0] for reason in found.certificate["reasons"] if ": " in reason}
-    assert told == refused
-    assert all(found.certificate["full"]["findings"][name] < 1e-8 for name in refused)
-    checks = canonical.checks(canonical.scene(dimension, asked), 1 / 240)
-    assert all(abs(found.metrics[check.metric][0] - check.truth) <= check.bound for check in checks)
+    slot = Slot(
+        "heavy_on_light", CATALOGUE["heavy_on_light"].minimal(asked), dimension, "reference", "reference", 1 / 240
+    )
+    found = execute(slot)
+    assert found.outcome is Outcome.OK, found.certificate["reasons"]
+    assert {row.physics for row in rows_of("run", [found])} == {"pass"}
+
+
+def test_eight_blocks_that_fall_off_each_other_are_located_throughout_and_certified():
+    """Slips of 5e-11 m/s end in a stack that rocks: a projection that takes them out leaves 4e-11 of a cone."""
+    asked = {"n": 8.0, "margin": -0.05, "duration": 1.5}
+    slot = Slot("overhang", CATALOGUE["overhang"].minimal(asked), 2, "reference", "reference", 1 / 240)
+    found = execute(slot)
+    assert found.outcome is Outcome.OK, found.certificate["reasons"]
+    assert found.certificate["held_steps"] == 0

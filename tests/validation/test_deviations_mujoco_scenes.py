@@ -165,8 +165,10 @@ def test_blocks_tip_at_the_rate_of_a_rigid_one_that_stands_on_its_edge():
 
 @pytest.mark.parametrize(
     ("profile", "params"),
-    [("default", {"margin": 1e-6}), ("tuned", {"margin": -0.05, "n": 8.0})],
-    ids=["a pyramid", "blocks that fall onto others"],
+    [
+        pytest.param("default", {"margin": 1e-6}, id="a pyramid"),
+        pytest.param("tuned", {"margin": -0.05, "n": 8.0}, id="blocks that fall onto others", marks=pytest.mark.long),
+    ],
 )
 def test_blocks_of_another_problem_are_not_predicted(profile, params):
     scene = CATALOGUE["overhang"].scene(2, params)

@@ -20,7 +20,7 @@ from reference_solver.certification.space import SPACES
 from reference_solver.certification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 
 #: Piles of half a minute of CPU or more each: `crosscheck certify` measures them, and `make test-long`.
-LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes")
+LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes", "50 boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),
