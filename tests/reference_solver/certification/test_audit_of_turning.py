@@ -1,0 +1,83 @@
+"""What the audit allows for contacts that turn: pieces beside each other in time, and no more than they tell."""
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, HalfSpace, Model, Sphere
+from reference_solver.certification.audit.run import Run
+from reference_solver.certification.audit.turning import UNKNOWN_CHANGE, changes_of_force, turns_beside
+from reference_solver.pieces import FIFTH_ORDER, FORCES, Pieces
+
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+H = 1.0 / 240.0
+
+
+def run_of(lengths, forces=None, begin=None, contacts=1):
+    """Pieces of a ball on a floor, of some lengths [s] and mean forces [N], one after the other unless they begin else."""
+    lengths = np.asarray(lengths, dtype=float)
+    begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) if begin is None else np.asarray(begin, dtype=float)
+    p, c = len(lengths), len(lengths) * contacts
+    forces = np.tile([0.0, 0.0, 1.0], (p, 1)) if forces is None else np.asarray(forces, dtype=float)
+    impulse = np.repeat(forces * lengths[:, None], contacts, axis=0) / contacts
+    pose, normal = np.tile([0.0, 0.0, 0.5, *UPRIGHT], (p, 1)), np.tile([0.0, 0.0, 1.0], (c, 1))
+    pieces = Pieces(
+        step=np.arange(p), begin=begin, length=lengths,
+        kind=np.full(p, FORCES), scheme=np.full(p, FIFTH_ORDER),
+        first_body=np.arange(p + 1), first_contact=contacts * np.arange(p + 1),
+        body=np.ones(p, np.int64), pose_before=pose, twist_before=np.zeros((p, 6)), pose_after=pose,
+        twist_after=np.zeros((p, 6)), body_a=np.zeros(c, np.int64), body_b=np.ones(c, np.int64),
+        feature=np.zeros(c, np.int64), point=np.zeros((c, 3)), normal=normal, impulse=impulse,
+        moment=np.zeros((c, 3)),
+    )  # fmt: skip
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+    ball = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))
+    return Run(Model(3, [floor, ball], (0.0, 0.0, -9.81), 0.0, 0.5), pieces, H)
+
+
+class TestTurnsBeside:
+    """A slip that turns back within a piece has both its ends alike: the slower of its neighbours tells how far."""
+
+    @pytest.mark.parametrize(
+        ("turned", "found"),
+        [
+            ((0.1, 0.0, 0.3), 0.2),  # the slower of both, for twice as long
+            ((0.3, 0.0, 0.1), 0.2),
+            ((0.1, 0.7, 0.3), 0.7),  # what it turns by itself is more
+            ((0.1, 0.0, 1.5), 0.0),  # no turn that its ends could tell
+            ((0.0, 0.0, 0.3), 0.0),  # one neighbour alone says nothing
+        ],
+    )
+    def test_the_slower_neighbour_tells_for_the_time_of_the_piece(self, turned, found):
+        beside = turns_beside(run_of([H, 2.0 * H, H]), np.array(turned))
+        assert beside == pytest.approx([turned[0], found, turned[2]], abs=1e-12)
+
+    @pytest.mark.parametrize("late", [1e-9 * H, 0.5 * H])
+    def test_what_does_not_follow_is_no_neighbour(self, late):
+        run = run_of([H, 2.0 * H, H], begin=[0.0, H, 3.0 * H + late])
+        assert turns_beside(run, np.array([0.1, 0.0, 0.3])) == pytest.approx([0.1, 0.0, 0.3])
+
+    def test_pieces_far_from_the_start_follow_each_other_but_for_their_round_off(self):
+        begin = 1e4 + np.array([0.0, H, 3.0 * H])  # a unit in the last place of it is 4e-10 of a step
+        run = run_of([H, 2.0 * H, H], begin=begin)
+        assert turns_beside(run, np.array([0.1, 0.0, 0.3]))[1] == pytest.approx(0.2)
+
+    def test_points_of_one_pair_say_nothing_of_each_other(self):
+        turned = np.repeat([0.1, 0.0, 0.3], 2)
+        assert turns_beside(run_of([H, 2.0 * H, H], contacts=2), turned) == pytest.approx(turned, abs=0.0)
+
+
+class TestChangesOfForce:
+    def test_the_faster_of_both_neighbours_tells_and_twice_that_is_allowed(self):
+        """2, 2.02, 2.1 N over 1, 2 and 1 steps: .02 and .08 N in 1.5 steps, .08/1.5 a step of 2.02 N."""
+        forces = np.array([[0.0, 0.0, f] for f in (2.0, 2.02, 2.1)])
+        found = changes_of_force(run_of([H, 2.0 * H, H], forces))
+        assert found == pytest.approx([UNKNOWN_CHANGE, 2.0 * 2.0 * (0.08 / 1.5) / 2.02, UNKNOWN_CHANGE], rel=1e-12)
+
+    def test_a_force_that_turns_changes(self):
+        forces = [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.6, 0.0, 0.8)]
+        found = changes_of_force(run_of([H, H, H], forces))
+        assert found[1] == pytest.approx(2.0 * np.hypot(0.6, 0.2), rel=1e-12)
+
+    def test_what_begins_later_tells_nothing(self):
+        run = run_of([H, H, H], begin=[0.0, H, 2.5 * H])
+        assert changes_of_force(run) == pytest.approx([UNKNOWN_CHANGE] * 3)
