@@ -9,7 +9,7 @@ from reference_solver import Body, HalfSpace, Model, Settings, Simulation, Spher
 from reference_solver.certification import self_test
 from reference_solver.certification.audit import audit
 from reference_solver.certification.audit.run import Run
-from reference_solver.certification.audit.turning import UNKNOWN_CHANGE, changes_of_force, turns_beside
+from reference_solver.certification.audit.turning import UNKNOWN_CHANGE, _largest_turn, changes_of_force, turns_beside
 from reference_solver.certification.known import gates
 from reference_solver.pieces import FIFTH_ORDER, FORCES, Pieces
 
@@ -17,7 +17,7 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 H = 1.0 / 240.0
 
 
-def run_of(lengths, forces=None, begin=None, contacts=1):
+def run_of(lengths, forces=None, begin=None, contacts=1, twist=(0.0,) * 6):
     """Pieces of a ball on a floor, of some lengths [s] and mean forces [N], one after the other unless they begin else."""
     lengths = np.asarray(lengths, dtype=float)
     begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) if begin is None else np.asarray(begin, dtype=float)
@@ -29,8 +29,8 @@ def run_of(lengths, forces=None, begin=None, contacts=1):
         step=np.arange(p), begin=begin, length=lengths,
         kind=np.full(p, FORCES), scheme=np.full(p, FIFTH_ORDER),
         first_body=np.arange(p + 1), first_contact=contacts * np.arange(p + 1),
-        body=np.ones(p, np.int64), pose_before=pose, twist_before=np.zeros((p, 6)), pose_after=pose,
-        twist_after=np.zeros((p, 6)), body_a=np.zeros(c, np.int64), body_b=np.ones(c, np.int64),
+        body=np.ones(p, np.int64), pose_before=pose, twist_before=np.tile(twist, (p, 1)), pose_after=pose,
+        twist_after=np.tile(twist, (p, 1)), body_a=np.zeros(c, np.int64), body_b=np.ones(c, np.int64),
         feature=np.zeros(c, np.int64), point=np.zeros((c, 3)), normal=normal, impulse=impulse,
         moment=np.zeros((c, 3)),
     )  # fmt: skip
@@ -71,6 +71,12 @@ class TestTurnsBeside:
         assert turns_beside(run_of([H, 2.0 * H, H], contacts=2), turned) == pytest.approx(turned, abs=0.0)
 
 
+def test_a_normal_turns_no_farther_than_spins_and_what_bodies_pass_each_other_by_take_it():
+    """3 rad/s, and 2 m/s past a corner at the ball's own radius of .5 m: 7 rad/s."""
+    run = run_of([H, 2.0 * H], twist=(2.0, 0.0, 0.0, 0.0, 0.0, 3.0))
+    assert _largest_turn(run, np.arange(2)) == pytest.approx([7.0 * H, 14.0 * H], abs=1e-11)
+
+
 class TestChangesOfForce:
     def test_the_faster_of_both_neighbours_tells_and_twice_that_is_allowed(self):
         """2, 2.02, 2.1 N over 1, 2 and 1 steps: .02 and .08 N in 1.5 steps, .08/1.5 a step of 2.02 N."""
@@ -105,6 +111,22 @@ def test_corruptions_are_seen_at_a_millionth_but_for_those_that_are_told():
         if not trial.seen:
             missed[trial.corruption.name] = max(trial.size, missed.get(trial.corruption.name, 0.0))
     assert missed == NOT_SEEN
+
+
+HILL = self_test.SCENES["disc that slides off a disc"]
+
+
+def test_a_moment_over_a_hill_is_seen_from_where_its_point_is_known_to():
+    """Its point goes .003 m in a piece, and its force changes by a hundredth: 1e-4 of the moment are not told."""
+    spun = next(each for each in self_test.CORRUPTIONS if each.name == "moment and spin over a hill")
+    assert "moment" in self_test.seen_by(*spun.plant(HILL, 2e-4))
+
+
+@pytest.mark.parametrize("share", [1e-3, 1e-2, 0.5])
+def test_friction_over_a_hill_that_is_too_weak_is_seen(share):
+    """It slips all the way: where normals turn, too, all of mu p_n is against it."""
+    weaker = self_test.given(lambda model, size: replace(model, friction=model.friction * (1.0 - size)))
+    assert "friction" in self_test.seen_by(*weaker(HILL, share))
 
 
 @pytest.fixture(scope="module", params=["ball slipping along a groove", "ball spinning in a corner"])
