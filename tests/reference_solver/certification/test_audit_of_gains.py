@@ -14,7 +14,7 @@ LIGHT, HEAVY = 0.1, 10.0
 
 
 def landing(sinks, falls, e=E, friction=0.0):
-    """A heavy disc comes down on a light one that rests on a floor which ``sinks`` [m/s]; the light one has e = 0 there."""
+    """A heavy disc comes down on a light one that rests, with e = 0, on a floor which ``sinks`` [m/s]."""
 
     def disc(y, mass, speed):
         return Body(Disc(0.5), mass, 0.125 * mass, (0.0, y, 0.0), (0.0, speed, 0.0))

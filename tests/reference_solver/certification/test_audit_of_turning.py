@@ -18,7 +18,7 @@ H = 1.0 / 240.0
 
 
 def run_of(lengths, forces=None, begin=None, contacts=1, twist=(0.0,) * 6):
-    """Pieces of a ball on a floor, of some lengths [s] and mean forces [N], one after the other unless they begin else."""
+    """Pieces of a ball on a floor, of some lengths [s] and mean forces [N], one after the other or as they begin [s]."""
     lengths = np.asarray(lengths, dtype=float)
     begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) if begin is None else np.asarray(begin, dtype=float)
     p, c = len(lengths), len(lengths) * contacts

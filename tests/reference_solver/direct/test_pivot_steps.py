@@ -34,7 +34,7 @@ def test_what_falls_to_zero_first_leaves(direct, column, right, leaves):
 
 
 def test_each_search_is_covered_otherwise(direct):
-    """Entries of the covering vector lie between one and two, and no two rows or searches have the same but the first."""
+    """Entries of the covering vectors lie between one and two; but for the first search no two are the same."""
     vectors = []
     for attempt in range(pivoting.COVERINGS):
         problem = direct.random(3, 4)
