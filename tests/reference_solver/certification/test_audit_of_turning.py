@@ -18,7 +18,7 @@ H = 1.0 / 240.0
 
 
 def run_of(lengths, forces=None, begin=None, contacts=1, twist=(0.0,) * 6):
-    """Pieces of a ball on a floor, of some lengths [s] and mean forces [N], one after the other or as they begin [s]."""
+    """Pieces of a ball on a floor: lengths [s], mean forces [N]; one after the other, or as they begin [s]."""
     lengths = np.asarray(lengths, dtype=float)
     begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) if begin is None else np.asarray(begin, dtype=float)
     p, c = len(lengths), len(lengths) * contacts
@@ -180,3 +180,12 @@ class TestFrictionOfSlipsThatTurn:
             impulse[contact] = pressed * n + (1.0 + sign * more) * along
             if name == "cone" or more > 2.0 * slipping[3][contact]:
                 assert name in refused(*slipping[:3], impulse=impulse), name
+
+    def test_friction_of_what_is_not_pressed_is_seen(self, slipping):
+        """Of a ten-thousand-millionth of its speed: what round-off of a phase leaves is a tenth of that."""
+        model, record, dt, _ = slipping
+        contact, _, _, along, impulse = self.parts(slipping)
+        ball = model.bodies[-1]
+        speed = ball.shape.radius * np.linalg.norm(record.twist[:, -1, 3:], axis=1).min()
+        impulse[contact] = 1e-10 * ball.mass * speed * along / np.linalg.norm(along)
+        assert "cone" in refused(model, record, dt, impulse=impulse)
