@@ -11,7 +11,7 @@ G, NOISE = 9.81, 1e-12
 
 @pytest.mark.parametrize("e", [0.2, 0.5, 0.8, 0.95])
 def test_a_series_is_over_at_twice_the_speed_that_the_noise_of_its_gap_keeps_up(e):
-    """Each fall is deeper by the noise that the rebound was lifted by: ``u <- e sqrt(u^2 + 2 g noise)`` stands still."""
+    """Each fall is deeper by the noise that lifted the rebound: ``u <- e sqrt(u^2 + 2 g noise)`` stands still."""
     kept = 1.0
     for _ in range(2000):
         kept = e * math.sqrt(kept * kept + 2.0 * G * NOISE)
