@@ -47,6 +47,26 @@ located.put_back(island)
 print(np.array_equal(world._bodies.pose, before))
 """
 
+#: Of a box on a floor, whose smallest half width is .1 m, near the origin and a thousand kilometres off.
+CLOSED = """
+from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation
+from reference_solver.planar import impact
+from reference_solver.spatial import touching
+
+for far in (0.0, 1e6):
+    box = Body(Box((0.1, 0.2)), 1.0, 0.02, (far, 0.2, 0.0))
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    simulation = Simulation(Model(2, [floor, box], (0.0, -9.81), 0.0, 0.5), Settings.reference(1.0 / 60.0))
+    simulation.advance(1)
+    print(impact.closed_gap(simulation._world._bodies, simulation._world._rows, 0))
+    upright = (1.0, 0.0, 0.0, 0.0)
+    box = Body(Box((0.1, 0.3, 0.2)), 1.0, (0.1,) * 3, (far, 0.0, 0.2, *upright))
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *upright), motion="fixed")
+    simulation = Simulation(Model(3, [floor, box], (0.0, 0.0, -9.81), 0.0, 0.5), Settings.reference(1.0 / 60.0))
+    simulation.advance(1)
+    print(touching.closed_gap(simulation._world._bodies, simulation._world._manifolds, 0, 0))
+"""
+
 
 def said_by(script, *arguments):
     done = subprocess.run(
@@ -75,3 +95,10 @@ def test_gaps_are_closed_while_that_helps_and_bodies_stay_where_it_does_not(over
 
 def test_bodies_that_are_put_back_are_where_they_were():
     assert said_by(PUT_BACK) == ["True"]
+
+
+def test_a_gap_of_a_tenth_of_what_touches_is_none_or_one_of_a_place_s_last_places():
+    """1e-10 of the smaller half width, or 2e-15 of where it is, be that more: a box has its corner at 1e6 - .1 m."""
+    near, far = [float(each) for each in said_by(CLOSED)[:2]], [float(each) for each in said_by(CLOSED)[2:]]
+    assert near == pytest.approx([1e-11, 1e-11], rel=1e-9)
+    assert far == pytest.approx([2e-9, 2e-9], rel=1e-3)
