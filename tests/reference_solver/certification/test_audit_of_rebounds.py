@@ -1,11 +1,12 @@
 """Impacts that do not rebound, rebounds that are held and released, and what is pressed in phases (E82)."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from reference_solver import Body, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
 from reference_solver.certification import self_test
 from reference_solver.certification.audit import audit
 from reference_solver.certification.known import gates
@@ -57,3 +58,19 @@ def test_what_is_pressed_in_a_phase_does_not_part_as_it_begins():
     assert "normal" not in refused(motion.model, record, dt)
     before[pieces.first_body[piece + 1] - 1, :3] += 1e-6 * pieces.normal[contact]
     assert "normal" in refused(motion.model, replace(record, pieces=replace(pieces, twist_before=before)), dt)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, -0.6])
+def test_corners_that_meet_have_normals_of_edges_only(angle):
+    """Along many directions corners that touch are as far apart; the law knows those of edges, at 45 degrees."""
+    turn = 0.25 * math.pi
+    bodies = [
+        Body(Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.0, turn), (1.0, -0.4, 0.0)),
+        Body(Box((0.5, 0.5)), 1.0, 1 / 6, (math.sqrt(2.0) + 0.1, -0.04, turn)),
+    ]
+    model, dt = Model(2, bodies, (0.0, 0.0), 0.0, 0.0), 1.0 / 240.0
+    record = Simulation(model, Settings.reference(dt)).record(30, pieces=True)
+    assert len(record.pieces.normal) and "direction" not in refused(model, record, dt)
+    normal = np.zeros_like(record.pieces.normal) + [math.cos(angle), math.sin(angle)]
+    other = replace(record, pieces=replace(record.pieces, normal=normal))
+    assert "direction" in refused(model, other, dt)
