@@ -1,0 +1,80 @@
+"""Newton's law may create energy where one contact rebounds and another, which parted, is pressed (E63): no defect."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver.certification.audit import audit, energy
+from reference_solver.certification.audit.run import Run
+
+DT, E = 1.0 / 240.0, 0.3
+LIGHT, HEAVY = 0.1, 10.0
+
+
+def landing(sinks, falls, e=E, friction=0.0):
+    """A heavy disc comes down on a light one that rests, with e = 0, on a floor which ``sinks`` [m/s]."""
+
+    def disc(y, mass, speed):
+        return Body(Disc(0.5), mass, 0.125 * mass, (0.0, y, 0.0), (0.0, speed, 0.0))
+
+    floor = Body(HalfSpace((0.0, 1.0)), twist=(0.0, -sinks, 0.0), motion="prescribed")
+    bodies = [floor, disc(0.5, LIGHT, 0.0), disc(1.5, HEAVY, -falls)]
+    restitution = np.zeros((3, 3))
+    restitution[1, 2] = restitution[2, 1] = e
+    return Model(2, bodies, (0.0, 0.0), restitution, friction)
+
+
+def run(model):
+    record = Simulation(model, Settings.reference(DT)).record(4, pieces=True)
+    return record, Run(model, record.pieces, DT)
+
+
+def refused(model, record):
+    return {finding.name for finding in audit(model, record, DT) if not finding.holds}
+
+
+def test_a_heavy_disc_that_comes_down_as_fast_as_the_floor_gains_energy_by_law():
+    """Seen from the floor it stands still, and the light disc goes up: struck, that stays, and the heavy one leaves.
+
+    With e times .25 m/s: 28 mJ after 3 mJ before. It was refused for that.
+    """
+    model = landing(0.25, 0.25)
+    record, _ = run(model)
+    assert record.twist[-1, 1:, 1] == pytest.approx([-0.25, -0.25 + 0.25 * E], rel=1e-12)
+    before, after = LIGHT * 0.25**2, HEAVY * (0.25 * E) ** 2
+    assert after > 5.0 * before
+    assert refused(model, record) == set()
+
+
+def test_what_leaves_faster_than_its_law_says_is_refused_all_the_same():
+    record, _ = run(landing(0.25, 0.25, E + 1e-6))
+    assert "normal" in refused(landing(0.25, 0.25), record)
+
+
+@pytest.mark.parametrize(
+    ("sinks", "falls", "e", "friction", "may"),
+    [
+        (0.25, 0.25, E, 0.0, True),
+        (0.25, 0.25, 0.0, 0.0, False),  # nothing rebounds
+        (0.0, 0.25, E, 0.0, False),  # nothing parts
+        (-0.1, 0.25, E, 0.0, False),  # all approach
+        (0.0, 0.25, E, 0.5, True),  # Kane's
+    ],
+)
+def test_only_what_rebounds_beside_what_parts_or_rubs_may_gain(sinks, falls, e, friction, may):
+    record, judged = run(landing(sinks, falls, e, friction))
+    first = record.pieces.kind == 1
+    assert first.any() and energy._may_gain(judged)[first].tolist() == [may] * int(first.sum())
+    assert refused(judged.model, record) == set()
+
+
+def test_what_may_not_gain_and_does_is_refused():
+    """The heavy disc leaves ten times as fast as it came: no law, and energy from nowhere."""
+    model = landing(0.0, 0.25)
+    record, _ = run(model)
+    pieces, after = record.pieces, record.pieces.twist_after.copy()
+    hit = np.flatnonzero(np.repeat(pieces.kind == 1, np.diff(pieces.first_body)) & (pieces.body == 2))
+    after[hit] *= 1.0 + 10.0 / E  # from .3 of the speed to more than it had
+    assert "gained" in refused(model, replace(record, pieces=replace(pieces, twist_after=after)))
