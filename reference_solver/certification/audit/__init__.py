@@ -126,13 +126,18 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
         ]
 
 
-def ends_of_series(model: Model, record: Record, dt: float) -> np.ndarray:
-    """Return when (k,) a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile [s]."""
+def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return when a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile.
+
+    Times (k,) [s]; what is left out there (k,) [m]; and what that goes on by (k,) [m/s] (`left_out_by_series`).
+    """
     if record.pieces is None:
         raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
     run = Run(model, record.pieces, dt)
-    found: np.ndarray = record.pieces.begin[np.unique(run.contact_owner[contact.ends_of_series(run)])]
-    return found
+    ends = contact.ends_of_series(run)
+    which, place = np.unique(run.contact_owner[ends], return_inverse=True)
+    sums = [np.bincount(place, part[ends], len(which)) for part in contact.left_out_by_series(run, ends)]
+    return record.pieces.begin[which], sums[0], sums[1]
 
 
 def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:

@@ -55,6 +55,55 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
     return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
 
 
+def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """What (c,) the rebounds move that each of ``ends`` leaves out [m], and how fast that goes on [m/s].
+
+    Of speed u and first flight T they make the way ``s = u T/(1 - e)``. Friction a, which comes in blows instead of all
+    along, moves bodies by ``a T^2/(2 (1 - e^2))`` meanwhile, and a row that turns at the rate w has velocities off by
+    w s (E22): where it is hit, and up to ``m r^2/I`` times that a reach r from the centre. What holds the contact
+    afterwards brings it back, ``T = 2 u/g_n``; a series lasts a step at most.
+    """
+    pieces, a, b, n = run.pieces, run.pieces.body_a, run.pieces.body_b, run.pieces.normal
+    sides = (run.side[0], a), (run.side[1], b)
+    first, second = (run.velocity_at(row, body, pieces.point, after=False) for row, body in sides)
+    e, approach = run.model.restitution[a, b], ((second - first) * n).sum(axis=1)
+    leaves = np.where(ends, e * np.maximum(-approach, 0.0), 0.0)
+    slows, rubs = np.zeros(len(leaves)), np.zeros(len(leaves))
+    for j in np.flatnonzero(leaves > 0.0):
+        held, rubs[j] = _held_by(run, int(j), -approach[j])
+        slows[j] = max(1.0 - e[j], 0.0) * held
+    lasts = 2.0 * leaves / np.maximum(slows, 2.0 * leaves / run.dt + np.finfo(float).tiny)
+    way = leaves * lasts
+    spins = [np.where(row >= 0, np.linalg.norm(pieces.twist_before[row, run.d :], axis=1), 0.0) for row in run.side]
+    far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
+    way *= 1.0 + np.maximum(far[a], far[b])
+    return rubs * way / (1.0 + e), np.maximum(*spins) * way
+
+
+def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
+    """Return the acceleration [m/s^2] at which the pair of contact j is held after an impact, and its friction's share.
+
+    By what it takes to hold the pair, of which ``stopped`` [m/s] took the impulse of the impact; 0 and mu where the
+    phase after it is not told.
+    """
+    pieces, mu = run.pieces, float(run.model.friction[run.pieces.body_a[j], run.pieces.body_b[j]])
+
+    def impulses(piece: int) -> tuple[float, float]:
+        own = slice(pieces.first_contact[piece], pieces.first_contact[piece + 1])
+        same = (pieces.body_a[own] == pieces.body_a[j]) & (pieces.body_b[own] == pieces.body_b[j])
+        p, n = pieces.impulse[own][same], pieces.normal[own][same]
+        pressed = (p * n).sum(axis=1)
+        return float(pressed.sum()), float(np.linalg.norm(p - pressed[:, None] * n, axis=1).sum())
+
+    after = int(run.contact_owner[j]) + 1
+    if after >= len(pieces) or not run.is_forces[after] or pieces.length[after] <= 0.0:
+        return 0.0, mu
+    (blow, _), (pressed, rubbed) = impulses(after - 1), impulses(after)
+    if blow <= 0.0 or pressed <= 0.0:
+        return 0.0, mu
+    return pressed / float(pieces.length[after]) * stopped / blow, rubbed / pressed
+
+
 def _laws(run: Run) -> Iterator[float]:
     pieces = run.pieces
     row_a, row_b = run.side

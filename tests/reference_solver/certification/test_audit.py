@@ -18,7 +18,7 @@ from reference_solver.certification.audit.run import Run
 from reference_solver.certification.fuzz.scenes import STRIDE, scene
 from reference_solver.certification.geometry import rotation
 from reference_solver.certification.truth import certify, distance
-from reference_solver.pieces import FIFTH_ORDER
+from reference_solver.pieces import FIFTH_ORDER, IMPACT
 
 DT, G = 1.0 / 240.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -308,9 +308,42 @@ class TestTruth:
         model = planar(floor(), box, restitution=0.45, friction=0.8)
         certificate = certify(model, Settings.reference(DT), 144)
         record = Simulation(model, Settings.reference(DT)).record(144, pieces=True)
-        ends = ends_of_series(model, record, DT)
+        ends, _, _ = ends_of_series(model, record, DT)
         left_out = 0.27e-11 * (1.0 + (certificate.t[-1] - ends) / DT / 100.0)
         assert len(ends) and certificate.error[-1] > left_out.sum()
+
+    def test_what_an_end_leaves_out_goes_by_the_speed_that_it_holds(self):
+        """A box that lands flat on a slope: of its last rebound u each corner leaves out ``a T^2/(2 (1 - e^2))``.
+
+        So far for what is hit; a corner may move by m r^2/I times that as well.
+        """
+        e, mu, tilt = 0.5, 0.3, 0.5
+        gravity = (9.81 * math.sin(tilt), -9.81 * math.cos(tilt))
+        for rubs in (mu, 0.0):
+            box = Body(Box((0.3, 0.2)), 2.0, 0.09, (0.0, 0.3, 0.0))
+            model = Model(2, [floor(), box], gravity, e, rubs)
+            record = Simulation(model, Settings.reference(DT)).record(240, pieces=True)
+            ends, at_once, onward = ends_of_series(model, record, DT)
+            pieces = record.pieces
+            last = np.flatnonzero((pieces.begin == ends[0]) & (pieces.kind == IMPACT))[0]
+            rows = slice(pieces.first_body[last], pieces.first_body[last + 1])
+            u = -e * pieces.twist_before[rows][pieces.body[rows] == 1][0, 1]
+            flight, friction = 2.0 * u / -gravity[1], rubs * -gravity[1]
+            assert u > 0.0
+            each = friction * flight**2 / (2.0 * (1.0 - e * e)) * (1.0 + 2.0 * (0.3**2 + 0.2**2) / 0.09)
+            assert at_once[0] == pytest.approx(2.0 * each, rel=1e-6, abs=1e-30)
+            assert onward[0] == pytest.approx(0.0, abs=1e-20)  # it does not turn
+
+    def test_an_end_that_leaves_out_more_than_its_law_allows_counts_with_that(self, monkeypatch):
+        """A series that was ended too early is as far off with other steps; the record tells of it."""
+        model = planar(floor(), disc(0.0, 1.5), restitution=0.8)
+        monkeypatch.setattr(
+            "reference_solver.certification.truth.ends_of_series",
+            lambda model, record, dt: (np.array([0.1]), np.array([1e-7]), np.array([1e-5])),
+        )
+        certificate = certify(model, Settings.reference(DT), 60)
+        assert certificate.error[-1] == pytest.approx(1e-7 + 1e-5 * (60 * DT - 0.1), rel=1e-3)
+        assert certificate.error[10] < 1e-9
 
     def test_what_is_off_only_for_a_while_counts(self):
         """A box that topples off another's edge: off by 6e-11 m as it falls, and no more once it lies (seed 15)."""
