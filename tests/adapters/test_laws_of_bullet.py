@@ -72,8 +72,13 @@ def test_a_belt_takes_a_box_to_its_own_speed_and_no_further(dimension):
     assert value == motion.twist[-1, 1, 0] and band == 6.0 * RESIDUAL_SPEED / scene.duration
     assert np.array_equal(motion.pose[:, 0], [belt.pose] * len(motion.t)) and not motion.twist[:, 0].any()
     assert pulled_with_drag(scene, DT, lambda *asked: {"pull": (None, "it stands")}) is None
-    for other in (replace(scene, gravity=(1.0, *scene.gravity[1:])), replace(scene, bodies=(*scene.bodies, replace(box, name="other"))),
-                  replace(scene, bodies=(replace(belt, surface_velocity=(0.0,) * dimension), box))):  # fmt: skip
+    still = replace(belt, surface_velocity=(0.0,) * dimension)
+    others = (
+        replace(scene, gravity=(1.0, *scene.gravity[1:])),
+        replace(scene, bodies=(*scene.bodies, replace(box, name="other"))),
+        replace(scene, bodies=(still, box)),
+    )
+    for other in others:
         assert pulled_with_drag(other, DT, measure) is None
     fast = replace(belt, surface_velocity=tuple(1e4 * each for each in belt.surface_velocity))
     assert pulled_with_drag(replace(scene, bodies=(fast, box)), DT, measure) is None
