@@ -21,21 +21,6 @@ def few_worlds(monkeypatch):
     monkeypatch.setattr(worlds, "BUILDS", 100)
 
 
-@pytest.mark.usefixtures("few_worlds")
-def test_a_fault_that_no_receipt_sees_is_found(toy):
-    found = failing(check_adapter(toy("world shared with another")))
-    assert "fresh" in found
-    assert not [name for name in found if name.startswith("receipt")]
-
-
-@pytest.mark.usefixtures("few_worlds")
-def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
-    found = failing(check_adapter(toy("impulse of the wrong body")))
-    assert "impulse" in found
-    receipts = {name for name in found if name.startswith("receipt")}
-    assert receipts == {"receipt impulse"}
-
-
 def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
     class Idle(toy_class):
         def refuses(self, scene, profile):
@@ -125,3 +110,18 @@ def test_our_adapters_conform(name):
     assert [str(finding) for finding in findings if not finding.holds] == []
     if found.facts.profile("solution"):
         assert {finding.status for finding in findings} == {"ok"} and not found.engine.expected
+
+
+@pytest.mark.usefixtures("few_worlds")
+def test_a_fault_that_no_receipt_sees_is_found(toy):
+    found = failing(check_adapter(toy("world shared with another")))
+    assert "fresh" in found
+    assert not [name for name in found if name.startswith("receipt")]
+
+
+@pytest.mark.usefixtures("few_worlds")
+def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
+    found = failing(check_adapter(toy("impulse of the wrong body")))
+    assert "impulse" in found
+    receipts = {name for name in found if name.startswith("receipt")}
+    assert receipts == {"receipt impulse"}
