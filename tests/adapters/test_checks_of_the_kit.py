@@ -110,7 +110,9 @@ def test_a_check_whose_scenes_are_all_refused_is_not_asked_and_says_why(check):
             super().refuses(scene, profile)
             return f"not today, {scene.name}"
 
-    with pytest.raises(NotAsked, match="" if check == "capabilities" else "^first: not today, check_"):
+    with pytest.raises(
+        NotAsked, match="^every scene is refused" if check == "capabilities" else "^first: not today, check_"
+    ):
         CHECKS[check](Idle())
 
 
