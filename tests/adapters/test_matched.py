@@ -298,3 +298,28 @@ def test_a_running_surface_carries_a_box_up_to_its_speed_by_coulombs_law() -> No
     found = drive(scene_of(belt, slab(), mu=0.3, g=DOWN, T=0.5))
     speeds = np.minimum(1.0, 0.3 * G * found.t)
     assert np.abs(found.twist[:, 1, 0] - speeds).max() <= SUMS and np.abs(found.pose[:, 1, 2] - 0.1).max() <= SUMS
+
+
+def test_steps_of_which_the_rounds_do_not_settle_are_counted_and_said(monkeypatch):
+    """Where they run out they may miss what they end at; where they end before, a thousandth."""
+    from adapters.mujoco import matched
+
+    scene = scene_of(FLOOR, ball("ball", 0.0, 0.0, 0.5))
+    answers = iter([(2, 0.0), (9, 1e-6), (5, 0.9 * SETTLED), (7, 1.1 * SETTLED), (5, math.nan)])
+    monkeypatch.setattr(matched, "matched_step2", lambda *asked: next(answers))
+    monkeypatch.setattr(matched, "by_geoms", lambda model, rows: {})
+    own = settings(scene)
+    made = matched.Matched(None, scene, own | {"rounds": 9, "agreed": 1e-5}, None, None)
+    for unsolved, most, apart in ((0, 2, 0.0), (0, 9, 1e-6), (0, 9, 0.9 * SETTLED), (1, 9, 1.1 * SETTLED)):
+        made.step2()
+        assert (made.unsolved, made.most, made.apart) == (unsolved, most, apart)
+    assert made.told()["reasons"] == ["in 1 step the shifts of references do not settle: 0.0011 apart"]
+    made.step2()
+    told = made.told()
+    assert told["certified"] is False and told["rounds"] == 9 and told["shifts_apart"] == made.apart
+    assert told["reasons"][0].startswith("in 2 steps the shifts of references do not settle: ")
+    fine = matched.Matched(None, scene, own | {"rounds": 9, "agreed": 1e-7}, None, None)
+    assert fine.told() == {"rounds": 0, "shifts_apart": 0.0}
+    monkeypatch.setattr(matched, "matched_step2", lambda *asked: (9, 1e-6))
+    fine.step2()
+    assert fine.unsolved == 1  # all rounds are made, and more is missed than they end at

@@ -19,6 +19,29 @@ def make(tmp_path, name):
     return CliRunner().invoke(main, ["new-adapter", name, "--into", str(tmp_path)])
 
 
+def test_a_folder_below_one_that_is_not_there_is_made(tmp_path):
+    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path / "far" / "away")])
+    assert done.exit_code == 0 and (tmp_path / "far/away/mine/tests/test_conformance.py").is_file()
+
+
+def test_json_names_the_files_that_were_written(tmp_path):
+    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path), "--json"])
+    told = json.loads(done.output)
+    assert told["name"] == "mine" and [Path(file).is_file() for file in told["files"]] == [True] * 3
+
+
+@pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "a" * 200])
+def test_a_name_that_cannot_be_one_is_refused_in_one_line(tmp_path, name):
+    done = make(tmp_path, name)
+    assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_there_is_left_alone(tmp_path):
+    (tmp_path / "mine").mkdir()
+    done = make(tmp_path, "mine")
+    assert done.exit_code == 2 and "is there already" in done.output and not list((tmp_path / "mine").iterdir())
+
+
 def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     """Its own test runs the kit; then the command finds the engine by the entry point of its pyproject."""
     done = make(tmp_path, "my_discs")
@@ -46,26 +69,3 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     assert ran.returncode == 0 and "my_discs/plain" in ran.stdout and "Every row that is judged passes" in ran.stdout, (
         ran.stderr
     )
-
-
-def test_a_folder_below_one_that_is_not_there_is_made(tmp_path):
-    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path / "far" / "away")])
-    assert done.exit_code == 0 and (tmp_path / "far/away/mine/tests/test_conformance.py").is_file()
-
-
-def test_json_names_the_files_that_were_written(tmp_path):
-    done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path), "--json"])
-    told = json.loads(done.output)
-    assert told["name"] == "mine" and [Path(file).is_file() for file in told["files"]] == [True] * 3
-
-
-@pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "a" * 200])
-def test_a_name_that_cannot_be_one_is_refused_in_one_line(tmp_path, name):
-    done = make(tmp_path, name)
-    assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
-
-
-def test_a_folder_that_is_there_is_left_alone(tmp_path):
-    (tmp_path / "mine").mkdir()
-    done = make(tmp_path, "mine")
-    assert done.exit_code == 2 and "is there already" in done.output and not list((tmp_path / "mine").iterdir())

@@ -26,19 +26,6 @@ def test_healthy_toy_passes(toy, name):
     assert self_test.broken(toy(), name) == ""
 
 
-@pytest.mark.parametrize(("fault", "size"), PLANTED)
-def test_planted_fault_is_caught(fault, size):
-    assert self_test.broken(Spoilt(fault, size), FAULTS[fault].check)
-
-
-def test_worlds_that_are_never_freed_are_seen_in_a_heap_full_of_holes():
-    """Blocks of 3 kB fit between blocks that stay: twice a thousand worlds then take no page more."""
-    blocks = [bytes(3_100) for _ in range(8_000)]
-    del blocks[::2]
-    assert self_test.broken(Spoilt("worlds that are never freed", 3e3), "memory")
-    assert len(blocks) == 4_000
-
-
 def test_every_check_and_receipt_has_a_fault_and_at_least_25_have_three_sizes():
     named = {fault.check for fault in FAULTS.values()}
     # Which packages lie on the path is no matter of an adapter.
@@ -125,3 +112,8 @@ def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
 def test_a_fault_of_no_size_is_none(fault):
     """What is planted is as large as it says: with nothing of it the toy is healthy again."""
     assert self_test.broken(Spoilt(fault, 0.0), FAULTS[fault].check) == ""
+
+
+@pytest.mark.parametrize(("fault", "size"), PLANTED)
+def test_planted_fault_is_caught(fault, size):
+    assert self_test.broken(Spoilt(fault, size), FAULTS[fault].check)

@@ -273,27 +273,6 @@ def test_bands_of_an_engine_in_single_precision():
     assert slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + round_off)
 
 
-def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
-    told = {"linear_damping": Declared(0.04, 0.01), "angular_damping": Declared(0.2, 0.0)}
-    slips = by_quantity(receipts(declaring(**told), "default", IMPACT, DT))
-    window = 8 * DT  # at up to 1.3 m/s, and drag may grow with the square of a speed above 1 m/s
-    fastest = 9.81 * window
-    share = rate(0.05) * window * fastest
-    assert slips["gravity"].band == slips["mass"].band == pytest.approx(share + 1e-12)
-    assert slips["inertia"].band == pytest.approx(rate(0.2) * window * fastest + 1e-12)
-    assert slips["sampling"].band == pytest.approx(8 * share + 1e-12)
-    assert slips["impulse"].band == pytest.approx(rate(0.05) * 12 * DT + 1e-6)  # 5.5 steps down, 5.5 up, one of contact
-    assert slips["gravity"].because == "exact but for round-off; and declared drag"
-    assert slips["turn"].band == 0.0 and slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + 1e-12)
-    for untouched in ("step", "restitution"):
-        assert (slips[untouched].band, slips[untouched].because) == (1e-12, "exact but for round-off")
-    assert slips["friction"].band == slips["friction_impulse"].band == 0.5e-4 + 1e-12
-    for damping in ("linear_damping", "angular_damping"):
-        assert slips[damping].band == told[damping].band
-    finer = by_quantity(receipts(declaring(**told), "default", IMPACT, 1 / 960))
-    assert finer["gravity"].band == pytest.approx(rate(0.05) * 8 / 960 + 1e-12)  # slower than 1 m/s: not less than 1
-
-
 def test_drag_of_one_kind_widens_nothing_that_the_other_kind_slows():
     slips = by_quantity(receipts(declaring(angular_damping=Declared(0.2, 0.0)), "default", IMPACT, DT))
     assert slips["gravity"].band == slips["linear_damping"].band == 1e-12 < slips["inertia"].band
@@ -491,3 +470,24 @@ def test_what_is_told_of_one_sweep_says_what_else_it_may_cost():
     assert found.value == 1.0 and found.band == pytest.approx(0.01 + LANDING_SPEED * case.dt / HALF_EXTENTS[0])
     assert found.because == "a landing; 1 iteration was asked for: a step of motion more"
     assert _starved("size", told, case, 2, False) == told
+
+
+def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
+    told = {"linear_damping": Declared(0.04, 0.01), "angular_damping": Declared(0.2, 0.0)}
+    slips = by_quantity(receipts(declaring(**told), "default", IMPACT, DT))
+    window = 8 * DT  # at up to 1.3 m/s, and drag may grow with the square of a speed above 1 m/s
+    fastest = 9.81 * window
+    share = rate(0.05) * window * fastest
+    assert slips["gravity"].band == slips["mass"].band == pytest.approx(share + 1e-12)
+    assert slips["inertia"].band == pytest.approx(rate(0.2) * window * fastest + 1e-12)
+    assert slips["sampling"].band == pytest.approx(8 * share + 1e-12)
+    assert slips["impulse"].band == pytest.approx(rate(0.05) * 12 * DT + 1e-6)  # 5.5 steps down, 5.5 up, one of contact
+    assert slips["gravity"].because == "exact but for round-off; and declared drag"
+    assert slips["turn"].band == 0.0 and slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + 1e-12)
+    for untouched in ("step", "restitution"):
+        assert (slips[untouched].band, slips[untouched].because) == (1e-12, "exact but for round-off")
+    assert slips["friction"].band == slips["friction_impulse"].band == 0.5e-4 + 1e-12
+    for damping in ("linear_damping", "angular_damping"):
+        assert slips[damping].band == told[damping].band
+    finer = by_quantity(receipts(declaring(**told), "default", IMPACT, 1 / 960))
+    assert finer["gravity"].band == pytest.approx(rate(0.05) * 8 / 960 + 1e-12)  # slower than 1 m/s: not less than 1

@@ -90,49 +90,10 @@ def test_our_engines_come_first_and_others_by_name(plugins: None) -> None:
     assert names == sorted(names) and len(names) == 12  # an engine of others under a name of ours is none of ours
 
 
-def test_whatever_is_wrong_with_an_engine_it_is_found_under_its_name_and_one_without_reason_is_there(plugins) -> None:
-    for found in map(registry.find, registry.names()):
-        assert (found.engine is None) == bool(found.reason), found
-    assert [registry.find(name).name for name in registry.names()] == registry.names()
-    # So it is where it is loaded here, as in the process that is asked about it.
-    for name in registry.names():
-        here = registry.loaded(registry.entry(name))
-        assert (here.name, here.engine is None) == (name, registry.find(name).engine is None)
-    listed = {entry["name"]: entry for entry in engines()}
-    assert list(listed) == registry.names()
-    for name, entry in listed.items():
-        there = registry.find(name).engine is not None
-        assert entry["status"] == ("installed" if there else "not installed") and bool(entry["reason"]) is not there
-    assert {entry["status"] for entry in listed.values()} == {"installed", "not installed"}
-
-
 def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
     found = registry.find("healthy")
     assert found.engine is not None and (found.version, found.reason) == ("1.2", "")
     assert registry.load("healthy").version() == "1.2"
-
-
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("missing_package", "package_that_is_not_there"),
-        ("broken_version", "ZeroDivisionError: first line"),
-        ("broken_init", "RuntimeError: cannot start"),
-        ("not_an_engine", "tests_plugins:NotAnEngine is not an adapters.Engine"),
-        ("leaves", "SystemExit: left the process"),
-        ("no_module", "tests_plugin_nowhere"),
-        ("no_class", "Nowhere"),
-        ("syntax", "SyntaxError"),
-        ("two_lines", "two; it is an engine of another distribution"),
-    ],
-)
-def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: None, name: str, reason: str) -> None:
-    found = registry.find(name)
-    assert found.engine is None and found.version == ""
-    assert reason in found.reason and "\n" not in found.reason
-    with pytest.raises(EngineError, match=f"^engine: {name} is not installed"):
-        registry.load(name)
-    assert registry.find("healthy").engine is not None
 
 
 def test_a_missing_package_of_others_comes_with_its_own_pip_line_and_no_extra_of_ours(plugins: None) -> None:
@@ -253,3 +214,42 @@ def test_every_setting_has_one_name_a_reason_and_a_source_that_are_words(name: s
             for setting in settings:
                 assert isinstance(setting.because, str) and isinstance(setting.source, str), setting
                 assert setting.because and setting.name.isidentifier(), setting
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("missing_package", "package_that_is_not_there"),
+        ("broken_version", "ZeroDivisionError: first line"),
+        ("broken_init", "RuntimeError: cannot start"),
+        ("not_an_engine", "tests_plugins:NotAnEngine is not an adapters.Engine"),
+        ("leaves", "SystemExit: left the process"),
+        ("no_module", "tests_plugin_nowhere"),
+        ("no_class", "Nowhere"),
+        ("syntax", "SyntaxError"),
+        ("two_lines", "two; it is an engine of another distribution"),
+    ],
+)
+def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: None, name: str, reason: str) -> None:
+    found = registry.find(name)
+    assert found.engine is None and found.version == ""
+    assert reason in found.reason and "\n" not in found.reason
+    with pytest.raises(EngineError, match=f"^engine: {name} is not installed"):
+        registry.load(name)
+    assert registry.find("healthy").engine is not None
+
+
+def test_whatever_is_wrong_with_an_engine_it_is_found_under_its_name_and_one_without_reason_is_there(plugins) -> None:
+    for found in map(registry.find, registry.names()):
+        assert (found.engine is None) == bool(found.reason), found
+    assert [registry.find(name).name for name in registry.names()] == registry.names()
+    # So it is where it is loaded here, as in the process that is asked about it.
+    for name in registry.names():
+        here = registry.loaded(registry.entry(name))
+        assert (here.name, here.engine is None) == (name, registry.find(name).engine is None)
+    listed = {entry["name"]: entry for entry in engines()}
+    assert list(listed) == registry.names()
+    for name, entry in listed.items():
+        there = registry.find(name).engine is not None
+        assert entry["status"] == ("installed" if there else "not installed") and bool(entry["reason"]) is not there
+    assert {entry["status"] for entry in listed.values()} == {"installed", "not installed"}

@@ -50,7 +50,7 @@ class Drawn:
 
 #: What a mutant meets that is drawn today.
 MEETS = (
-    f"the tests that reach its statements, the cheapest case of each first, its file's fixtures counted, "
+    f"the tests that reach its statements, the cheapest first, its file's fixtures and each earlier case counted, "
     f"for up to {SPENT:g} s of CPU, of those "
     f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
     f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"

@@ -4,7 +4,7 @@
 
 `SUBJECTS` is a choice of modules, each with its own tests. This asks without a choice: each mutant of any module is as
 likely as any other. A drawn one stands alone in the module's source, in a copy of the checkout; the tests that reach
-its statements (`reach`) run, the cheapest case of each first, until one fails or what a mutant may cost is spent; then
+its statements (`reach`) run, the cheapest first (`in_turn`), until one fails or what a mutant may cost is spent; then
 the rest of a test file whose record ended before it did. It *survived* if none failed, for whatever reason: what it may
 cost was spent, or no test is known to reach it. So the share that is killed is a lower bound. A kill counts only if the
 test that failed passes in the copy without a mutant.
@@ -59,6 +59,8 @@ from subjects import PACKAGES, ROOT
 
 #: Seconds of wall time that a whole file may take: what its tests start in processes of their own counts nowhere else.
 PATIENCE_WITH_FILES = 120.0
+#: What the clock of a process tells at the least, a hundredth of a second: a test of nothing costs something.
+TICK = 0.01
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
 #: Package -> the kept tables that hold something of most that it does.
@@ -284,17 +286,21 @@ def reaching(reach: Reach, before: str, after: str, module: str, function: str) 
 
 
 def in_turn(tests: dict[str, float], shared: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Tests in the order in which they are asked: the cheapest case of each first, for different ones see more.
+    """Tests in the order in which they are asked: the cheapest first, for more of them see more.
+
+    A test's further cases see much what its first one has: the n-th of them counts n times its seconds, so that dear
+    first cases of tests beside the matter leave room for the case of one engine among ten that costs nothing.
 
     ``shared`` are the seconds of CPU that a test file takes before its first test, and count as those of each of its
     tests: else two files whose tests cost nothing once a page is made fill all the time that there is for fixtures,
     and no test beside the code is asked.
     """
-    met, place = Counter[str](), dict[str, tuple[int, float, str]]()
+    met, place = Counter[str](), dict[str, tuple[float, int, str]]()
     costs = {test: seconds + shared[test.partition("::")[0]] for test, seconds in tests.items()}
     for test, seconds in sorted(costs.items(), key=lambda item: (item[1], item[0])):
         name = test.partition("[")[0]
-        place[test], met[name] = (met[name], seconds, test), met[name] + 1
+        place[test] = (met[name] + 1) * max(seconds, TICK), met[name], test
+        met[name] += 1
     return sorted(tests.items(), key=lambda item: place[item[0]])
 
 

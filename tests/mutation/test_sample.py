@@ -77,5 +77,12 @@ def test_a_test_beside_the_code_is_asked_before_one_that_costs_nothing_once_a_pa
         "unit.py::test_z": 1,
     }
     order = [test for test, _ in sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})]
-    assert order == ["unit.py::test_sum[a]", "unit.py::test_z", "page.py::test_words", "unit.py::test_sum[b]"]
+    assert order == ["unit.py::test_sum[a]", "unit.py::test_sum[b]", "unit.py::test_z", "page.py::test_words"]
     assert dict(sample.in_turn(tests, {"page.py": 15.0, "unit.py": 0.2})) == tests
+
+
+def test_a_cheap_case_of_many_is_asked_before_dear_tests_and_no_test_fills_the_time_with_its_cases(imported):
+    sample = imported("sample")
+    tests = {f"cases.py::test_each[{k:03}]": 0.0 for k in range(500)} | {"one.py::test_long": 2.0}
+    order = [test for test, _ in sample.in_turn(tests, {"cases.py": 0.0, "one.py": 0.0})]
+    assert order.index("one.py::test_long") == 199  # the 200th case of a hundredth of a second counts as its two

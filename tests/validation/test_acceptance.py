@@ -565,3 +565,78 @@ def test_a_study_has_no_scatter_and_the_least_of_bands():
 def test_which_rows_are_run_again_from_moved_starts(fields, moved):
     row = row_of(**{"floor": None, **fields})
     assert bool(slots_to_move([row], row.engine)) is moved
+
+
+def test_which_bands_are_of_sixteen_starts_and_which_of_four():
+    """Twelve to sixteen moved starts that left a value; what nobody asked for, more of them, is a half width again."""
+    truth, all_of = 0.0, (*TWO_WAYS, 2.5)
+    for number in range(2, 19):
+        draws = all_of[:number]
+        row, (value, width, diverged, ends) = wide(draws)
+        assert (value, diverged) == (3.0, False)
+        if 13 <= number <= 17:
+            assert width == 0.0 and ends == acceptance._ends(row, draws) == acceptance.one_more(draws, truth)
+        else:
+            assert ends is None and acceptance._ends(row, draws) == (3.0 - width, 3.0 + width)
+
+
+@pytest.mark.parametrize(
+    ("draws", "floor", "scatter"),
+    [
+        ((), 0.25, 0.25), ((2.0,), 0.25, 0.25), ((2.0,), None, 0.0),
+        ((2.0, 2.5), 0.25, 0.5), ((2.0, 2.0), 0.25, 0.0), ((2.0, 1.0, 2.5), None, 1.0),
+        ((2.0, 2.0, 2.0, 2.0, 2.125, 9.0), 0.25, 0.125),  # the sixth was moved further, for another row
+    ],
+)  # fmt: skip
+def test_half_a_width_is_four_times_what_four_moves_change_or_the_floor_that_is_known(draws, floor, scatter):
+    row = row_of(value=2.0, truth=1.0, tolerance=0.0, floor=floor)
+    assert acceptance._width(row, draws) == max(4.0 * scatter, 2e-6)
+
+
+def test_values_and_tolerances_of_nothing_are_nothing():
+    """A law that is exact has a tolerance of 0, and what stands still a value of 0: no band is made of either."""
+    still = row_of(value=0.0, truth=1.0, tolerance=0.0, floor=0.0)
+    assert acceptance._width(still, ()) == 0.0 and acceptance._ends(still, (0.0,)) == (0.0, 0.0)
+    draws = (0.0,) * 17
+    assert acceptance._ends(still, draws) == pytest.approx((0.0, 0.0), abs=1e-12)
+    tolerant = row_of(value=0.0, truth=1.0, tolerance=0.5, floor=0.0)
+    assert acceptance._ends(tolerant, draws) == pytest.approx((-0.005, 0.005), abs=1e-12)
+
+
+def test_what_is_no_number_is_no_draw():
+    for value in (None, math.nan, math.inf):
+        seen = [observed(SLOT, creep=0.5), observed(replace(SLOT, ulp=1), creep=value)]
+        assert acceptance.draws_of(seen) == {KEY: (0.5,)}
+
+
+def test_distances_are_from_the_truth_wherever_that_is():
+    near, far = acceptance.one_more(TWO_WAYS, 0.0)
+    for shift in (-10.0, 10.0):
+        moved = tuple(each + shift for each in TWO_WAYS)
+        assert acceptance.one_more(moved, shift) == pytest.approx((near + shift, far + shift))
+    assert acceptance.one_more((3.0, *(0.0, 1.0) * 8), 0.0)[0] < 0.0  # what lies on the truth has no logarithm
+    row = row_of(truth=10.0, tolerance=0.1, value=11.0, physics="fail")
+    assert acceptance.hides(row, (10.3, 12.0)) and not acceptance.hides(row, (10.4, 12.0))
+    assert not acceptance.hides(row, (10.9, 11.1)) and acceptance.hides(row, (9.0, 11.0))
+    for missing in ("value", "truth", "tolerance"):
+        assert not acceptance.hides(replace(row, **{missing: None}), (10.3, 12.0))
+    exact = row_of(truth=10.0, tolerance=0.1, value=10.0, physics="pass")
+    assert acceptance.hides(exact, (9.99, 10.01)) and not acceptance.hides(exact, (10.01, 10.02))
+
+
+def test_a_listed_value_of_nothing_has_a_band_about_nothing():
+    row = row_of(truth=0.4, tolerance=0.01, value=0.1, physics="fail")
+    found = Finding(FAMILY, 0.1, ends=(0.05, 0.2))
+    for band_of_it, asks in ((0.38, True), (0.2, False)):
+        change, old = acceptance.Change(FAMILY), Finding(FAMILY, 0.0, band_of_it)
+        acceptance._place(change, KEY, found, {KEY: old}, row)
+        assert (change.bands, change.same) == (({KEY: (old, found)}, {}) if asks else ({}, {KEY: old}))
+
+
+def test_rows_that_were_moved_further_or_of_which_no_draw_is_known_are_told_apart():
+    judged = rows(moved=0.2)
+    asked = [replace(SLOT, ulp=n) for n in acceptance.MORE_MOVES]
+    assert acceptance.slots_to_move_further(judged, "nameless", {}) == asked  # by the floor that they have
+    for number, more in ((5, asked), (6, [])):
+        draws = {KEY: (0.5, 0.5, 0.5, 0.4, 0.4, 0.5)[:number]}
+        assert acceptance.slots_to_move_further(judged, "nameless", draws) == more

@@ -445,3 +445,20 @@ def test_whose_findings_they_are_is_told_from_who_registered_the_engine(monkeypa
 def test_an_engine_that_is_no_folder_has_nowhere_to_keep_findings(monkeypatch):
     monkeypatch.setattr(files, "folder_of", lambda engine: None)
     assert files.findings_folder("nameless") is None
+
+
+@pytest.mark.parametrize(("band", "ends"), [("0.25..0.5", (0.25, 0.5)), ("0.5..0.75", (0.5, 0.75)), ("0.....75", None),
+                                            ("0...75", (0.0, 0.75))])  # fmt: skip
+def test_a_value_at_an_end_of_its_band_is_within_and_the_first_two_dots_part_the_ends(findings, band, ends):
+    folder = findings(FAMILY, HEAD + MEMBER.replace("1e-3", band))
+    if ends is None:
+        with pytest.raises(FindingsError, match="must be numbers"):
+            files.read("nameless", folder)
+        return
+    (found,) = files.read("nameless", folder).members.values()
+    assert found.ends == ends and found.holds(0.5)
+
+
+def test_an_end_is_as_short_as_the_whole_of_its_room_lets_it_be():
+    assert files._outwards(1.5, 1, 0.5) == "2" and files._outwards(-1.5, -1, 0.5) == "-2"
+    assert files._outwards(1.5, 1, 0.49) == "1.5"

@@ -344,3 +344,16 @@ def test_a_table_has_a_column_per_field_and_per_parameter():
 
 def test_no_rows_are_a_table_with_all_columns():
     assert list(frame([]).columns) == list(Row.__dataclass_fields__)
+
+
+def test_what_laws_have_said_ahead_is_not_asked_again_and_what_they_have_not_is(monkeypatch):
+    """Laws of thousands of rows are asked in processes side by side before the first row is made."""
+    scene = CATALOGUE["incline"].scene(3, {"ratio": 0.99})
+    monkeypatch.setattr(rows, "predictions", lambda slot, version, metric, scene: ["now", slot, version, metric])
+    asked = (SLOT, "1.2", "creep")
+    assert CHECK.metric == "creep" and rows._predictions(SEEN, scene, CHECK, {asked: ["ahead"]}) == ["ahead"]
+    assert rows._predictions(SEEN, scene, CHECK, {asked: []}) == []
+    assert rows._predictions(SEEN, scene, CHECK, {}) == ["now", *asked]
+    passing = replace(SEEN, metrics={"creep": (CHECK.truth, "")})
+    for silent in (passing, replace(SEEN, metrics={}), replace(SEEN, outcome=Outcome.CRASHED)):
+        assert rows._predictions(silent, scene, CHECK, {asked: ["ahead"]}) == []

@@ -1,0 +1,113 @@
+"""Memory that worlds leave behind: what the system tells of it, and that a leak is seen among free blocks."""
+
+import gc
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from listening import Listening
+
+from adapters.conformance import CHECKS, self_test, worlds
+from adapters.conformance.finding import NotAsked
+from adapters.conformance.spoilt import Spoilt
+
+MEGABYTE = 2**20
+
+
+def test_memory_that_grows_once_is_asked_again_and_what_no_system_tells_is_not_asked(toy, monkeypatch):
+    """An allocator takes a pool once; what leaks does so again."""
+
+    def growth(grown):
+        counts = iter(grown)
+        return lambda build: (build(1), next(counts))[1]
+
+    monkeypatch.setattr(worlds, "WARM", 1)
+    monkeypatch.setattr(worlds, "resident", lambda: 1e6)
+    for grown, leaks in (([0.0], False), ([2e9, 0.0], False), ([2e9, 1e9], True)):
+        monkeypatch.setattr(worlds, "_growth", growth(grown))
+        assert bool(CHECKS["memory"](toy())) == leaks
+    monkeypatch.setattr(worlds, "resident", lambda: None)
+    with pytest.raises(NotAsked, match="does not tell"):
+        CHECKS["memory"](toy())
+
+
+def test_worlds_are_built_stepped_and_closed_of_the_first_profile_and_the_warm_ones_do_not_count(monkeypatch):
+    told = []
+    monkeypatch.setattr(worlds, "WARM", 2)
+    monkeypatch.setattr(worlds, "BUILDS", 3)
+    engine = Listening()
+    monkeypatch.setattr(worlds, "_settled", lambda: (told.append(len(engine.built)), (0.0, 0.0))[1])
+    assert CHECKS["memory"](engine) == ""
+    assert told == [2, 5]
+    assert engine.worlds("first") == {"resting floor box 2": [1] * 5} and not engine.worlds("second")
+    assert all(world.closed == 1 for world in engine.built)
+
+
+def test_memory_is_what_grew_most_of_pages_and_heap_in_bytes_of_a_world(monkeypatch):
+    """Memory that an engine maps for itself shows in the pages alone, small blocks among others in the heap alone."""
+    for before, after, grown in (((5.0, 7.0), (8.0, 8.0), 3.0), ((5.0, 7.0), (6.0, 12.0), 5.0)):
+        states, asked = iter((before, after)), []
+        monkeypatch.setattr(worlds, "_settled", lambda states=states: next(states))
+        assert worlds._growth(asked.append) == grown
+        assert asked == [worlds.BUILDS]
+    monkeypatch.setattr(worlds, "WARM", 1)
+    for grown, said in (
+        (worlds.STEADY, ""),
+        (worlds.STEADY + worlds.BUILDS, "first: 1000 worlds leave 1050 bytes each"),
+    ):
+        monkeypatch.setattr(worlds, "_growth", lambda build, grown=grown: grown)
+        assert CHECKS["memory"](Listening()) == said
+
+
+def test_a_hundred_megabytes_that_are_taken_are_told_and_given_back():
+    """Of the system and of the heap alike: both are bytes, and count what this process holds."""
+    pytest.importorskip("resource")
+    if worlds.resident() is None or worlds.taken() is None:
+        pytest.skip("this system does not tell")
+    before = worlds._settled()
+    held = np.ones(100 * MEGABYTE // 8)
+    during = worlds._settled()
+    assert held[-1] == 1.0
+    del held
+    after = worlds._settled()
+    for k in (0, 1):
+        assert during[k] - before[k] == pytest.approx(100 * MEGABYTE, abs=20 * MEGABYTE)
+        assert during[k] - after[k] == pytest.approx(100 * MEGABYTE, abs=20 * MEGABYTE)
+    address_space = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    assert MEGABYTE < worlds.resident() < address_space
+
+
+def test_what_hangs_in_circles_is_freed_before_memory_is_looked_at():
+    class Link:
+        pass
+
+    gc.collect()
+    gc.disable()
+    try:
+        one, other = Link(), Link()
+        one.other, other.one, one.load = other, one, np.ones(50 * MEGABYTE // 8)
+        del one, other
+        before = worlds.taken() or 0.0
+        after = worlds._settled()[1]
+    finally:
+        gc.enable()
+    assert before - after > 40 * MEGABYTE or not before
+
+
+def test_a_system_that_tells_nothing_holds_nothing(monkeypatch):
+    def missing(*asked):
+        raise OSError("no such file")
+
+    monkeypatch.setattr(worlds.Path, "read_text", missing)
+    assert worlds.resident() is None
+    monkeypatch.setattr(worlds.ctypes, "CDLL", missing)
+    assert worlds.taken() is None and worlds._settled() == (0.0, 0.0)
+
+
+def test_worlds_that_are_never_freed_are_seen_in_a_heap_full_of_holes():
+    """Blocks of 3 kB fit between blocks that stay: twice a thousand worlds then take no page more."""
+    blocks = [bytes(3_100) for _ in range(8_000)]
+    del blocks[::2]
+    assert self_test.broken(Spoilt("worlds that are never freed", 3e3), "memory")
+    assert len(blocks) == 4_000

@@ -1,0 +1,224 @@
+"""What an engine says of itself: each fact that is wrong is named, and what it says is done and refused."""
+
+import importlib.util
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from listening import SWEEPS, Listening
+
+from adapters.conformance import CHECKS, statements
+from adapters.engine import EngineError, Scheme, Setting
+
+
+def engine_with(**changed):
+    """The listening toy with other facts."""
+    engine = Listening()
+    engine.facts = replace(Listening.facts, **changed)
+    return engine
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"name": ""}, "facts need a name and the package to install"),
+        ({"package": ""}, "facts need a name and the package to install"),
+        ({"dimensions": frozenset()}, "facts.dimensions: set() must be out of 2 and 3"),
+        ({"dimensions": frozenset({3, 4})}, "facts.dimensions: {3, 4} must be out of 2 and 3"),
+        ({"dimensions": frozenset({2})}, ""),
+        ({"scheme": Scheme("odd", 1.1)}, "scheme.position_offset: 1.1 must lie in [-1, 1]"),
+        ({"scheme": Scheme("odd", -1.1)}, "scheme.position_offset: -1.1 must lie in [-1, 1]"),
+        ({"scheme": Scheme("odd", math.nan)}, "scheme.position_offset: nan must lie in [-1, 1]"),
+        ({"scheme": Scheme("position first", -1)}, ""),
+        ({"profile_schemes": {"second": Scheme("odd", 2.0)}}, "scheme.position_offset: 2.0 must lie in [-1, 1]"),
+        ({"roles": {"first": "shipped", "second": "tuned"}}, ""),
+        ({"roles": {"third": "shipped"}}, "facts.roles: 'third' cannot be 'shipped': no such profile, or none of the"),
+        ({"roles": {"first": "best"}}, "facts.roles: 'first' cannot be 'best': no such profile, or none of the roles"),
+        ({"customary_dt": 0.0}, "facts.customary_dt: 0.0 must be a positive number of seconds"),
+        ({"customary_dt": -0.1}, "facts.customary_dt: -0.1 must be a positive number of seconds"),
+        ({"customary_dt": math.inf}, "facts.customary_dt: inf must be a positive number of seconds"),
+        ({"customary_dt": math.nan}, "facts.customary_dt: nan must be a positive number of seconds"),
+    ],
+)  # fmt: skip
+def test_a_fact_that_is_wrong_is_named(changed, said):
+    told = CHECKS["facts"](engine_with(**changed))
+    assert told.startswith(said) and bool(told) == bool(said)
+
+
+def test_facts_are_facts_and_a_version_is_a_word():
+    engine = Listening()
+    engine.facts = SimpleNamespace(**{name: getattr(Listening.facts, name) for name in ("name", "package")})
+    assert CHECKS["facts"](engine) == "facts need a name and the package to install"
+    for version in ("", None, 3):
+        engine = Listening()
+        engine.version = lambda version=version: version
+        assert CHECKS["facts"](engine) == "version() must say which"
+
+
+def rules(**profiles):
+    engine = Listening()
+    engine.profiles = profiles
+    return engine
+
+
+def test_profiles_are_there_say_the_same_each_time_and_why():
+    good = [Setting("iterations", 3, "a reason"), Setting("slop", 0.1, "another")]
+    assert CHECKS["profiles"](rules()) == "there is no profile"
+    assert CHECKS["profiles"](rules(one=lambda needs, dt: good)) == ""
+    calls = iter(range(1000))
+    told = CHECKS["profiles"](
+        rules(one=lambda needs, dt: good, two=lambda needs, dt: [Setting("n", next(calls), "so")])
+    )
+    assert told == "two: differs from call to call"
+    for wrong, said in (
+        ([*good, Setting("margin", 0.1, "")], "two: margin has no reason"),
+        ([*good, Setting("slop", 0.2, "so")], "two: slop is set twice"),
+    ):
+        assert CHECKS["profiles"](rules(one=lambda needs, dt: good, two=lambda needs, dt, own=wrong: own)) == said
+    with pytest.raises(TypeError, match="JSON"):
+        CHECKS["profiles"](rules(one=lambda needs, dt: [Setting("slop", {1, 2}, "a set is no data")]))
+
+
+@pytest.mark.parametrize("kind", ["rest", "impact"])
+def test_profiles_are_asked_for_needs_of_rest_and_of_impacts_in_each_dimension(kind):
+    for dimensions, asked in (({2, 3}, (2, 3)), ({2}, (2,))):
+        engine = engine_with(dimensions=frozenset(dimensions))
+        for dimension in (2, 3):
+
+            def rule(needs, dt, dimension=dimension):
+                wrong = needs.regime == kind and needs.dimension == dimension
+                return [Setting("iterations", 3, "" if wrong else "so")]
+
+            engine.profiles = {"one": rule}
+            assert bool(CHECKS["profiles"](engine)) is (dimension in asked)
+
+
+def test_numbers_that_are_none_are_tried_for_each_setting_of_a_profile():
+    """Counts below 1, and NaN for what is a number; a word has no such thing."""
+    tried = []
+
+    class Taking(Listening):
+        said: EngineError | None = EngineError("no")
+
+        def build(self, scene, dt, settings):
+            tried.append((dt, settings["iterations"], settings["slop"]))
+            if self.said:
+                raise self.said
+            return SimpleNamespace(close=lambda: closed.append(1))
+
+    engine, closed = Taking(), []
+    settings = [Setting("iterations", 3, "so"), Setting("slop", 0.1, "so"), Setting("cone", "round", "so")]
+    engine.profiles = {"first": lambda needs, dt: settings}
+    assert CHECKS["bad_numbers"](engine) == ""
+    steps = [(repr(dt), count, repr(slop)) for dt, count, slop in tried]
+    assert [step[0] for step in steps[:4]] == ["0.0", repr(-statements.DT), "nan", "inf"]
+    own = repr(statements.DT)
+    assert steps[4:] == [(own, 3, "nan"), (own, 0, "0.1"), (own, -1, "0.1")]
+    assert all(step[1:] == (3, "0.1") for step in steps[:4])
+    Taking.said = EngineError("no\nnever")
+    assert CHECKS["bad_numbers"](engine) == "first: a step of 0 s is refused in more than one line"
+    Taking.said = None
+    assert CHECKS["bad_numbers"](engine) == "first: a step of 0 s is accepted" and closed == [1]
+    engine.profiles = {"first": lambda needs, dt: [Setting("slop", 0.1, "so"), Setting("iterations", "many", "so")]}
+    Taking.said, before = EngineError("no"), len(tried)
+    assert CHECKS["bad_numbers"](engine) == ""
+    assert [count for _, count, _ in tried[before:]] == ["many"] * 5  # a count that is a word is no number to spoil
+
+
+def test_what_is_unknown_is_refused_with_an_error_of_engines():
+    class Lenient(Listening):
+        def settings(self, profile, needs, dt, iterations=None):
+            return [] if profile not in self.profiles else super().settings(profile, needs, dt, iterations)
+
+    assert CHECKS["refusals"](Lenient()) == "an unknown profile is accepted"
+
+    class Talking(Listening):
+        def settings(self, profile, needs, dt, iterations=None):
+            if profile not in self.profiles:
+                raise EngineError("there is none\nof that name")
+            return super().settings(profile, needs, dt, iterations)
+
+    assert CHECKS["refusals"](Talking()) == "an unknown profile is refused in more than one line"
+    for said in (3, "two\nlines"):
+        for asked in (("check_pairs", 2), ("check_pairs", 3), ("check_leaning", 2), ("check_carried", 2)):
+
+            class Odd(Listening):
+                def refuses(self, scene, profile, said=said, asked=asked):
+                    odd = profile == "second" and (scene.name, scene.dimension) == asked
+                    return said if odd else super().refuses(scene, profile)
+
+            assert CHECKS["refusals"](Odd()) == f"second: refuses() must give one line or None, not {said!r}"
+
+    class Planar(Listening):
+        facts = replace(Listening.facts, dimensions=frozenset({2}))
+
+        def refuses(self, scene, profile):
+            return "two\nlines" if scene.dimension == 3 else super().refuses(scene, profile)
+
+    assert CHECKS["refusals"](Planar()) == ""  # nobody asks an engine of the plane for space
+
+
+def test_a_dimension_that_is_not_in_the_facts_is_refused_and_what_is_refused_is_not_built():
+    class Planar(Listening):
+        facts = replace(Listening.facts, dimensions=frozenset({2}))
+        strict = False
+
+        def build(self, scene, dt, settings):
+            if self.strict and scene.dimension == 3:
+                raise EngineError("dimension: the toy is planar")
+            return super().build(scene, dt, settings)
+
+    assert CHECKS["capabilities"](Planar()) == "first: facts.dimensions has no 3, and a spatial scene is built"
+    engine = Planar()
+    Planar.strict = True
+    assert CHECKS["capabilities"](engine) == ""
+    assert {world.scene.dimension for world in engine.built} == {2}
+
+    class Failing(Listening):
+        def build(self, scene, dt, settings):
+            if settings["iterations"] == SWEEPS["second"] and scene.name == "check_flying" and scene.dimension == 3:
+                raise EngineError("no room")
+            return super().build(scene, dt, settings)
+
+    assert CHECKS["capabilities"](Failing()) == "second: check_flying, 3-D: not refused, but no room"
+
+
+def test_a_world_that_ends_early_is_told_and_so_is_a_body_that_is_fixed_and_moves():
+    class Ending(Listening):
+        def build(self, scene, dt, settings):
+            world = super().build(scene, dt, settings)
+            if world.profile == "second" and scene.name == "check_resting":
+                twist = world.twist
+                world.twist = lambda: twist() * (math.nan if world.steps > 3 else 1.0)
+            return world
+
+    # A floor that is nowhere moves neither so nor otherwise: what ended the run is said.
+    assert "the state is not finite" in CHECKS["capabilities"](Ending())
+    for size, said in ((0.5, ""), (2.0, "second: check_resting, 2-D: floor is fixed and does not move so")):
+
+        class Sinking(Listening):
+            def build(self, scene, dt, settings, size=size):
+                world = super().build(scene, dt, settings)
+                if world.profile == "second" and scene.name == "check_resting":
+                    twist, floor = world.twist, scene.index("floor")
+
+                    def sinking():
+                        told = twist()
+                        told[floor, 1] -= size * 1e-9
+                        return told
+
+                    world.twist = sinking
+                return world
+
+        assert CHECKS["capabilities"](Sinking()) == said
+
+
+def test_the_package_on_the_path_is_ours(monkeypatch, tmp_path):
+    assert CHECKS["packages"](Listening()) == ""
+    elsewhere = tmp_path / "adapters" / "__init__.py"
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace(origin=str(elsewhere)))
+    assert CHECKS["packages"](Listening()) == f"`adapters` on this path is {elsewhere.parent}"
+    for none in (None, SimpleNamespace(origin=None)):
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name, none=none: none)
+        assert CHECKS["packages"](Listening()) == "`adapters` on this path is None"

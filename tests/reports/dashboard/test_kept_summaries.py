@@ -1,0 +1,72 @@
+"""Summaries that were kept: what is broken about the file costs the time to make them, and no run nor page."""
+
+import sqlite3
+
+import pytest
+
+from reports.brief import FILE, Kept, Summary
+
+
+def summary():
+    return Summary(*({} for _ in Summary.__dataclass_fields__))
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / FILE
+
+
+def changed(file, *statements):
+    with sqlite3.connect(file) as db:
+        for statement in statements:
+            db.execute(statement)
+    db.close()
+
+
+def test_a_file_that_is_no_database_keeps_nothing_and_stays_what_it_is(file):
+    file.write_bytes(b"notes of somebody\n" * 100)
+    kept = Kept(file.parent)
+    kept.put("run", summary())
+    assert kept.get("run") is None
+    kept.close()
+    assert file.read_bytes() == b"notes of somebody\n" * 100
+
+
+def test_a_table_that_is_gone_or_of_another_program_keeps_nothing(file):
+    for statements in (["DROP TABLE summaries"], ["DROP TABLE summaries", "CREATE TABLE summaries (other TEXT)"]):
+        kept = Kept(file.parent)
+        changed(file, *statements)
+        kept.put("run", summary())
+        assert kept.get("run") is None
+        kept.close()
+
+
+def test_a_summary_that_another_program_wrote_is_made_anew(file):
+    kept = Kept(file.parent)
+    kept.put("run", summary())
+    assert kept.get("run") == summary() and kept.get("other") is None
+    for body in ("no JSON", "[]", "{}", "7"):
+        changed(file, f"UPDATE summaries SET body = '{body}'")
+        assert kept.get("run") is None
+    kept.put("run", summary())
+    assert kept.get("run") == summary()
+    changed(file, "UPDATE summaries SET code = 'judged by other code'")
+    assert kept.get("run") is None
+    kept.close()
+
+
+def test_a_file_that_another_process_writes_is_left_alone_and_a_folder_that_is_not_there_is_none(file, monkeypatch):
+    connect = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda path, timeout: connect(path, timeout=0.01 * timeout))
+    kept, other = Kept(file.parent), connect(file)
+    other.execute("BEGIN EXCLUSIVE")
+    kept.put("run", summary())
+    other.rollback()
+    other.close()
+    assert kept.get("run") is None
+    kept.close()
+    nowhere = Kept(file.parent / "missing")
+    nowhere.put("run", summary())
+    assert nowhere.get("run") is None
+    nowhere.close()
+    assert not (file.parent / "missing").exists()

@@ -1,0 +1,150 @@
+"""What pytest says of a check, of each verdict and standing there is; and which cells run for it, when."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from reports import testing
+from reports.command.completion import row_ids
+from reports.testing import Failed, Plugin, _Check, _report
+from validation.cells import Slot
+from validation.judging.verdicts import Physics, Standing
+
+SLOT = Slot("impact", (("e", 0.5),), 2, "chipmunk", "default", 1 / 240)
+PASS, FAIL = Physics.PASS.value, Physics.FAIL.value
+
+
+def row(physics, standing=None, reason="so it is", outcome="ok"):
+    return SimpleNamespace(
+        physics=physics, standing=standing and standing.value, reason=reason, outcome=outcome, value=1.0, truth=2.0,
+        tolerance=0.1, engine_version="1.0",
+    )  # fmt: skip
+
+
+def listed(holds):
+    """A finding of some releases, this one among them or not."""
+    return SimpleNamespace(family=SimpleNamespace(holds_for=lambda version: holds, releases=">=2", reason="it is soft"))
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """`asked(row, finding, mended)`: how a check of that row ends, and what it leaves."""
+
+    def ask(found, finding=None, mended=False):
+        monkeypatch.setattr(testing, "finding_of", lambda own: finding)
+        monkeypatch.setattr(testing, "mended", lambda own: mended)
+        monkeypatch.setattr(testing, "_report", lambda own: "its report")
+        plugin = SimpleNamespace(mended=[], row_of=lambda slot, metric: found)
+        item = SimpleNamespace(plugin=plugin, slot=SLOT, metric="speed", name="cell::speed", user_properties=[])
+        try:
+            _Check.runtest(item)
+        except (Failed, pytest.skip.Exception, pytest.xfail.Exception) as error:
+            return type(error).__name__, str(error), item
+        return "passed", "", item
+
+    return ask
+
+
+@pytest.mark.parametrize(
+    ("found", "finding", "how", "said"),
+    [
+        (row(PASS), None, "passed", ""),
+        (row(PASS, Standing.DRIFTED), listed(True), "Failed", "its report"),
+        (row(FAIL, Standing.NEW), None, "Failed", "its report"),
+        (row(FAIL, Standing.DRIFTED), listed(True), "Failed", "its report"),
+        (row(FAIL, Standing.KNOWN), listed(True), "XFailed", "so it is"),
+        (row(FAIL, Standing.EXPLAINED), None, "XFailed", "so it is"),
+        (row(FAIL, Standing.NEW), listed(False), "XFailed", "as listed for >=2: it is soft"),
+        (row(FAIL, Standing.KNOWN), listed(False), "XFailed", "so it is"),
+        (row(None, Standing.KNOWN), listed(True), "XFailed", "so it is"),
+        (row(None, Standing.EXPLAINED), None, "XFailed", "so it is"),
+        (row(None, Standing.NEW), listed(False), "Failed", "its report"),  # no answer is a failure
+        (row(None, outcome="crashed"), None, "Failed", "its report"),
+        (row(None, reason="no boxes", outcome="unsupported"), None, "Skipped", "no boxes"),
+        (None, None, "Failed", "there is no row of speed: the cell left no observation"),
+    ],
+)  # fmt: skip
+def test_how_a_check_ends(asked, found, finding, how, said):
+    ended, told, item = asked(found, finding)
+    assert (ended, told) == (how, said)
+    numbers = [] if found is None else [("value", 1.0), ("truth", 2.0), ("tolerance", 0.1)]
+    assert item.user_properties == numbers and item.plugin.mended == []
+
+
+def test_what_passes_although_others_list_it_is_kept_for_the_end(asked):
+    assert asked(row(PASS), listed(False), True)[2].plugin.mended == ["cell::speed: so it is"]
+    assert asked(row(PASS, reason=""), listed(False), True)[2].plugin.mended == [
+        "cell::speed: listed for other releases"
+    ]
+    said = []
+    terminal = SimpleNamespace(section=lambda title: said.append(f"= {title}"), line=said.append)
+    Plugin.pytest_terminal_summary(SimpleNamespace(mended=[]), terminal)
+    assert said == []
+    Plugin.pytest_terminal_summary(SimpleNamespace(mended=["one", "two"]), terminal)
+    assert said == ["= crosscheck: mended", "one", "two"]
+
+
+def test_cells_of_a_scene_run_once_when_the_first_of_its_checks_is_asked(monkeypatch):
+    other = Slot("stack", (("n", 2.0),), 2, "chipmunk", "default", 1 / 240)
+    ran = []
+
+    def run_cells(cells, jobs):
+        ran.append((list(cells), jobs))
+        return cells
+
+    def rows(run, cells):
+        assert run == ""
+        return [SimpleNamespace(slot=cell.as_dict(), metric=name, n=n) for cell in cells
+                for n, name in enumerate(("speed", "energy", "speed"))]  # fmt: skip
+
+    monkeypatch.setattr(testing, "run_cells", run_cells)
+    monkeypatch.setattr(testing, "rows_of", rows)
+    plugin = SimpleNamespace(ran=set(), rows={}, slots=[SLOT, other])
+    assert Plugin.row_of(plugin, SLOT, "speed").n == 0  # the first of a name
+    assert Plugin.row_of(plugin, SLOT, "energy").n == 1 and Plugin.row_of(plugin, SLOT, "height") is None
+    assert ran == [([SLOT], 0)]
+    assert Plugin.row_of(plugin, other, "energy").n == 1
+    assert ran == [([SLOT], 0), ([other], 0)]
+
+
+def test_a_report_says_what_was_measured_what_is_true_and_how_to_see_it_again():
+    plain = {"value": 1.25, "unit": "m/s", "metric": "speed", "reason": ""}
+    found = SimpleNamespace(
+        value=1.25, truth=2.0, tolerance=0.125, unit="m/s", because="of the step", standing="new", outcome="ok",
+        reason="", slot=SLOT.as_dict(), as_dict=lambda: plain,
+    )  # fmt: skip
+    lines = _report(found).splitlines()
+    assert [line.partition(" ")[0] for line in lines] == ["measured", "truth", "tolerance", "standing", "again"]
+    assert all(line[11] != " " and line[10] == " " for line in lines)
+    assert "1.25" in lines[0] and "2" in lines[1] and lines[2].endswith("0.125 m/s: of the step")
+    assert lines[3] == "standing   new" and "impact" in lines[4] and "chipmunk" in lines[4]
+    found.value, found.standing, found.outcome = None, None, "crashed"
+    assert _report(found).splitlines()[::3] == ["no value   crashed", "standing   crashed"]
+    found.reason = "signal 11"
+    assert _report(found).splitlines()[::3] == ["no value   signal 11", "standing   crashed: signal 11"]
+
+
+def test_rows_that_are_offered_are_the_worst_of_each_family_and_begin_as_is_typed(monkeypatch, tmp_path):
+    import reports.exports
+    import reports.findings
+    import reports.wording
+
+    def load(folder):
+        assert folder == tmp_path
+        return [SimpleNamespace(as_dict=lambda name=name: name) for name in ("a1", "a2", "b1")]
+
+    def families(rows):
+        return [SimpleNamespace(worst=name, engine="mujoco", profile="tuned", scene="stack", metric="depth")
+                for name in rows]  # fmt: skip
+
+    monkeypatch.setattr(reports.exports, "load_rows", load)
+    monkeypatch.setattr(reports.findings, "families", families)
+    monkeypatch.setattr(reports.wording, "row_id", lambda name: name)
+    context = SimpleNamespace(params={"out": str(tmp_path)})
+    found = row_ids(context, None, "a")
+    assert [(each.value, each.help) for each in found] == [(n, "mujoco/tuned stack depth") for n in ("a1", "a2")]
+    monkeypatch.setattr(reports.exports, "load_rows", lambda folder: 1 / 0)
+    assert row_ids(context, None, "") == []  # a completion must never fail
+    told = []
+    monkeypatch.setattr(reports.exports, "load_rows", lambda folder: told.append(str(folder)) or [])
+    assert row_ids(SimpleNamespace(params={}), None, "") == [] and told == ["crosscheck-out"]
