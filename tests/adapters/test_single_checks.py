@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from listening import Listening
+from listening import Dull, Listening
 
 from adapters.conformance import CHECKS, mechanics, scenes
 from adapters.conformance.faults import FAULTS
 from adapters.conformance.finding import NotAsked
 from adapters.conformance.mechanics import contacts
-from adapters.conformance.spoilt import Spoilt
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import Contacts, Declared
 
@@ -143,18 +142,7 @@ def test_balls_that_pass_through_each_other_are_said():
     [("", []), ("impulse of the wrong body", ["impulse", "sampling"]), ("world shared with another", ["fresh"])],
 )
 def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
-    class Dull:
-        def refuses(self, scene, profile):
-            rebounds = any(restitution > 0.0 for restitution, _ in scene.materials())
-            return "pairs: no restitution" if rebounds else super().refuses(scene, profile)
-
-    class Healthy(Dull, ToyEngine):
-        pass
-
-    class Broken(Dull, Spoilt):
-        pass
-
-    engine = Broken(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Healthy()
+    engine = Dull(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Dull()
     asked = ("momentum", "spin", "impulse", "sampling", "fresh")
     assert [name for name in asked if CHECKS[name](engine)] == seen
 

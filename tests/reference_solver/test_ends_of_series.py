@@ -1,7 +1,12 @@
 """When a series of rebounds counts as over (E22): by what it leaves out, summed up rebound by rebound."""
 
+import json
 import math
+import os
+import subprocess
+import sys
 
+import numpy as np
 import pytest
 
 from reference_solver.stepping.impacts import DRIFT_STEPS, drifts_aside, is_lowest, turns_aside
@@ -40,3 +45,38 @@ def test_what_turns_counts_over_ten_thousand_steps_or_until_it_has_turned():
     assert turns_aside(1e-6, 1e-4, 0.02, 1e-3) == pytest.approx(0.2 * 1e-10, rel=1e-12)
     assert turns_aside(1e-6, 1e-4, 3.0, 1e-3) == pytest.approx(1e-10, rel=1e-12)
     assert turns_aside(1e-6, 1e-4, 0.0, 1e-3) == 0.0
+
+
+#: A box that comes to rest on a corner (planar seed 0 of `certify --random`), with series that end at ``sys.argv[1]``
+#: times what is the lowest energy of a rebound; functions read the constant anew where they are plain ones.
+PLANTED = """
+import json, sys
+from reference_solver import Settings, Simulation
+from reference_solver.certification.audit import ends_of_series
+from reference_solver.certification.fuzz.scenes import STRIDE, scene
+from reference_solver.stepping import impacts
+
+impacts.LOWEST *= float(sys.argv[1])
+drawn = scene(0, 2)
+record = Simulation(drawn.model, Settings.reference(1.0 / drawn.rate)).record(drawn.steps, STRIDE, pieces=True)
+ends, at_once, onward = ends_of_series(drawn.model, record, 1.0 / drawn.rate)
+print(json.dumps([record.pose.tolist(), (at_once + onward * (record.t[-1] - ends)).sum()]))
+"""
+
+
+def planted(times):
+    """Poses of the run, and what its ends leave out [m]."""
+    done = subprocess.run(
+        [sys.executable, "-c", PLANTED, str(times)],
+        capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    pose, left_out = json.loads(done.stdout)
+    return np.array(pose), left_out
+
+
+def test_a_series_that_is_ended_too_early_is_off_by_no_more_than_its_record_tells():
+    """At a thousand times the speed: all steps leave out the same, so that other ones do not show it."""
+    (pose, left_out), (other, told) = planted(1), planted(1e6)
+    assert left_out < 1e-10
+    assert 1e-7 < np.abs(other - pose).max() < told

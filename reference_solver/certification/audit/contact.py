@@ -44,12 +44,7 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
             for free, body in zip(run.free, run.model.bodies, strict=True)
         ]
     )
-    approach, leaves = (
-        ((run.velocity_at(run.side[1], b, pieces.point, x) - run.velocity_at(run.side[0], a, pieces.point, x)) * n).sum(
-            axis=1
-        )
-        for x in (False, True)
-    )
+    approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
     held = run.is_impact[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
     return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
@@ -63,10 +58,8 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     w s (E22): where it is hit, and up to ``m r^2/I`` times that a reach r from the centre. What holds the contact
     afterwards brings it back, ``T = 2 u/g_n``; a series lasts a step at most.
     """
-    pieces, a, b, n = run.pieces, run.pieces.body_a, run.pieces.body_b, run.pieces.normal
-    sides = (run.side[0], a), (run.side[1], b)
-    first, second = (run.velocity_at(row, body, pieces.point, after=False) for row, body in sides)
-    e, approach = run.model.restitution[a, b], ((second - first) * n).sum(axis=1)
+    pieces, a, b = run.pieces, run.pieces.body_a, run.pieces.body_b
+    e, approach = run.model.restitution[a, b], (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
     leaves = np.where(ends, e * np.maximum(-approach, 0.0), 0.0)
     slows, rubs = np.zeros(len(leaves)), np.zeros(len(leaves))
     for j in np.flatnonzero(leaves > 0.0):
@@ -109,10 +102,7 @@ def _laws(run: Run) -> Iterator[float]:
     row_a, row_b = run.side
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
     restitution, mu = run.model.restitution[a, b], run.model.friction[a, b]
-    before, after = (
-        run.velocity_at(row_b, b, pieces.point, late) - run.velocity_at(row_a, a, pieces.point, late)
-        for late in (False, True)
-    )
+    before, after = (run.meeting_velocity(late) for late in (False, True))
     approach, leaves = (before * n).sum(axis=1), (after * n).sum(axis=1)
     # Where rows turn within a piece its impulse is a mean over normals: what remains unknown of that mean adds a share
     # of the normal impulse to the friction, and of the friction to the normal impulse.

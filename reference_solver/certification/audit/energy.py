@@ -112,9 +112,7 @@ def _may_gain(run: Run) -> NDArray[np.bool_]:
     pieces, owner = run.pieces, run.contact_owner
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
     pressed = (pieces.impulse * n).sum(axis=1) > 0.0
-    sides = (run.side[0], a), (run.side[1], b)
-    first, second = (run.velocity_at(row, body, pieces.point, after=False) for row, body in sides)
-    e, parts = run.model.restitution[a, b], ((second - first) * n).sum(axis=1) > 0.0
+    e, parts = run.model.restitution[a, b], (run.meeting_velocity(after=False) * n).sum(axis=1) > 0.0
     bouncy, uneven = np.zeros(len(pieces), bool), np.zeros(len(pieces), bool)
     bouncy[owner[pressed & (e > 0.0)]] = True
     uneven[owner[pressed & (parts | (run.model.friction[a, b] > 0.0))]] = True

@@ -245,6 +245,11 @@ class Run:
         arm = point - np.where(known, pose[row, : self.d], point)
         return motion[:, : self.d] + turned(motion[:, self.d :], arm)
 
+    def meeting_velocity(self, after: bool) -> Array:
+        """Velocities (c, d) of body B against body A where they meet, before or ``after`` the piece [m/s]."""
+        a, b, point = self.pieces.body_a, self.pieces.body_b, self.pieces.point
+        return self.velocity_at(self.side[1], b, point, after) - self.velocity_at(self.side[0], a, point, after)
+
 
 def twist_of(body: Body) -> Array:
     """Twist of a body at the start, zeros where it has none."""

@@ -8,6 +8,7 @@ import pytest
 from reference_solver import Body, Disc, HalfSpace, Model, Settings, Simulation
 from reference_solver.certification.audit import audit, energy
 from reference_solver.certification.audit.run import Run
+from reference_solver.pieces import IMPACT
 
 DT, E = 1.0 / 240.0, 0.3
 LIGHT, HEAVY = 0.1, 10.0
@@ -65,7 +66,7 @@ def test_what_leaves_faster_than_its_law_says_is_refused_all_the_same():
 )
 def test_only_what_rebounds_beside_what_parts_or_rubs_may_gain(sinks, falls, e, friction, may):
     record, judged = run(landing(sinks, falls, e, friction))
-    first = record.pieces.kind == 1
+    first = record.pieces.kind == IMPACT
     assert first.any() and energy._may_gain(judged)[first].tolist() == [may] * int(first.sum())
     assert refused(judged.model, record) == set()
 
@@ -75,6 +76,6 @@ def test_what_may_not_gain_and_does_is_refused():
     model = landing(0.0, 0.25)
     record, _ = run(model)
     pieces, after = record.pieces, record.pieces.twist_after.copy()
-    hit = np.flatnonzero(np.repeat(pieces.kind == 1, np.diff(pieces.first_body)) & (pieces.body == 2))
+    hit = np.flatnonzero(np.repeat(pieces.kind == IMPACT, np.diff(pieces.first_body)) & (pieces.body == 2))
     after[hit] *= 1.0 + 10.0 / E  # from .3 of the speed to more than it had
     assert "gained" in refused(model, replace(record, pieces=replace(pieces, twist_after=after)))
