@@ -31,6 +31,7 @@ from adapters.conformance.scenes import (
 from adapters.engine import ROLES, Engine, EngineError, EngineFacts, Setting
 from adapters.lift import lift
 from adapters.needs import Needs, needs
+from adapters.plain import one_line
 from adapters.scene import Scene
 from adapters.stepping import posed_for
 
@@ -69,12 +70,15 @@ def profiles(engine: Engine) -> str:
         return "there is no profile"
     for profile, asked in product(engine.profiles, all_needs(engine)):
         settings = engine.settings(profile, asked, DT)
-        names = [setting.name for setting in settings]
         if settings != engine.settings(profile, asked, DT):
             return f"{profile}: differs from call to call"
         for setting in settings:
-            if not isinstance(setting, Setting) or not setting.because:
-                return f"{profile}: {getattr(setting, 'name', setting)} has no reason"
+            if not isinstance(setting, Setting):
+                return f"{profile}: {one_line(repr(setting), 40)} is no Setting"
+        names = [setting.name for setting in settings]
+        for setting in settings:
+            if not setting.because:
+                return f"{profile}: {setting.name} has no reason"
             if names.count(setting.name) > 1:
                 return f"{profile}: {setting.name} is set twice"
             json.dumps(setting.value)

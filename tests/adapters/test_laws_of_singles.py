@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from adapters.law import Deviation
-from adapters.scene import Pair
-from adapters.single_motions import corner_law, standstill_law
-from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law, without_a_place
+from adapters.scene import Box, Pair
+from adapters.single_motions import corner_law, kept_law, standstill_law
+from adapters.single_precision import ROUNDINGS, UNIT, Method, Threshold, plane_law, rounded_law, without_a_place
 from validation import bounds
 from validation.catalogue import CATALOGUE
 from validation.findings import Known
@@ -162,3 +162,18 @@ def test_what_leaves_its_plane_by_more_than_roundings_is_not_explained(share, st
     value, band = law.says(scene, DT, CATALOGUE["flat_box"].measure)
     told = judge(share * band, bounds.planar(scene, DT), [(law, value, band)], Known(None, True))
     assert (told.physics.value, told.standing.value) == ("fail", standing)
+
+
+def test_a_law_of_what_blows_keep_is_silent_wherever_something_else_can_take_it():
+    """A load of any kind, on one body alone, is enough; and so are friction, loss, a box or a ball that is held."""
+    law, scene = kept_law("momentum_defect"), CATALOGUE["rack"].scene(2)
+    value, band = law(scene, DT, CATALOGUE["rack"].measure)
+    # The roundings of one blow for each pair that can touch: six around a ball, half a pair each.
+    assert value == 0.0 and band == pytest.approx(ROUNDINGS * 2.0**-24 * 3.0 * len(scene.bodies), rel=1e-12)
+    last, pair = scene.bodies[-1], scene.pairs[0]
+    pushed = {"force": (1.0, 0.0), "torque": (1.0,), "motion": "fixed", "shape": Box((0.1, 0.1))}
+    changes = [{"bodies": (*scene.bodies[:-1], replace(last, **{name: value}))} for name, value in pushed.items()]
+    changes += [{"gravity": (0.0, -9.81)}, {"gravity": (0.1, 0.0)}]
+    changes += [{"pairs": (replace(pair, **own), *scene.pairs[1:])} for own in ({"restitution": 0.99}, {"friction": 0.1})]
+    for change in changes:
+        assert law(replace(scene, **change), DT, CATALOGUE["rack"].measure) is None, change

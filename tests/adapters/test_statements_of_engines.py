@@ -74,6 +74,10 @@ def test_profiles_are_there_say_the_same_each_time_and_why():
     for wrong, said in (
         ([*good, Setting("margin", 0.1, "")], "two: margin has no reason"),
         ([*good, Setting("slop", 0.2, "so")], "two: slop is set twice"),
+        ([*good, ("slop", 0.2)], "two: ('slop', 0.2) is no Setting"),
+        ([None, *good], "two: None is no Setting"),
+        ([SimpleNamespace(name="slop", because="so")], "two: namespace(name='slop', because='so') is no Setting"),
+        ([*good, "a line\nand more " + 99 * "x"], rf"two: 'a line\nand more {18 * 'x'} ... is no Setting"),
     ):
         assert CHECKS["profiles"](rules(one=lambda needs, dt: good, two=lambda needs, dt, own=wrong: own)) == said
     with pytest.raises(TypeError, match="JSON"):

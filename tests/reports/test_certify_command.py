@@ -112,8 +112,15 @@ def test_orders_are_shown_beside_their_errors(monkeypatch):
     result = CliRunner().invoke(main, ["certify", "--order", "--json"])
     assert result.exit_code == 0
     assert [row["order"] for row in json.loads(result.stdout)] == [1.0, None]
-    for shown in ("round-off", "bounce [m]", "0.05", "0.00313"):
-        assert shown in result.stderr
+    title, *lines = result.stderr.splitlines()
+    assert title.strip() == f"Orders, largest error of {certifying.PHASES} phases"
+    told = [[word.strip() for word in re.split("[\u2502\u2503]", line)[1:-1]] for line in lines]
+    assert [row for row in told if row] == [
+        ["case", "made by", "order", f"at 1/{RATES[0]} s", f"at 1/{RATES[-1]} s"],
+        ["bounce [m]", "classical, planar", "1.00", "0.05", "0.00313"],
+        ["flight", "reference, planar", "round-off", "0", "0"],
+    ]
+    assert CliRunner().invoke(main, ["certify", "--order"]).stdout == ""  # no data where none is asked for
 
 
 def planted(monkeypatch, missed, flags):

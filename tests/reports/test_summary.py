@@ -388,3 +388,18 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
     out, _ = two_engines
     result = call("explain", name, "--out", out)
     assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1 and "row:" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0.0, "does not rebound"),
+        (0.9e-6, "does not rebound"),
+        (-0.9e-6, "does not rebound"),
+        (1e-6, "rebounds at 1.0e-6 instead of 1"),
+        (-1e-6, "goes on at 1.0e-6 of its speed; true: rebounds at 1"),
+    ],
+)
+def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):
+    (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
+    assert answer.wrong == f"{words} (e=1 v=1)"

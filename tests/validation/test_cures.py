@@ -288,3 +288,17 @@ def test_what_a_committed_cure_tells_failed_before_and_passes_with_it(engine):
 def test_no_cure_has_the_settings_of_a_profile_without_a_rank():
     pytest.importorskip("mujoco")
     assert cures._profiles("mujoco") == ["default", "tuned"]
+
+
+def test_a_search_asks_with_as_many_processes_as_it_was_given_and_ends_where_the_engine_refuses(monkeypatch):
+    asked = []
+
+    def refusing(slots, jobs):
+        asked.append(([slot.engine for slot in slots], {slot.scene for slot in slots}, jobs))
+        return {slot: Observation(slot, "", 0, "1.0", Outcome.UNSUPPORTED, "it has no slopes") for slot in slots}
+
+    monkeypatch.setattr(cures, "observe", refusing)
+    assert search("chipmunk", "incline", 2, jobs=3) == Unsearched(False, "it has no slopes")
+    cells = len(asked_of("incline", 2))
+    assert asked == [(["chipmunk"] * cells, {"incline"}, 3)]
+    assert search("chipmunk", "incline", 2) and asked[-1][2] == 1

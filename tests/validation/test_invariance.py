@@ -324,3 +324,16 @@ def test_last_digits_of_a_defect_are_those_of_what_it_is_a_difference_of():
     assert judged("mirrored", {"hop": (0.0, "")}, answer, Allowances(floors, sizes=sizes)).holds
     worse = {"hop": (65.0 * np.finfo(float).eps * size_of(scene), "")}
     assert not judged("mirrored", {"hop": (0.0, "")}, worse, Allowances(floors, sizes=sizes)).holds
+
+
+@pytest.mark.parametrize("finish", ["diverged", "completed"])
+def test_of_a_motion_that_diverged_its_reason_is_told_and_nothing_is_measured_of_it(monkeypatch, finish):
+    from validation.questions import invariance
+
+    pytest.importorskip("pymunk")
+    real = invariance.run
+    monkeypatch.setattr(
+        invariance, "run", lambda *given: replace(real(*given), finish=finish, reason="a speed beyond 1e9 m/s")
+    )
+    found = measured(Slot("head_on", (), 2, "chipmunk", "tuned", 1 / 240), "again")
+    assert found == "a speed beyond 1e9 m/s" if finish == "diverged" else "impulse" in found
