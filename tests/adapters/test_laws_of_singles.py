@@ -174,6 +174,8 @@ def test_a_law_of_what_blows_keep_is_silent_wherever_something_else_can_take_it(
     pushed = {"force": (1.0, 0.0), "torque": (1.0,), "motion": "fixed", "shape": Box((0.1, 0.1))}
     changes = [{"bodies": (*scene.bodies[:-1], replace(last, **{name: value}))} for name, value in pushed.items()]
     changes += [{"gravity": (0.0, -9.81)}, {"gravity": (0.1, 0.0)}]
-    changes += [{"pairs": (replace(pair, **own), *scene.pairs[1:])} for own in ({"restitution": 0.99}, {"friction": 0.1})]
+    changes += [
+        {"pairs": (replace(pair, **own), *scene.pairs[1:])} for own in ({"restitution": 0.99}, {"friction": 0.1})
+    ]
     for change in changes:
         assert law(replace(scene, **change), DT, CATALOGUE["rack"].measure) is None, change

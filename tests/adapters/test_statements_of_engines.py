@@ -98,6 +98,28 @@ def test_profiles_are_asked_for_needs_of_rest_and_of_impacts_in_each_dimension(k
             assert bool(CHECKS["profiles"](engine)) is (dimension in asked)
 
 
+def test_needs_that_profiles_are_asked_for_are_blows_and_rest_as_they_are_on_earth():
+    """Elastic, plastic and rough blows at 6 m/s, rest with and without a slip."""
+    asked, engine = [], Listening()
+
+    def rule(needs, dt):
+        told = (needs.regime, needs.restitution, needs.friction, needs.slide, needs.rotation)
+        asked.append((needs.dimension, told, needs.gravity, needs.top_speed, dt))
+        return [Setting("iterations", 3, "so")]
+
+    engine.profiles = {"one": rule}
+    assert CHECKS["profiles"](engine) == ""
+    kinds = [
+        ("impact", 0.8, 0.0, False, False),
+        ("impact", 0.0, 0.0, False, False),
+        ("impact", 0.5, 0.5, True, False),
+        ("rest", 0.0, 0.5, False, True),
+        ("rest", 0.0, 0.5, True, True),
+    ]
+    assert sorted(set(asked)) == sorted((d, kind, 9.81, 6.0, statements.DT) for d in (2, 3) for kind in kinds)
+    assert len(asked) == 2 * 2 * len(kinds)  # each twice: what differs from call to call is seen
+
+
 def test_numbers_that_are_none_are_tried_for_each_setting_of_a_profile():
     """Counts below 1, and NaN for what is a number; a word has no such thing."""
     tried = []

@@ -1,4 +1,4 @@
-"""What the law of a scene does not cover is refused in one line: the parameter by its name, and what was asked of it."""
+"""What the law of a scene does not cover is refused in one line: the parameter by name, and what was asked of it."""
 
 import pytest
 
