@@ -1,25 +1,22 @@
-"""Cells on a Dask cluster: the rows of the local pool, whoever dies on the way."""
+"""Cells on a Dask cluster: the rows of the local pool, whoever dies on the way (its driver: `test_cluster_driver.py`)."""
 
-import io
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-from adapters.scene import SceneError
 from reports import exports
 from reports.command import main
-from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
+from validation.cells import Slot, slot_from_dict
 from validation.records.store import Store, StoreError
 from validation.workers import LimitError
-from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _Driver, checked, run_cells_on
+from validation.workers.cluster import run_cells_on
 
 pytest.importorskip("distributed", reason="pip install 'contact-crosscheck[dask]'")
 pytest.importorskip("pymunk")
@@ -187,21 +184,6 @@ def test_scene_files_need_not_be_on_the_workers(tmp_path):
     assert found.outcome.value == "ok" and found.slot == slot
 
 
-def test_batches_are_of_one_engine_and_neither_tiny_nor_huge():
-    slots = [Slot("impact", (("v", float(k + 1)),), 2, e, "p", 0.1) for k in range(2000) for e in ("a", "b")]
-    batches = list(_batches(slots, 2))
-    assert sorted((s for batch in batches for s in batch), key=Slot.key) == sorted(slots, key=Slot.key)
-    assert all(len({slot.engine for slot in batch}) == 1 and len(batch) <= MOST for batch in batches)
-    assert [batch[0].engine for batch in batches[:4]] == ["a", "b", "a", "b"]
-    assert len(next(_batches(slots[:LEAST], 64))) >= LEAST // 2
-
-
-@pytest.mark.parametrize("address", ["", "local:0", "local:x", "http://a:1", "tcp://a", "tcp://a:b", "tcp://a b:1"])
-def test_an_address_that_can_be_none_is_refused(address):
-    with pytest.raises(SceneError, match="neither local:N nor tcp"):
-        checked(address)
-
-
 def test_without_dask_the_line_that_installs_it(monkeypatch, tmp_path):
     monkeypatch.setattr("validation.workers.cluster.find_spec", lambda name: None)
     done = CliRunner().invoke(main, [*SWEEP, "--cluster", "local:1", "--out", str(tmp_path)])
@@ -218,123 +200,3 @@ def test_texts_handed_to_run_cell_must_be_a_table():
     for line in ('{"scenes": 1}', '{"scenes": {"a.toml@00000000": "x"}}', '{"scenes": '):
         done = CliRunner().invoke(main, ["run-cell", "--batch"], input=line + "\n")
         assert done.exit_code == 2 and json.loads(done.output.splitlines()[0])["error"]
-
-
-class Future:
-    """What a cluster says of a batch: finished with a result, or lost with an error."""
-
-    def __init__(self, result=None, error=None, status="finished"):
-        self.status = "error" if error else status
-        self._result, self._error = result, error
-
-    def result(self):
-        return self._result
-
-    def exception(self):
-        return self._error
-
-    def add_done_callback(self, callback):
-        pass
-
-    def release(self):
-        pass
-
-
-class Client:
-    """A cluster on which nothing runs: it remembers what was handed to it."""
-
-    def __init__(self):
-        self.status, self.handed = "running", []
-
-    def submit(self, function, text, timeout, topic, name, **options):
-        assert options["retries"] == 0 and options["pure"] is False
-        self.handed.append([json.loads(line) for line in text.splitlines()[1:]])
-        return Future()
-
-
-@pytest.fixture
-def driver():
-    left = {}
-    made = _Driver(Client(), io.StringIO(), 9.0, lambda slot, reason: left.__setitem__(slot, reason))
-    made.left = left
-    return made
-
-
-def cells(count):
-    return [Slot("impact", (("v", float(k + 1)),), 2, "chipmunk", "tuned", 1 / 240) for k in range(count)]
-
-
-def answer(slot, **changed):
-    found = Observation(slot, prepare(slot).cell.key(), 1, "7.3.1", Outcome.OK)
-    return json.dumps(replace(found, **changed).as_dict())
-
-
-def batch_of(driver, slots):
-    driver._submit(list(slots))
-    return f"{driver.topic}-{driver.made}"
-
-
-def test_a_cell_that_comes_back_twice_counts_once(driver):
-    (slot,) = cells(1)
-    name = batch_of(driver, [slot])
-    line = answer(slot)
-    assert len(list(driver._heard({"batch": name, "line": line, "worker": "w"}))) == 1
-    driver.futures[name] = Future({"lines": [line], "left": "", "said": "", "worker": "w"})
-    assert list(driver._ended(name)) == [] and not driver.batches
-
-
-def test_what_a_lost_batch_had_not_brought_back_is_asked_again_in_halves(driver):
-    slots = cells(5)
-    name = batch_of(driver, slots)
-    driver._line(driver.batches[name], answer(slots[0]), "w").__next__()
-    driver.futures[name] = Future(error=RuntimeError("its worker died"))
-    assert list(driver._ended(name)) == []
-    again = driver.client.handed[1:]
-    assert [len(part) for part in again] == [2, 2]
-    assert [each["params"]["v"] for part in again for each in part] == [2.0, 3.0, 4.0, 5.0]
-    note = [json.loads(line) for line in driver.journal.getvalue().splitlines()][-1]
-    assert note["event"] == "lost" and len(note["cells"]) == 4 and "its worker died" in note["reason"]
-
-
-def test_a_cell_that_takes_its_worker_along_again_and_again_is_one_crash(driver):
-    name = batch_of(driver, cells(1))
-    for _ in range(MOST_LOST - 1):
-        driver.futures[name] = Future(error=RuntimeError("gone"))
-        assert list(driver._ended(name)) == []
-        name = f"{driver.topic}-{driver.made}"
-    driver.futures[name] = Future(error=RuntimeError("gone"))
-    (found,) = driver._ended(name)
-    assert found.outcome is Outcome.CRASHED and "lost with its worker 3 times" in found.reason
-    assert not driver.batches
-
-
-def test_cells_that_a_batch_left_are_left_and_not_asked_again(driver):
-    slots = cells(2)
-    name = batch_of(driver, slots)
-    driver.futures[name] = Future({"lines": [], "left": "left: it timed out 3 times", "said": "", "worker": "w"})
-    assert list(driver._ended(name)) == [] and len(driver.client.handed) == 1
-    assert driver.left == dict.fromkeys(slots, "left: it timed out 3 times")
-
-
-def test_a_worker_with_other_code_is_refused(driver):
-    (slot,) = cells(1)
-    name = batch_of(driver, [slot])
-    with pytest.raises(LimitError, match="has other code than this machine"):
-        list(driver._heard({"batch": name, "line": answer(slot, cell="0" * 16, engine_version="7.0"), "worker": "w"}))
-
-
-def test_a_batch_that_begins_a_second_time_is_in_the_journal(driver):
-    name = batch_of(driver, cells(2))
-    for worker in ("a", "b"):
-        list(driver._heard({"batch": name, "begun": worker}))
-    notes = [json.loads(line) for line in driver.journal.getvalue().splitlines()]
-    assert [(note["event"], note["worker"], len(note["cells"])) for note in notes] == [
-        ("begun", "a", 2),
-        ("again", "b", 2),
-    ]
-
-
-@pytest.mark.parametrize("line", ["", "{", '{"slot": 1}', "[]", '{"line": 1, "error": "left"}'])
-def test_half_a_line_of_a_process_that_died_is_no_observation(driver, line):
-    name = batch_of(driver, cells(1))
-    assert list(driver._line(driver.batches[name], line, "w")) == [] and len(driver.batches[name].slots) == 1
