@@ -1,4 +1,4 @@
-"""Cells on a Dask cluster: the rows of the local pool, whoever dies on the way (its driver: `test_cluster_driver.py`)."""
+"""Cells on a Dask cluster: the rows of the local pool, whoever dies on the way."""
 
 import json
 import os

@@ -212,7 +212,7 @@ def test_every_slot_is_back_once_and_the_journal_has_a_line_for_each_batch_that_
     begun_and_ended = [
         (("begun", name, n), ("ended", name, 0)) for name, n in zip(client.keys, (25, 25, 10), strict=True)
     ]
-    assert told == [line for both in begun_and_ended for line in both]
+    assert told == [line for name, n in sizes for line in (("begun", name, n), ("ended", name, 0))]
     assert notes[0]["worker"] == "w" and notes[0]["cells"] == [slot.key() for slot in slots[:25]]
     assert all(abs(note["time"] - notes[0]["time"]) < 60.0 for note in notes)
 
