@@ -209,9 +209,7 @@ def test_every_slot_is_back_once_and_the_journal_has_a_line_for_each_batch_that_
     assert client.keys == [f"{made.topic}-{k}" for k in (1, 2, 3)]
     assert client.topics == [("on", made.topic), ("off", made.topic)] and made.topic.startswith("crosscheck-")
     told = [(note["event"], note["batch"], len(note["cells"])) for note in notes]
-    begun_and_ended = [
-        (("begun", name, n), ("ended", name, 0)) for name, n in zip(client.keys, (25, 25, 10), strict=True)
-    ]
+    sizes = tuple(zip(client.keys, (25, 25, 10), strict=True))
     assert told == [line for name, n in sizes for line in (("begun", name, n), ("ended", name, 0))]
     assert notes[0]["worker"] == "w" and notes[0]["cells"] == [slot.key() for slot in slots[:25]]
     assert all(abs(note["time"] - notes[0]["time"]) < 60.0 for note in notes)
