@@ -43,7 +43,7 @@ def table(rows: Iterable[Starved]) -> pd.DataFrame:
 def _word(row: Starved) -> str:
     if not row.stands:
         return "falls"
-    return "stands" if row.sunk < RANGE[0] else f"{100.0 * row.sunk:.1g} %"
+    return "stands" if row.sunk < RANGE[0] else f"{float(f'{100.0 * row.sunk:.1g}'):g} %"
 
 
 def chart(rows: Iterable[Starved], scheme: str) -> dict[str, Any]:

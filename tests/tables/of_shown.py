@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import pandas as pd
 from click.testing import CliRunner
-from of_print import numbered
+from of_print import _flat, numbered
 from of_results import printed, told
 from rich.console import Console
 from telling import Sections
 
 from adapters.conformance import self_test
 from adapters.conformance.self_test import Caught
+from reference_solver.certification.self_test import JUDGED, SIZES, Corruption, Trial
+from reference_solver.hard_cases.starved import Starved
 from reports import releases as told_releases
-from reports import speed, tables
-from reports.command import benching, inspecting, main, piles, posing, releasing
+from reports import speed, starved, tables
+from reports.command import accepting, benching, certifying, fuzzing, inspecting, main, piles, posing, releasing
+from reports.palette import PAPER
 from validation.bench import agreement
 from validation.bench.piles import KINDS, Lap
 from validation.cells import Slot
+from validation.findings import Family, Finding
+from validation.judging.acceptance import Change as Proposed
 from validation.judging.comparison import Change, Kind
 from validation.questions import invariance
 from validation.questions.detection import BlindSpot, Detected
@@ -223,7 +230,106 @@ def posed() -> Sections:
     return found
 
 
+def doctor() -> Sections:
+    """What is told of a machine where all is well, and of one where an engine broke and a foreign package lies."""
+    engines = [
+        {"name": "toy", "version": "1.2", "status": "installed", "reason": ""},
+        {"name": "brittle", "version": "", "status": "broken", "reason": "ImportError: [no] such symbol"},
+        {"name": "absent", "version": "", "status": "not installed", "reason": ""},
+    ]
+    sound: dict[str, Any] = {
+        "machine": {"cpu": "a [fast] one", "cores": 4}, "commit": "abc123", "executable": "/x/python",
+        "engines": engines[:1], "packages": {"adapters": "/x/adapters", "reports": "/y/[old]/reports"},
+        "kernel_cache": {"folder": "/z/cache"}, "problems": [], "traces": {},
+    }  # fmt: skip
+    spoilt = sound | {
+        "commit": "", "engines": engines, "kernel_cache": {"folder": None},
+        "problems": ["brittle: it cannot be imported", "reports is not ours: /y/[old]/reports"],
+        "traces": {"brittle": ["File one, line 3", "ImportError: [no] such symbol"]},
+    }  # fmt: skip
+    found = Sections()
+    for name, data in {"sound": sound, "spoilt": spoilt}.items():
+        found[name] = printed(lambda console, data=data: tables.health(data, console))
+        for more in ([], ["--json"]):
+            with patch.object(inspecting.listing, "doctor", lambda data=data: data):
+                found[" ".join([name, *more])] = said(["doctor", *more])
+    return found
+
+
+def starved_stacks() -> Sections:
+    """The picture of stacks that too few sweeps let sink: its tiles, and its specification in both schemes."""
+    rows = [
+        Starved(10, 1, 9.0, 1.6, 1.0, False), Starved(10, 20, 0.0077, 0.002, 0.15, True),
+        Starved(10, 40, 0.021, 0.002, 0.15, True), Starved(5, 20, 0.5, 0.002, 0.15, True),
+        Starved(5, 40, 1e-3, 0.0, 0.0, True), Starved(1, 100, 0.0, 0.0, 0.0, True),
+    ]  # fmt: skip
+    found = Sections(
+        {"tiles": {f"{k}": json.dumps(each) for k, each in enumerate(starved.table(rows).to_dict("records"))}}
+    )
+    for scheme in PAPER:
+        spec = starved.chart(rows, scheme)
+        del spec["datasets"], spec["$schema"]
+        found[scheme] = {path: value for path, value in _flat(spec, "") if not path.endswith(".data.name")}
+    return found
+
+
+def refusals() -> Sections:
+    """What became of random scenes: certified, refused for this and that, different, without an answer; and of none."""
+
+    def answer(seed: int, **more: Any) -> dict[str, Any]:
+        sound = {"seed": seed, "dimension": 3, "certified": True, "conditions": {}, "bound": 1e-10 * 2**seed}
+        return sound | {"off": 3e-11 * 3**seed, "defects": [], **more}
+
+    many = [answer(seed, certified=False, conditions={"cone": 1e-7 * seed, "gap": 2.0}) for seed in range(20, 27)]
+    groups = {
+        "none": [],
+        "all hold": [answer(seed) for seed in range(4)],
+        "all refused": [*many, answer(9, certified=False, conditions={"energy": math.nan}, off=math.inf)],
+        "of all kinds": [
+            answer(1), answer(2, defects=[["mirrored", 0.25, 1.25e-5, 2e-12], ["moved", 0.5, 2e-5, 3e-12]]),
+            *many[:2], {"seed": 7, "dimension": 3, "broken": "no answer after 900 s"},
+        ],
+    }  # fmt: skip
+    found = Sections()
+    for name, answers in groups.items():
+        bad = list[int]()
+        found[name] = printed(lambda console, own=answers, bad=bad: bad.append(fuzzing._tell(console, 3, own)))
+        found[name]["defects"] = str(bad)
+    return found
+
+
+def corruptions() -> Sections:
+    """Which planted corruptions of a run are seen at which size, where enough are and where too few."""
+    law = Corruption("law", "friction", "block", lambda *given: given, "no check asks for it")
+    motion = Corruption("motion", "a place", "ball", lambda *given: given)
+    found = Sections()
+    for name, missed in {"all": (), "the least": SIZES[-1:], "the judged": (JUDGED,), "every": SIZES}.items():
+        made = [Trial(each, size, () if size in missed and each is law else ("gap", "cone"))
+                for each in (law, motion) for size in SIZES]  # fmt: skip
+        with patch.object(certifying, "trials", lambda made=made: iter(made)):
+            for more in ([], ["--json"]):
+                found[" ".join([name, *more])] = said(["certify", "--self-test", *more])
+    return found
+
+
+def accepted() -> Sections:
+    """What is told of a family before its reason is asked for, and of rows that cannot be listed."""
+    family = Family("f-1", ("default", "tuned"), "stack", ("creep",), "", "", ">=1")
+    keys = [("default", "stack", "2", "", f"n={n}", "", f"creep[{n}]") for n in range(5)]
+    keys += [("tuned", "stack", "3", "4", "", "", "drift")]
+    values = {key: Finding(family, 0.1234567 * (k + 1), 1e-3) for k, key in enumerate(keys)}
+    moved = {key: (own, replace(own, value=2.0 * (own.value or 0.0))) for key, own in values.items()}
+    changes = {
+        "new": Proposed(family, new=values), "drifted": Proposed(family, drifted=moved), "gone": Proposed(family, gone=values),
+        "bands": Proposed(family, bands=moved), "all": Proposed(family, values, values, moved, values, moved),
+        "same": Proposed(family, same=values),
+    }  # fmt: skip
+    return {name: numbered(accepting._details(change), "line") for name, change in changes.items()}
+
+
 MAKERS: dict[str, Callable[[], Sections]] = {
     "shown/sensitivity": sensitivity, "shown/piles": clocked_piles, "shown/self-test": tried_faults,
     "shown/bisected": bisected, "shown/environments": kept_environments, "shown/times": times, "shown/posed": posed,
+    "shown/doctor": doctor, "shown/starved": starved_stacks, "shown/attacked": refusals,
+    "shown/corruptions": corruptions, "shown/accepted": accepted,
 }  # fmt: skip
