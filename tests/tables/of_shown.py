@@ -320,7 +320,8 @@ def accepted() -> Sections:
     values = {key: Finding(family, 0.1234567 * (k + 1), 1e-3) for k, key in enumerate(keys)}
     moved = {key: (own, replace(own, value=2.0 * (own.value or 0.0))) for key, own in values.items()}
     changes = {
-        "new": Proposed(family, new=values), "drifted": Proposed(family, drifted=moved), "gone": Proposed(family, gone=values),
+        "new": Proposed(family, new=values), "drifted": Proposed(family, drifted=moved),
+        "gone": Proposed(family, gone=values),
         "bands": Proposed(family, bands=moved), "all": Proposed(family, values, values, moved, values, moved),
         "same": Proposed(family, same=values),
     }  # fmt: skip
