@@ -13,6 +13,7 @@ from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.questions.invariance import (
+    MOVES,
     RELATIONS,
     Allowances,
     Change,
@@ -337,3 +338,83 @@ def test_of_a_motion_that_diverged_its_reason_is_told_and_nothing_is_measured_of
     )
     found = measured(Slot("head_on", (), 2, "chipmunk", "tuned", 1 / 240), "again")
     assert found == "a speed beyond 1e9 m/s" if finish == "diverged" else "impulse" in found
+
+
+def asked_of(monkeypatch, answers, relations=()):
+    """What is asked of a cell, in order, and what changed; as `compared`, with who is asked in a fresh process."""
+    from validation.questions import invariance
+
+    asked = []
+
+    class Listening:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *ended):
+            asked.append("over")
+
+        def ask(self, question, slot, relation, moves=0.0, turns=0.0, fresh=False):
+            assert question is measured
+            asked.append((relation, moves, turns, fresh))
+            return answers(relation, moves, turns)
+
+    monkeypatch.setattr(invariance, "Apart", Listening)
+    return asked, compare(Slot("off_centre", (), 3, "chipmunk", "tuned", 1 / 240), relations)
+
+
+def test_starts_are_moved_once_for_maps_of_one_size_and_turned_only_where_something_is_to_be_mended(monkeypatch):
+    canonical = CATALOGUE["off_centre"]
+    scene = canonical.scene(3)
+    unit = unit_of(scene, 0.0)
+    steps = [sign * k for k in MOVES for sign in (1, -1)]
+    moved = [("again", k * unit, 0.0, False) for k in steps]
+    turned = [("again", 0.0, k * unit / size_of(scene), False) for k in steps]
+
+    def same(relation, moves, turns):
+        return {"spin": (3.0, "")}
+
+    asked, found = asked_of(monkeypatch, same, ["again", "fresh process", "mirrored"])
+    one = ("again", 0.0, 0.0, False)
+    rest = [("fresh process", 0.0, 0.0, True), ("mirrored", 0.0, 0.0, False)]
+    assert asked == [one, *moved, one, *rest, "over"]
+    assert [change.relation for change in found] == ["again", "fresh process", "mirrored"]
+    assert all(change.holds and not change.lost and not change.refused for change in found)
+
+    def broken(relation, moves, turns):
+        return {"spin": (3.0 + 1e-9 * bool(moves) + 2e-9 * bool(turns) + (1e-3 if relation == "mirrored" else 0.0), "")}
+
+    asked, found = asked_of(monkeypatch, broken, ["mirrored", "again"])
+    assert asked == [one, *moved, one, *turned, ("mirrored", 0.0, 0.0, False), "over"] or asked == [
+        one, *moved, ("again", 0.0, 0.0, False), ("mirrored", 0.0, 0.0, False), *turned, "over"
+    ]  # fmt: skip
+    change = found[-1]
+    assert (change.relation, change.metric, change.holds) == ("mirrored", "spin", False)
+    assert change.change == pytest.approx(1e-3, rel=1e-9)
+    bound = next(check.bound for check in canonical.checks(scene, 1 / 240) if check.metric == "spin")
+    size = scales(canonical, scene, 1 / 240)["spin"]
+    allowed = Allowances({"spin": 2e-9}, {"spin": bound}, {"spin": size}).of("spin", 3.0)
+    assert change.allowed == pytest.approx(allowed, rel=1e-6)
+
+
+def test_a_map_that_rounds_is_asked_of_moved_starts_in_its_own_pose_before_it_counts_as_a_break(monkeypatch):
+    scene = CATALOGUE["off_centre"].scene(3)
+    shift = next(each for each in RELATIONS if each.name == "turned 33").pose(scene).shift
+    unit = unit_of(scene, shift)
+    steps = [sign * k for k in MOVES for sign in (1, -1)]
+
+    def answers(relation, moves, turns):
+        return {"spin": (3.0 + (1e-3 + 1e-3 * bool(moves) if relation == "turned 33" else 0.0), "")}
+
+    asked, (change,) = asked_of(monkeypatch, answers, ["turned 33"])
+    assert change.holds  # its own starts scatter by as much
+    assert asked[-1 - len(steps) : -1] == [("turned 33", k * unit, 0.0, False) for k in steps]
+
+
+def test_a_cell_without_an_answer_has_none_in_any_pose_and_one_that_is_lost_in_a_pose_is_lost_there(monkeypatch):
+    asked, found = asked_of(monkeypatch, lambda *given: "it crashed")
+    assert asked == [("again", 0.0, 0.0, False), "over"]
+    assert found == [Change(each.name, refused="it crashed") for each in RELATIONS]
+    asked, (change,) = asked_of(
+        monkeypatch, lambda relation, *more: "it hung" if relation == "mirrored" else {"spin": (3.0, "")}, ["mirrored"]
+    )
+    assert change == Change("mirrored", refused="it hung", lost=True)

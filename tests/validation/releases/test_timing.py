@@ -10,6 +10,7 @@ from adapters import registry
 from reports.command import main
 from reports.dashboard.series import panels
 from validation.bench.stopwatch import Lap
+from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot
 from validation.records.store import RELEASE_TITLE, Store
 from validation.releases import history, timing
@@ -161,3 +162,54 @@ def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatc
     assert "time: the first release" in text and "x1" in text
     assert len([run for run in store.runs() if run.title.endswith(": times")]) == 2  # what is stored is not timed again
     store.close()
+
+
+def test_a_lap_is_kept_whole_and_its_yardstick_beside_it_under_the_same_profile():
+    told = lap(round_=3, seconds=0.5, yardstick=0.25, void="it hung") | {
+        "order": 4, "wall_seconds": 0.75, "bodies": 2, "steps": 120}  # fmt: skip
+    own, beside = timing.timings_of(told, "1.5")
+    assert own == Timing(
+        purpose="work", slot=SLOT, cell="", engine_version="1.5", bodies=2, opponent="python/default", round=3, order=4,
+        process=3, sampled=False, steps=120, seconds=0.5, wall_seconds=0.75, state_hash="ab", error=None, void="it hung",
+    )  # fmt: skip
+    assert beside == replace(
+        own, slot=replace(SLOT, engine="python"), engine_version="", bodies=0, seconds=0.25, wall_seconds=0.25,
+        state_hash="", void="",
+    )  # fmt: skip
+
+
+def test_rounds_have_processes_of_their_own_and_what_is_void_once_is_timed_no_more(monkeypatch):
+    """A lap lies between two yardsticks and is told with their mean; the lane ends whatever happens."""
+    did, sticks = [], iter(range(1, 100))
+    other = replace(SLOT, profile="other")
+
+    class Lane:
+        def __init__(self, patience):
+            did.append(("made", patience))
+
+        def start(self):
+            did.append("started")
+
+        def stop(self):
+            did.append("stopped")
+
+        def time(self, unit):
+            did.append(unit.slot.profile)
+            if len(did) > 9:
+                raise RuntimeError("the machine fell asleep")
+            return Lap("1.0", 0.5, 0.75, 1.0, "ab", None, "", "it hung" if unit.slot == other else "")
+
+    monkeypatch.setattr(timing, "Lane", Lane)
+    monkeypatch.setattr(timing, "yardstick", lambda: float(next(sticks)))
+    told = list(timing.laps([other, SLOT], 2))
+    assert did == [("made", timing.PATIENCE), "started", "other", "default", "started", "default", "stopped"]
+    unit = timing.work_unit(SLOT, "", None)
+    plain = {"wall_seconds": 0.75, "seconds": 0.5, "steps": unit.steps, "bodies": unit.bodies, "state_hash": "ab"}
+    assert told == [
+        {"timed": other.as_dict(), "round": 0, "order": 0, "yardstick": 1.5, "void": "it hung", **plain},
+        {"timed": SLOT.as_dict(), "round": 0, "order": 1, "yardstick": 2.5, "void": "", **plain},
+        {"timed": SLOT.as_dict(), "round": 1, "order": 0, "yardstick": 4.5, "void": "", **plain},
+    ]
+    with pytest.raises(RuntimeError):
+        list(timing.laps([SLOT], 5))
+    assert did[-1] == "stopped"
