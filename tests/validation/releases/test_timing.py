@@ -170,7 +170,8 @@ def test_a_lap_is_kept_whole_and_its_yardstick_beside_it_under_the_same_profile(
     own, beside = timing.timings_of(told, "1.5")
     assert own == Timing(
         purpose="work", slot=SLOT, cell="", engine_version="1.5", bodies=2, opponent="python/default", round=3, order=4,
-        process=3, sampled=False, steps=120, seconds=0.5, wall_seconds=0.75, state_hash="ab", error=None, void="it hung",
+        process=3, sampled=False, steps=120, seconds=0.5, wall_seconds=0.75, state_hash="ab", error=None,
+        void="it hung",
     )  # fmt: skip
     assert beside == replace(
         own, slot=replace(SLOT, engine="python"), engine_version="", bodies=0, seconds=0.25, wall_seconds=0.25,
