@@ -9,7 +9,9 @@ import pytest
 from listening import SWEEPS, Listening
 
 from adapters.conformance import CHECKS, statements
+from adapters.conformance.finding import NotAsked
 from adapters.engine import EngineError, Scheme, Setting
+from adapters.scene import Box
 
 
 def engine_with(**changed):
@@ -248,3 +250,87 @@ def test_the_package_on_the_path_is_ours(monkeypatch, tmp_path):
     for none in (None, SimpleNamespace(origin=None)):
         monkeypatch.setattr(importlib.util, "find_spec", lambda name, none=none: none)
         assert CHECKS["packages"](Listening()) == "`adapters` on this path is None"
+
+
+class Round(Listening):
+    """The toy that has no boxes."""
+
+    def refuses(self, scene, profile):
+        said = super().refuses(scene, profile)
+        return "it has no boxes" if any(isinstance(body.shape, Box) for body in scene.bodies) else said
+
+
+@pytest.mark.parametrize("check", ["refusals", "bad_numbers", "capabilities"])
+def test_an_engine_without_boxes_is_asked_with_what_it_has(check):
+    engine = Round()
+    assert CHECKS[check](engine) == ""
+    shapes = {type(body.shape).__name__ for world in engine.built for body in world.scene.bodies}
+    assert "Box" not in shapes and ("Disc" in shapes) is (check == "capabilities")
+
+
+def test_what_is_unknown_is_asked_for_by_names_that_nobody_has_and_of_a_box_that_rests():
+    profiles, built = [], []
+
+    class Heard(Listening):
+        def settings(self, profile, needs, dt, iterations=None):
+            if profile not in self.profiles:
+                profiles.append((profile, needs.regime, needs.dimension, dt))
+            return super().settings(profile, needs, dt, iterations)
+
+        def build(self, scene, dt, settings):
+            built.append((scene.name, type(scene.bodies[-1].shape).__name__, dt, dict(settings)))
+            return super().build(scene, dt, settings)
+
+    assert CHECKS["refusals"](Heard()) == ""
+    assert profiles == [("no such profile", "rest", 2, statements.DT)]
+    own = {"iterations": SWEEPS["first"]}
+    assert built == [("check_resting", "Box", statements.DT, own | {"no_such_setting": 1.0})]
+
+
+def test_an_engine_that_takes_any_setting_is_named_for_it_and_its_world_is_closed():
+    class Lax(Listening):
+        def build(self, scene, dt, settings):
+            return super().build(scene, dt, {k: v for k, v in settings.items() if k != "no_such_setting"})
+
+    engine = Lax()
+    assert CHECKS["refusals"](engine) == "an unknown setting is accepted"
+    assert [world.closed for world in engine.built] == [1]
+
+
+def test_an_engine_of_the_plane_is_asked_on_after_what_lies_in_space():
+    class Planar(Listening):
+        facts = replace(Listening.facts, dimensions=frozenset({2}))
+
+        def refuses(self, scene, profile):
+            return 3 if scene.name == "check_leaning" else super().refuses(scene, profile)
+
+    assert CHECKS["refusals"](Planar()) == "first: refuses() must give one line or None, not 3"
+
+
+def test_an_engine_that_refuses_all_has_shown_nothing():
+    class Nothing(Listening):
+        def refuses(self, scene, profile):
+            return "not today"
+
+    with pytest.raises(NotAsked, match=r"^every scene is refused, check_striking as well$"):
+        CHECKS["capabilities"](Nothing())
+
+
+def test_a_fixed_body_is_asked_for_where_it_is_at_the_end():
+    for after, said in ((0, "second: check_resting, 2-D: floor is fixed and does not move so"), (-1, "")):
+
+        class Late(Listening):
+            def build(self, scene, dt, settings, after=after):
+                world = super().build(scene, dt, settings)
+                if world.profile == "second" and scene.name == "check_resting":
+                    twist, floor = world.twist, scene.index("floor")
+
+                    def moving():
+                        told = twist()
+                        told[floor, 0] += (world.steps > 3) if after == 0 else (0 < world.steps <= 3)
+                        return told
+
+                    world.twist = moving
+                return world
+
+        assert CHECKS["capabilities"](Late()) == said
