@@ -10,6 +10,7 @@ import of_kit
 import of_laws
 import of_motions
 import of_options
+import of_other_worlds
 import of_print
 import of_questions
 import of_results
@@ -71,6 +72,7 @@ def tables() -> Makers:
         SCENES
         | MOTIONS
         | LAWS
+        | of_other_worlds.MAKERS
         | EXPERIMENTS
         | KIT
         | QUESTIONS
