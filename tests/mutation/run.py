@@ -10,7 +10,7 @@ one subject, both chosen by the commit, writes nothing, and fails on a survivor 
 subjects that are as they were when they ran: survivors of another are nobody's yet. Which those are is said, and more
 than half of all is a failure. ``--sample N --seed S`` asks about all modules (`sample`), ``--again``
 what the tests of now make of those that it missed. With ``--near`` a drawn mutant meets the test files that name its
-module, without the 20 min that it takes to see what tests reach: a lower bound that is lower.
+module, without the three quarters of an hour that it takes to see what tests reach: a lower bound that is lower.
 
 A survivor is listed by its function and its change, so that an edit elsewhere does not make it new. Its reason is
 written by hand, but for the few that `known_by_form` can tell; survivors without one are *open*. What only a time limit

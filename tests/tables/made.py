@@ -13,6 +13,7 @@ import of_options
 import of_other_worlds
 import of_print
 import of_questions
+import of_refusals
 import of_results
 import of_scenes
 import of_shown
@@ -63,6 +64,7 @@ def of_installed() -> Makers:
             for profile in engine.profiles:
                 found[f"settings/{name}-{profile}"] = partial(of_engines.settings_table, engine, profile)
                 found[f"held/{name}-{profile}"] = partial(of_engines.held_table, engine, profile)
+            found[f"scripts/{name}"] = partial(of_refusals.scripts, name)
     return found
 
 
@@ -80,5 +82,6 @@ def tables() -> Makers:
         | PRINTED
         | of_results.MAKERS
         | of_shown.MAKERS
+        | of_refusals.MAKERS
         | of_installed()
     )
