@@ -8,16 +8,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from unittest.mock import patch
 
 from click.testing import CliRunner
-from telling import Sections
+from telling import Sections, word
 
 from adapters import foreign
 from adapters.engine import EngineError, EngineFacts, Setting
+from adapters.model import Model
+from adapters.plain import one_line
 from adapters.scene import (
     Body,
     Box,
@@ -34,11 +37,15 @@ from adapters.scene import (
 )
 from reports.command import main
 from reports.scripts import written
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size, parse_dt, slot_from_dict
 from validation.files.scene_files import canonical_from_file
 from validation.posed import primary_of
 from validation.records.store import Store, StoreError
 from validation.releases.choosing import chosen
+
+#: Step of what is built [s].
+DT = 1 / 240
 
 
 def refusal(do: Callable[[], object], folder: str = "") -> str:
@@ -47,6 +54,8 @@ def refusal(do: Callable[[], object], folder: str = "") -> str:
         made = do()
     except (SceneError, EngineError, StoreError) as error:
         return f"{type(error).__name__}: {error}".replace(folder or "\0", "FOLDER")
+    except Exception as error:  # the engine's own, which should be ours
+        return f"untidy {type(error).__name__}: {error}"
     return f"made: {type(made).__name__}"
 
 
@@ -398,6 +407,130 @@ def of_stores() -> Sections:
     return {"stores": found}
 
 
+# ---- models and settings ---------------------------------------------------------------------------------------------
+
+MODELS = Path(__file__).parents[1] / "models"
+#: A ball above a floor, in MuJoCo's own words; what is wrong with it stands in one of the places.
+MJCF = """<mujoco{root}><option timestep="0.004"{option}/>{top}<worldbody>
+<geom name="floor" type="plane" size="0 0 1"{floor}/>{world}
+<body name="ball" pos="0 0 1"{body}>{joint}<geom name="round" type="sphere" size="0.5" mass="2"{geom}/>{inside}</body>
+</worldbody>{end}</mujoco>"""
+FREE, HINGE = "<freejoint/>", '<joint type="hinge" axis="0 1 0"/>'
+BOX_BY_IT = '<body name="box" pos="3 0 1"><freejoint/><geom type="box" size="0.5 0.5 0.5" mass="1"{}/></body>'
+ODD_MODELS: dict[str, dict[str, str]] = {
+    "sound": {},
+    "a hinge": {"joint": HINGE},
+    "no joint": {"joint": ""},
+    "stiff": {"joint": '<joint type="free" stiffness="3"/>'},
+    "damped": {"joint": '<joint type="free" damping="3"/>'},
+    "two shapes": {"inside": '<geom type="box" size="0.1 0.1 0.1"/>'},
+    "weightless": {"body": ' gravcomp="1"'},
+    "an ellipsoid": {"geom": '"/><geom type="ellipsoid" size="0.5 0.4 0.3'},
+    "off its centre": {"inside": '<inertial pos="0.1 0 0" mass="1" diaginertia="1 1 1"/>'},
+    "axes of its own": {"inside": '<inertial pos="0 0 0" euler="0 20 10" mass="1" diaginertia="1 0.9 0.8"/>'},
+    "a mask": {"geom": ' contype="2" conaffinity="2"'},
+    "a mask of the floor": {"floor": ' contype="0" conaffinity="0"'},
+    "wind": {"option": ' wind="1 0 0"'},
+    "water": {"option": ' density="1000"'},
+    "viscous": {"option": ' viscosity="1"'},
+    "no contacts": {"top": '<option><flag contact="disable"/></option>'},
+    "a fast solver": {"option": ' solver="CG"'},
+    "RK4": {"option": ' integrator="RK4"'},
+    "implicit": {"option": ' integrator="implicit"'},
+    "elliptic": {"option": ' cone="elliptic" impratio="10"'},
+    "override": {"top": '<option><flag override="enable"/></option>'},
+    "rolling": {"geom": ' condim="6" friction="1 0.1 0.1"'},
+    "torsion": {"geom": ' condim="4" friction="1 0.1 0.1"'},
+    "smooth": {"geom": ' condim="1"', "floor": ' condim="1"'},
+    "a gap": {"geom": ' gap="0.01" margin="0.02"'},
+    "softer": {"geom": ' solref="0.05 1"'},
+    "softer than the rest": {"world": BOX_BY_IT.format(' solref="0.05 1"')},
+    "smooth beside rough": {"geom": ' condim="1"', "floor": ' condim="1"', "world": BOX_BY_IT.format(' condim="3"')},
+    "a pair": {"end": '<contact><pair geom1="floor" geom2="round" condim="4" friction="1 2 0 0 0"/></contact>'},
+    "kept apart": {"end": '<contact><exclude body1="world" body2="ball"/></contact>'},
+    "a tendon": {"end": '<equality><weld body1="ball"/></equality>'},
+    "a motor": {"end": "<actuator><motor/></actuator>"},
+    "a keyframe": {"end": '<keyframe><key name="up" qpos="0 0 2 1 0 0 0"/></keyframe>'},
+    "a keyframe too short": {"end": '<keyframe><key qpos="0 0 2"/></keyframe>'},
+    "another root": {"root": "2"},
+    "a light": {"world": "<light/><camera/>"},
+    "a site": {"inside": "<site/>"},
+}
+
+
+def of_models() -> Sections:
+    """Models of MuJoCo and robots: what is refused of each, or how it is read, strictly and not."""
+    from adapters.mujoco import model, urdf
+
+    found = Sections()
+    for path in sorted(MODELS.iterdir()):
+        reader = {".xml": model, ".urdf": urdf}.get(path.suffix)
+        if reader is not None:
+            found[path.name] = as_read(reader.read, path.read_text(encoding="utf-8"))
+    places = ("root", "option", "top", "floor", "world", "body", "geom", "inside", "end")
+    texts = {
+        title: MJCF.format(**dict.fromkeys(places, "") | {"joint": FREE} | own) for title, own in ODD_MODELS.items()
+    }
+    texts |= {"no root": "<a/>", "entity": '<!DOCTYPE a [<!ENTITY b "c">]><mujoco/>', "empty": "<mujoco/>"}
+    for title, text in texts.items():
+        found[title] = as_read(model.read, text)
+    return found
+
+
+def as_read(read: Callable[[str, bool], Model], text: str) -> dict[str, str]:
+    """What is said of a model, strictly and where what has no place may be left out; and what was made of it."""
+    found = dict[str, str]()
+    for drop in (False, True):
+        try:
+            made = read(text, drop)
+        except (SceneError, EngineError) as error:
+            found[f"drop {drop}"] = one_line(error)
+            continue
+        found |= {f"drop {drop} note {k}": note for k, note in enumerate(made.notes)}
+        found |= {f"drop {drop} dropped {k}": left for k, left in enumerate(made.dropped)}
+        if not drop:
+            found |= {f"setting {k}": word(setting) for k, setting in enumerate(made.settings)}
+            found |= {f"body {body.name}": word(body) for body in made.scene.bodies}
+            found |= {f"pair {k}": word(pair) for k, pair in enumerate(made.scene.pairs)}
+    return found
+
+
+#: What settings of any kind may not be, or may be for some.
+VALUES = (None, "x", True, 0, -1, -0.5, 0.5, NAN, (), (1.0, 2.0))
+
+
+def of_settings(name: str) -> Sections:
+    """Every setting of an engine with values that it may not have, and its names."""
+    from adapters.needs import needs
+    from adapters.registry import load
+    from adapters.stepping import posed_for
+
+    engine, found = load(name), Sections()
+    scene = CATALOGUE["impact"].scene(2, {})
+    for profile in engine.profiles:
+        given = {s.name: s.value for s in engine.settings(profile, needs(scene), DT)}
+        posed = posed_for(engine, scene)
+
+        def build(settings: Mapping[str, Any], dt: float = DT, posed: Scene = posed) -> object:
+            made = engine.build(posed, dt, dict(settings))
+            made.close()
+            return made
+
+        sound = dict(given)
+        own: dict[str, Callable[[], object]] = {
+            f"{setting} = {value!r}": (lambda s=setting, v=value, sound=sound: build({**sound, s: v}))
+            for setting in given
+            for value in VALUES
+        }
+        own |= {
+            f"without {n}": (lambda n=n, sound=sound: build({k: v for k, v in sound.items() if k != n})) for n in given
+        }
+        own["another"] = lambda sound=sound: build({**sound, "colour": 1})
+        own |= {f"step {dt:g}": (lambda dt=dt, sound=sound: build(sound, dt)) for dt in (0.0, -0.1, NAN, INF)}
+        found[profile] = {what: said for what, said in told(own).items() if not said.startswith("untidy")}
+    return found
+
+
 # ---- scripts ---------------------------------------------------------------------------------------------------------
 
 
@@ -434,4 +567,8 @@ MAKERS: dict[str, Callable[[], Sections]] = {
     "refused/plugins": of_plugins,
     "refused/commands": of_commands,
     "refused/stores": of_stores,
+    "refused/models": of_models,
+    **{
+        f"refused/settings-{name}": partial(of_settings, name) for name in ("reference", "chipmunk", "bullet", "mujoco")
+    },
 }
