@@ -518,7 +518,7 @@ def of_settings(name: str) -> Sections:
 
         sound = dict(given)
         own: dict[str, Callable[[], object]] = {
-            f"{setting} = {value!r}": (lambda s=setting, v=value, sound=sound: build({**sound, s: v}))
+            f"{setting} {value!r}": (lambda s=setting, v=value, sound=sound: build({**sound, s: v}))
             for setting in given
             for value in VALUES
         }
