@@ -2,13 +2,16 @@
 
 import io
 import json
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 from rich.console import Console
 
 from adapters.scene import SceneError
 from reports import speed, tables
+from reports.command import main
 from reports.command.selection import _scene_names
 from validation.catalogue import CATALOGUE
 from validation.records.store import Store
@@ -60,3 +63,20 @@ def test_a_bench_is_written_as_one_json_and_a_table_each(tmp_path):
     assert isinstance(json.loads(paths[0].read_text()), dict)
     assert pd.read_csv(paths[2]).to_dict("records") == [{"scene": "impact", "cost": 2.5e-3}]
     assert pd.read_csv(paths[1]).to_dict("records") == [{"seconds": 1.5e-3}]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_engine_that_is_not_installed_is_described_by_why(monkeypatch, as_json):
+    from reports import listing
+
+    found = SimpleNamespace(version="", engine=None, reason="no module named toy; pip install toy")
+    monkeypatch.setattr(listing.registry, "names", lambda: ["toy"])
+    monkeypatch.setattr(listing.registry, "find", lambda name: found)
+    done = CliRunner().invoke(main, ["describe", "toy", *["--json"] * as_json])
+    assert done.exit_code == 0, done.output
+    if as_json:
+        assert json.loads(done.stdout) == {
+            "kind": "engine", "name": "toy", "version": "", "status": "not installed", "reason": found.reason,
+        }  # fmt: skip
+    else:
+        assert [line.strip() for line in done.stdout.splitlines()] == ["toy , not installed", found.reason]

@@ -5,6 +5,7 @@ from collections import Counter
 import pytest
 
 from reports.matrix import UNJUDGED, Field
+from reports.page import verdicts
 from reports.page.verdicts import Mark, family_mark
 from reports.wording import LABELS, MARKS
 
@@ -27,3 +28,32 @@ def test_a_mark_of_rows_of_one_kind_leads_to_them_unless_the_engine_was_not_aske
 
 def test_nothing_at_all_is_unsupported_and_leads_nowhere():
     assert family_mark(None, "there") == Mark("unsupported", "")
+
+
+def judged_row(**changed):
+    """A row that fails, of one engine and profile in one cell."""
+    slot = {"scene": "bounce", "params": {}, "dimension": 2, "engine": "toy", "profile": "default", "dt": 1 / 240,
+            "iterations": None, "ulp": 0}  # fmt: skip
+    row = {
+        "scene": "bounce", "dimension": 2, "engine": "toy", "profile": "default", "iterations": None,
+        "metric": "apex[2]",
+        "engine_version": "1", "unit": "m", "value": 0.5, "truth": 0.640001234, "error": -0.14, "tolerance": 1e-3,
+        "because": "so", "outcome": "ok", "reason": "", "dt": 1 / 240, "source": "law", "physics": "fail",
+        "floor": None,
+        "standing": "known", "params": {"e": 0.8}, "slot": slot, "skill": None, "explained": "", "known": "it sinks",
+    }  # fmt: skip
+    return {**row, **changed}
+
+
+def test_the_worst_row_of_a_column_says_where_it_is_how_far_off_and_how_many_pass():
+    """A cell at its scene's defaults is called so; what stands in brackets is which of the same kind it is."""
+    other = judged_row(metric="apex", value=0.64, error=1e-6, physics="pass", standing=None)
+    asked = judged_row(metric="apex", params={"e": 0.8}, iterations=7, error=-0.2)
+    asked["slot"] = {**asked["slot"], "params": {"e": 0.9}, "iterations": 7}
+    found = verdicts._worst(("toy", "default"), [other, judged_row()])
+    assert (found.engine, found.profile, found.row) == ("toy", "default", judged_row())
+    assert (found.mark.mark, found.mark.text) == ("known", "140")
+    assert (found.where, found.value, found.truth, found.tolerance) == ("[2]", "0.5", "0.640001", "0.001")
+    assert (found.ratio, found.passing) == ("140", "1/2")
+    assert verdicts._worst(("toy", "default"), [other]).where == "defaults"
+    assert verdicts._worst(("toy", "default"), [asked, other]).where == "e=0.9 it=7"
