@@ -6,6 +6,7 @@ A refusal names the field, says what stands there, and what may. Nothing is run.
 from __future__ import annotations
 
 import json
+import subprocess
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -40,9 +41,14 @@ from reports.scripts import written
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size, parse_dt, slot_from_dict
 from validation.files.scene_files import canonical_from_file
+from validation.findings import FindingsError, files
 from validation.posed import primary_of
+from validation.questions import breaks
 from validation.records.store import Store, StoreError
-from validation.releases.choosing import chosen
+from validation.releases import choosing, environments
+from validation.releases.choosing import Release, chosen
+from validation.releases.environments import BuildError
+from validation.workers import LimitError, limits
 
 #: Step of what is built [s].
 DT = 1 / 240
@@ -52,7 +58,7 @@ def refusal(do: Callable[[], object], folder: str = "") -> str:
     """What is said where something is refused; what was made where it is not."""
     try:
         made = do()
-    except (SceneError, EngineError, StoreError) as error:
+    except (SceneError, EngineError, StoreError, FindingsError, LimitError, BuildError) as error:
         return f"{type(error).__name__}: {error}".replace(folder or "\0", "FOLDER")
     except Exception as error:  # the engine's own, which should be ours
         return f"untidy {type(error).__name__}: {error}"
@@ -531,6 +537,124 @@ def of_settings(name: str) -> Sections:
     return found
 
 
+# ---- pip, limits, and what other processes hand over -----------------------------------------------------------------
+
+
+class Said:
+    """What a process that was started says in the end."""
+
+    def __init__(self, code: int = 0, out: str = "", err: str = "") -> None:
+        self.returncode, self.stdout, self.stderr = code, out, err
+
+
+def of_processes() -> Sections:
+    """What pip says of releases, what a shell allows, and what ``run-cell`` is handed."""
+    release = Release("toy", "1.0", "toy-wheel", ("numpy",))
+    answers = {
+        "none": Said(1, "", "ERROR: No matching distribution found for toy-wheel==1.0"),
+        "no version": Said(1, "", "ERROR: Could not find a version that satisfies toy"),
+        "words": Said(1, "", "a\nsorry"),
+        "two": Said(1, "", "ERROR: first\nERROR: second\nnot this"),
+        "silent": Said(2),
+        "fine": Said(0),
+    }
+    python = environments._short()
+    found = Sections({"install": {}, "listed": {}, "told": {}, "cells": {}})
+    for title, answer in answers.items():
+        with patch.object(environments.subprocess, "run", lambda *given, answer=answer, **more: answer):
+            own = refusal(lambda: environments._install(Path("x"), release)).replace(python, "PYTHON")
+            found["install"][title] = own
+            if answer.returncode:
+                found["told"][title] = refusal(lambda: environments._told_by(Path("x")))
+    lists = {
+        "none": Said(1, "", "ERROR: No matching distribution found"),
+        "silent": Said(0, "toy (1.0)"),
+        "odd": Said(1, "", "WARNING: a"),
+        "some": Said(0, "toy (1.0)\nAvailable versions: 2.0rc1, 1.10, x-y, 1.9\n  INSTALLED: 1.0"),
+    }
+    for title, answer in lists.items():
+        with patch.object(choosing.subprocess, "run", lambda *given, answer=answer, **more: answer):
+            found["listed"][title] = refusal(lambda: choosing._listed("toy"))
+
+    def late(*given: Any, **more: Any) -> Any:
+        raise subprocess.TimeoutExpired("pip", 1.0)
+
+    with patch.object(environments.subprocess, "run", late):
+        found["install"]["late"] = refusal(lambda: environments._install(Path("x"), release))
+        found["listed"]["late"] = refusal(lambda: choosing._listed("toy"))
+    with patch.object(environments, "find_spec", lambda name: None):
+        found["install"]["no pip"] = refusal(lambda: environments._install(Path("x"), release))
+    with patch.object(limits, "_hard_limit", lambda: limits.GIB):
+        found["told"]["a small shell"] = refusal(lambda: limits.memory(2))
+    for title, text in {"nothing": "", "words": "words", "a list": "[1]", "no engine": '{"scene": "impact"}'}.items():
+        done = CliRunner().invoke(main, ["run-cell"], input=text)
+        found["cells"][title] = f"{done.exit_code}: {done.output.strip()}"
+    return found
+
+
+#: A family of findings, and members of it; each entry of the tables below changes one field.
+FAMILY = {
+    "id": "a",
+    "profiles": ["default"],
+    "scene": "impact",
+    "metrics": ["impulse"],
+    "reason": "so",
+    "source": "manual",
+    "releases": ">=1",
+}
+ROW = ["a", "default", "2", "e=0.5", "1/240", "", "impulse", "1.5", "0.25"]
+
+
+def of_lists() -> Sections:
+    """Files of findings with one thing wrong."""
+    wrong: dict[str, dict[str, Any]] = {
+        "sound": {},
+        "all of all": {"profiles": ["*"], "metrics": ["*"]},
+        "many scenes": {"scene": "imp*"},
+        "no specifier": {"releases": "new"},
+        "no list": {"profiles": "default"},
+        "empty list": {"metrics": []},
+        "no reason": {"reason": " "},
+        "a number": {"source": 3},
+    }
+    rows: dict[str, dict[int, str]] = {
+        "sound": {},
+        "no family": {0: "b"},
+        "another profile": {1: "tuned"},
+        "another metric": {6: "drift"},
+        "no value": {7: "x"},
+        "no band": {8: "0"},
+        "endless": {7: "inf"},
+        "outside": {8: f"2{files.TO}3"},
+        "no width": {8: f"1.5{files.TO}1.5"},
+        "nothing": {7: ""},
+    }
+    here = Path("FOLDER/a.toml")
+    found = Sections({"families": {}, "rows": {}, "breaks": {}})
+    for title, changed in wrong.items():
+        found["families"][title] = refusal(lambda changed=changed: files._family("chipmunk", here, FAMILY | changed))
+        other = {
+            "id": "a",
+            "profiles": ["default"],
+            "scenes": ["impact"],
+            "relations": ["mirrored"],
+            "reason": "so",
+            "source": "manual",
+            "releases": ">=1",
+        }
+        also = {{"scene": "scenes", "metrics": "relations"}.get(name, name): value for name, value in changed.items()}
+        if title == "all of all":
+            also = {"scenes": ["*"], "relations": ["*"]}
+        found["breaks"][title] = refusal(lambda also=also, other=other: breaks._family("chipmunk", here, other | also))
+    family = files._family("chipmunk", here, FAMILY)
+    for title, cells in rows.items():
+        row = [cells.get(k, value) for k, value in enumerate(ROW)]
+        found["rows"][title] = refusal(lambda row=row: files._member("chipmunk", "FOLDER/a.csv:2", row, {"a": family}))
+    promised = FAMILY | {"profiles": ["reference"]}
+    found["families"]["a solution"] = refusal(lambda: files._family("reference", here, promised))
+    return found
+
+
 # ---- scripts ---------------------------------------------------------------------------------------------------------
 
 
@@ -568,6 +692,8 @@ MAKERS: dict[str, Callable[[], Sections]] = {
     "refused/commands": of_commands,
     "refused/stores": of_stores,
     "refused/models": of_models,
+    "refused/processes": of_processes,
+    "refused/lists": of_lists,
     **{
         f"refused/settings-{name}": partial(of_settings, name) for name in ("reference", "chipmunk", "bullet", "mujoco")
     },
