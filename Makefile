@@ -118,7 +118,7 @@ mutants-check: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
 	$(BIN)/python tests/mutation/run.py --check 40
 
-# N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 20 min of CPU at first, to
+# N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 40 min of CPU at first, to
 # see which tests reach which statements, then half a minute a mutant.
 N ?= 150
 SEED ?= 1

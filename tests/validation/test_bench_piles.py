@@ -85,3 +85,19 @@ def test_the_command_shows_cost_ratio_and_exponent(monkeypatch):
 def test_a_real_lap_costs_something():
     lap = next(iter(piles.laps("discs", 20)))
     assert lap.reference > 0.0 and lap.fixed_step > 0.0 and lap.bodies == 20
+
+
+@pytest.mark.parametrize("kind", piles.KINDS)
+def test_each_kind_is_a_pile_of_its_dimension_share_and_size_asked_for_by_each_seed(clocked, monkeypatch, kind):
+    """Warmed with one before the clock runs; then each seed at each size, from the instants of its fall."""
+    asked = []
+    made = {2: piles.planar_pile, 3: piles.spatial_pile}
+    for dimension, name in ((2, "planar_pile"), (3, "spatial_pile")):
+        monkeypatch.setattr(piles, name, lambda *given, d=dimension: asked.append((d, *given)) or made[d](*given))
+    found = list(piles.laps(kind, 40))
+    dimension, share = piles.KINDS[kind]
+    assert asked == [(dimension, piles.SEEDS[0], piles.LEAST, share),
+                     *[(dimension, seed, n, share) for n in (20, 40) for seed in piles.SEEDS]]  # fmt: skip
+    assert [(lap.kind, lap.bodies) for lap in found] == [
+        (kind, n) for n in (20, 40) for _ in piles.SEEDS for _ in piles.INSTANTS
+    ]
