@@ -184,9 +184,16 @@ def record(copy: Path, records: Path, seconds: float) -> None:
 
 
 def record_of(records: Path, name: str) -> Path:
-    """Where the record of a test file lies; another text of the file, or of how it is recorded, has another record."""
-    recorder = b"".join(Path(__file__).with_name(each).read_bytes() for each in ("recording.py", "reach.py"))
-    return records / f"{hashlib.sha256(name.encode() + (ROOT / name).read_bytes() + recorder).hexdigest()[:16]}.json"
+    """Where the record of a test file lies.
+
+    Another text of the file, of what stands beside it for tests, or of how it is recorded, has another record: cases of
+    kept tables are named by helpers.
+    """
+    path = ROOT / name
+    recorder = [Path(__file__).with_name(each) for each in ("recording.py", "reach.py")]
+    beside = sorted(each for each in path.parent.glob("*.py") if not each.name.startswith("test_"))
+    texts = b"".join(each.read_bytes() for each in (path, *beside, *recorder))
+    return records / f"{hashlib.sha256(name.encode() + texts).hexdigest()[:16]}.json"
 
 
 def reached(copy: Path, name: str, seconds: float) -> tuple[Record, set[str]]:
