@@ -7,6 +7,7 @@ import pytest
 from reports import testing
 from reports.command.completion import row_ids
 from reports.testing import Failed, Plugin, _Check, _report
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.judging.verdicts import Physics, Standing
 
@@ -148,3 +149,47 @@ def test_rows_that_are_offered_are_the_worst_of_each_family_and_begin_as_is_type
     told = []
     monkeypatch.setattr(reports.exports, "load_rows", lambda folder: told.append(str(folder)) or [])
     assert row_ids(SimpleNamespace(params={}), None, "") == [] and told == ["crosscheck-out"]
+
+
+class Config:
+    """Options of pytest as the plugin reads them."""
+
+    def __init__(self, **options):
+        self.options = {"--crosscheck": "chipmunk", "--scenes": "", "--crosscheck-profile": ""} | options
+
+    def getoption(self, name):
+        return self.options[name]
+
+
+def test_the_plugin_takes_its_cells_from_words_with_commas_and_says_how_many(monkeypatch):
+    asked = []
+    found = SimpleNamespace(engine=object(), version="7.3", reason="")
+    monkeypatch.setattr(testing.registry, "find", lambda name: found if name == "chipmunk" else None)
+    monkeypatch.setattr(testing, "slots", lambda request: asked.append(request) or [SLOT, SLOT])
+    options = {"--scenes": "impact, bounce,impact", "--crosscheck-profile": " tuned ,, default"}
+    plugin = Plugin(Config(**options))
+    assert (plugin.engine, plugin.version, plugin.slots) == ("chipmunk", "7.3", [SLOT, SLOT])
+    assert (plugin.rows, plugin.ran, plugin.mended) == ({}, set(), [])
+    assert plugin.pytest_report_header() == "crosscheck: chipmunk 7.3, 2 cells"
+    (request,) = asked
+    assert (request.scenes, request.engines, request.profiles) == (
+        ["impact", "bounce"], ["chipmunk"], ["tuned", "default"]
+    )  # fmt: skip
+    Plugin(Config())
+    assert asked[1].scenes == list(CATALOGUE) and asked[1].profiles == []
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"--crosscheck": "absent"}, "crosscheck: engine: absent is not installed: no wheel"),
+        ({"--scenes": "nobody"}, "crosscheck: scene: there is no scene called 'nobody'"),
+    ],
+)
+def test_an_engine_that_is_not_there_and_a_scene_that_is_none_are_wrong_calls(monkeypatch, options, said):
+    found = {"absent": SimpleNamespace(engine=None, version="", reason="no wheel")}
+    sound = SimpleNamespace(engine=object(), version="7.3", reason="")
+    monkeypatch.setattr(testing.registry, "find", lambda name: found.get(name, sound))
+    with pytest.raises(pytest.UsageError) as refused:
+        Plugin(Config(**options))
+    assert str(refused.value).startswith(said)
