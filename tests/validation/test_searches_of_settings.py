@@ -344,3 +344,39 @@ def test_every_cure_that_an_engine_names_is_measured_with_the_processes_that_wer
     monkeypatch.setattr(decisive, "measure", lambda engine, target, jobs=1: (engine, target, jobs))
     assert decisive.measure_all("toy", 4) == [("toy", "toy 1", 4), ("toy", "toy 2", 4)]
     assert [jobs for _, _, jobs in decisive.measure_all("toy")] == [1, 1]
+
+
+def test_a_cure_that_changes_nothing_in_the_cell_that_is_told_says_what_it_changes_elsewhere(monkeypatch):
+    """Values of other profiles differ from cell to cell; one that is as the profile has it there changes nothing."""
+
+    def off(slot):
+        margin, s = dict(slot.params).get("margin", 1.0), dict(slot.switched)
+        return (0.5 if s.get("b") == 3 or margin < 1.5 else 9.0, 1.5 if margin > 1.5 and s.get("b") == 3 else 0.5)
+
+    found, _, _ = cured(monkeypatch, off, {"b": (3,)})
+    assert (found.failing, found.helps) == (1, False)  # it breaks what passed
+    monkeypatch.setattr(cures, "readings", lambda found: [])
+    assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its standard cells is judged")
+
+
+def test_what_is_left_a_little_above_its_tolerance_is_not_mended(monkeypatch):
+    def off(slot):
+        s, margin = dict(slot.switched), dict(slot.params).get("margin", 1.0)
+        mended = s.get("a") == 1
+        return (1.5 if margin > 1.5 else 0.5) if mended else 9.0, 0.25 if mended else 9.0
+
+    found, _, _ = cured(monkeypatch, off, {"a": (1,)})
+    assert (found.failing, found.left, found.mends) == (6, 1, ("turned",))
+
+
+def test_a_table_of_cures_has_costs_to_three_digits_and_names_in_any_letters(tmp_path):
+    cure = Cure(
+        "toy", "2.1", "default", "pinch\u00e9", 2, ({},), 1, 0, 4, "creep", "m/s", {}, 0.0, 0.1, 0.9, 0.05, {"a": 1},
+        "", (), 3,
+        1.23456e-5, 2.34567e-5, ("creep",),
+    )  # fmt: skip
+    cures.write([cure], tmp_path / "cures.csv")
+    assert cures.read(tmp_path / "cures.csv") == [replace(cure, cost_before=1.23e-5, cost_after=2.35e-5)]
+    lines = (tmp_path / "cures.csv").read_bytes().decode("utf-8").split("\n")
+    assert len(lines) == 3 and lines[0].startswith("engine,version,shipped,scene,dimension,cells,failing")
+    assert not list(tmp_path.glob("*.new"))
