@@ -22,18 +22,23 @@ from adapters.conformance import self_test
 from adapters.conformance.self_test import Caught
 from reference_solver.certification.self_test import JUDGED, SIZES, Corruption, Trial
 from reference_solver.hard_cases.starved import Starved
+from reports import history as written
+from reports import page, speed, starved, tables
 from reports import releases as told_releases
-from reports import speed, starved, tables
 from reports.command import accepting, benching, certifying, fuzzing, inspecting, main, piles, posing, releasing
 from reports.palette import PAPER
 from validation.bench import agreement
 from validation.bench.piles import KINDS, Lap
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.findings import Family, Finding
 from validation.judging.acceptance import Change as Proposed
 from validation.judging.comparison import Change, Kind
+from validation.judging.comparison import Family as Moved
 from validation.questions import invariance
 from validation.questions.detection import BlindSpot, Detected
+from validation.records.store import Run
+from validation.releases import history
 from validation.releases.bisection import Found, Unchanged
 from validation.releases.environments import Environment
 
@@ -328,9 +333,45 @@ def accepted() -> Sections:
     return {name: numbered(accepting._details(change), "line") for name, change in changes.items()}
 
 
+def said_of_runs() -> Sections:
+    """What is said of rows that moved, how a page is cited and made again, and of times on a machine that was busy."""
+
+    def step(*kinds: tuple[Kind, bool]) -> history.Step:
+        changes = [
+            Change(kind, worse, "toy", "default", "stack", 3, f"n={k}", "creep", "pass", "fail", 3.25, SLOT.as_dict())
+            for k, (kind, worse) in enumerate(kinds)
+        ]
+        return history.Step("1.0", "1.1", Moved(tuple(changes)))
+
+    every = [(kind, worse) for kind in (Kind.FLIP, Kind.OUTCOME, Kind.ERROR) for worse in (True, False)]
+    moved = {f"{kind.value} {worse} {count}": written._moved([step(*[(kind, worse)] * count)])
+             for kind, worse in every for count in (1, 2)}  # fmt: skip
+    found = Sections({"moved": moved | {"all": written._moved([step(*every), step(*every[::-1])])}})
+    bench = type("Bench", (), {"run": type("Run", (), {"title": "bench quick: impact --dim 2"})})
+    scenes = " ".join(CATALOGUE)
+    with patch.object(page, "package_version", lambda: "1.2.3"):
+        for title in ("quick: impact bounce", f"full: {scenes} --dim 3 --engine bullet", "odd", f"standard: {scenes}"):
+            for commit in ("", "abc123", "abc123+"):
+                run = Run("20260101-000000", "2026-01-01T10:00:00", commit, {}, title, (), True)
+                own = type(
+                    "Source", (), {"run": run, "observations": [1, 2], "rows": [1], "bench": bench if commit else None}
+                )
+                told_of = page.cite(own)  # type: ignore[arg-type]
+                found[f"{title[:30]}, {commit}"] = {"text": told_of["text"]} | numbered(told_of["commands"], "line")
+    idle = pd.DataFrame(
+        {"void": ["", "", "", "it hung"], "load": [1.0, 1.1, 1.2, 9.0], "width": [0.01, 0.04, 0.1, 1.0],
+         "drifts": [False, True, False, True], "rounds": [5, 6, 7, 1]}
+    )  # fmt: skip
+    tables_of = {"idle": idle, "busy": idle.assign(load=[1.0, 1.3, 1.3, 1.0]), "none": idle[:0], "void": idle[3:]}
+    found["busy"] = {name: speed.busy(table) for name, table in tables_of.items()}
+    found["quality"] = {name: speed.quality_line(table) for name, table in tables_of.items()}
+    found["key"] = {str(ranked): speed.key(ranked) for ranked in (True, False)}
+    return found
+
+
 MAKERS: dict[str, Callable[[], Sections]] = {
     "shown/sensitivity": sensitivity, "shown/piles": clocked_piles, "shown/self-test": tried_faults,
     "shown/bisected": bisected, "shown/environments": kept_environments, "shown/times": times, "shown/posed": posed,
     "shown/doctor": doctor, "shown/starved": starved_stacks, "shown/attacked": refusals,
-    "shown/corruptions": corruptions, "shown/accepted": accepted,
+    "shown/corruptions": corruptions, "shown/accepted": accepted, "shown/said": said_of_runs,
 }  # fmt: skip
