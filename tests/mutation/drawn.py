@@ -73,11 +73,11 @@ def stored() -> list[Drawn]:
 
 
 def write(rows: list[Drawn]) -> None:
-    """Write what was drawn, in place of the sample before."""
+    """Write what was drawn, in place of what stood there."""
     with DRAWN.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(field.name for field in fields(Drawn))
-        writer.writerows(astuple(row) for row in sorted(rows, key=lambda row: row.number))
+        writer.writerows(astuple(row) for row in sorted(rows, key=lambda row: (row.seed, row.number)))
 
 
 def table(rows: list[Drawn]) -> list[str]:
@@ -86,10 +86,12 @@ def table(rows: list[Drawn]) -> list[str]:
         return []
     noticed = [row for row in rows if row.verdict in NOTICED]
     interval = binomtest(len(noticed), len(rows)).proportion_ci(0.95, method="exact")
+    seeds = {seed: [row for row in rows if row.seed == seed] for seed in dict.fromkeys(row.seed for row in rows)}
+    each = (f"{seed} ({sum(row.verdict in NOTICED for row in own)} of {len(own)})" for seed, own in seeds.items())
     lines = [
         "", "## A sample of all modules", "",
-        f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {rows[0].seed} from all of the "
-        f"three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
+        f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {' and '.join(each)} from all of "
+        f"the three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
         f"A mutant met {rows[0].met}. A survivor may be one that other tests notice.", "",
         f"**{len(noticed)} of {len(rows)} are noticed, {100.0 * len(noticed) / len(rows):.1f} % (95 %: "
         f"{100.0 * interval.low:.1f} to {100.0 * interval.high:.1f} %).**", "",

@@ -223,12 +223,16 @@ def copied(folder: Path) -> Path:
 
 
 def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
-    """Draw, run and write down; what is written already of this seed and these sources is not run again."""
+    """Draw, run and write down; what is written already of this seed and these sources is not run again.
+
+    Samples of the same sources by other seeds stay: none is chosen.
+    """
     bench = NearBench.of(folder) if by_name else Bench.of(folder)
     each = counts(folder / "counts.json")
     total = sum(each.values())
     of = hashlib.sha256(b"".join((ROOT / module).read_bytes() for module in each)).hexdigest()[:12]
     found = {row.number: row for row in stored() if (row.seed, row.of) == (seed, of)}
+    others = [row for row in stored() if row.of == of and row.seed != seed]
     for k, index in enumerate(draw(seed, number, total)):
         if k in found:
             continue
@@ -240,7 +244,7 @@ def sample(seed: int, number: int, folder: Path, by_name: bool) -> None:
         reason = "" if verdict in NOTICED else known_by_form(change)
         found[k] = Drawn(seed, k, of, module, function, change, verdict, tests, failed, reason=reason, met=bench.met)
         print(f"{k + 1} of {number}: {verdict}, {function}: {change[:100]}", flush=True)
-        write(list(found.values()))
+        write([*others, *found.values()])
 
 
 def again(folder: Path, by_name: bool) -> None:

@@ -53,6 +53,22 @@ def test_what_was_missed_meets_the_tests_of_now_where_its_code_is_as_it_was(tool
     assert "**1 of 6 are noticed, 16.7 %" in "\n".join(drawn.table(found))
 
 
+def test_samples_of_two_seeds_stand_together_and_each_is_told(tools):
+    _, drawn = tools
+    first = drawn.Drawn(11, 1, "of", "reports/a.py", "reports.a.x_f", "a -> b", "killed", 1, "t")
+    rows = [
+        first,
+        replace(first, seed=7, number=3),
+        replace(first, seed=7, verdict="survived"),
+        replace(first, number=0),
+    ]
+    drawn.write(rows)
+    assert [(row.seed, row.number) for row in drawn.stored()] == [(7, 1), (7, 3), (11, 0), (11, 1)]
+    text = "\n".join(drawn.table(drawn.stored()))
+    assert "4 mutants, drawn by the seed 7 (1 of 2) and 11 (2 of 2) from all" in text
+    assert "**3 of 4 are noticed, 75.0 %" in text
+
+
 def test_files_near_a_function_import_its_module_first_and_are_of_its_name_then(tools, monkeypatch, tmp_path):
     sample, _ = tools
     texts = {
