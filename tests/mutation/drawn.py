@@ -91,7 +91,8 @@ def table(rows: list[Drawn]) -> list[str]:
     lines = [
         "", "## A sample of all modules", "",
         f"Written by `make mutants-sample`: {len(rows)} mutants, drawn by the seed {' and '.join(each)} from all of "
-        f"the three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources `{rows[0].of}`. "
+        f"the three packages but {', '.join(APART)}, whose tests need engines that are set apart; sources "
+        f"`{rows[0].of}`. "
         f"A mutant met {rows[0].met}. A survivor may be one that other tests notice.", "",
         f"**{len(noticed)} of {len(rows)} are noticed, {100.0 * len(noticed) / len(rows):.1f} % (95 %: "
         f"{100.0 * interval.low:.1f} to {100.0 * interval.high:.1f} %).**", "",
