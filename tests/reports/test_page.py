@@ -20,7 +20,7 @@ from reports import page
 from reports.answers import answers
 from reports.command import main
 from reports.cures import Change
-from reports.page import Source, as_data, first_answers, load_source, policy, render
+from reports.page import Source, as_data, first_answers, load_source, policy, render, replay
 from reports.page.choosing import Cure, choices, cures
 from reports.page.conclusions import NAMED, findings, scenes_text, sentences
 from reports.page.explorer import explorer
@@ -408,6 +408,22 @@ def test_a_packed_replay_gives_back_every_pose_to_half_a_level(page_source):
         at += count + series["contacts"] * (1 + 2 + 2)
     exact = np.cumsum(levels[at:].reshape(2, -1), axis=-1, dtype=np.int16).T * data["unit"]
     assert exact[0] == pytest.approx([0.0, 1.5], abs=data["unit"]) and len(exact) == data["count"]
+
+
+def test_the_head_of_a_replay_has_what_the_page_s_script_reads(page_source):
+    """What stands there by another name the script takes for nothing: it draws an empty picture and says no word."""
+    head = next(r for r in replays(page_source) if r.id == "replay-bounce-2").head
+    read = ("dimension", "dt", "count", "bodies", "fixed", "tracked", "low", "high", "unit", "angle", "place", "arrow")
+    assert list(head) == [*read, "gravity", "static", "series"]
+    script = (Path(replay.__file__).parent / "templates" / "replay.js").read_text(encoding="utf-8")
+    assert all(f"data.{name}" in script or f"show.{name}" in script for name in read)
+    assert (head["dimension"], head["tracked"], head["static"]) == (2, 0, False)
+    assert head["gravity"] == [0.0, -9.81]
+    assert [body["name"] for body in head["bodies"]] == ["ball"]
+    assert [(body["name"], body["type"]) for body in head["fixed"]] == [("floor", "face")]
+    assert len(head["low"]) == len(head["high"]) == 2 and head["low"][-1] < 0.6 < 1.5 < head["high"][-1]
+    assert 0.0 < head["unit"] < 1e-3 and head["dt"] > 0.0 and head["count"] > 60
+    assert all({"who", "contacts"} <= set(one) for one in head["series"])
 
 
 def _recordings(source, scene, dimension):
