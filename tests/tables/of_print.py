@@ -105,6 +105,21 @@ def said(arguments: Sequence[str], width: int) -> Sections:
     return {"said": told}
 
 
+def coloured() -> Sections:
+    """What stands out on a terminal with colours: bold, dim and red are told as marks around it."""
+    row = row_id(next(row for row in source().rows if row["standing"] == "new"))
+    calls = {"show": ("show",), "all": ("show", "--all"), "findings": ("findings",), "explain": ("explain", row),
+             "compare": ("compare", "20260101-000000", "20260103-000000"), "runs": ("list", "runs")}  # fmt: skip
+    found = Sections()
+    for name, call in calls.items():
+        environment = {"COLUMNS": "110", "FORCE_COLOR": "1", "TERM": "xterm", "COLORTERM": ""}
+        with patch.dict("os.environ", environment):
+            result = CliRunner().invoke(main, [*call, "--out", str(folder())], color=True)
+        text = re.sub(r"\x1b\[([0-9;]*)m", r"{\1}", result.stdout)
+        found[name] = {"status": str(result.exit_code)} | numbered(text, "out")
+    return found
+
+
 def takes_out(command: str) -> bool:
     """Whether a command has ``--out``."""
     return any("--out" in option.opts for option in main.commands[command].params)
@@ -308,6 +323,6 @@ def makers() -> dict[str, Callable[[], Sections]]:
     }
     return found | {
         **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
-        "print/sentences": sentences, "print/files": exported, "print/bench": benched, "print/frame": data_frame,
+        "print/coloured": coloured, "print/sentences": sentences, "print/files": exported, "print/bench": benched, "print/frame": data_frame,
         "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
     }  # fmt: skip
