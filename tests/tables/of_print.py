@@ -323,6 +323,7 @@ def makers() -> dict[str, Callable[[], Sections]]:
     }
     return found | {
         **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
-        "print/coloured": coloured, "print/sentences": sentences, "print/files": exported, "print/bench": benched, "print/frame": data_frame,
+        "print/coloured": coloured, "print/sentences": sentences, "print/files": exported, "print/bench": benched,
+        "print/frame": data_frame,
         "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
     }  # fmt: skip

@@ -12,7 +12,7 @@ from adapters.trajectory import Trajectory
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.running.tracks import record, recording_from_bytes, representatives, tube
+from validation.running.tracks import _distance_to_path, record, recording_from_bytes, representatives, tube
 
 DT = 1.0 / 240.0
 
@@ -107,3 +107,19 @@ def test_one_cell_per_profile_is_kept_with_the_same_parameters_and_step_for_all(
         slot("default", 3, 1 / 60),
         slot("tuned", 3, 1 / 60),
     }
+
+
+@pytest.mark.parametrize(
+    ("path", "distance"),
+    [
+        ([(0.0, 0.0)], 5.0),
+        ([(0.0, 0.0), (0.0, 0.0)], 5.0),
+        ([(0.0, 0.0), (3.0, 0.0)], 4.0),
+        ([(0.0, 0.0), (6.0, 0.0)], 4.0),
+        ([(3.0, 5.0), (3.0, 8.0)], 1.0),
+        ([(0.0, 8.0), (0.0, 0.0), (6.0, 8.0)], 0.0),
+    ],
+)
+def test_a_point_is_as_far_from_a_path_as_from_its_nearest_line_or_its_only_point(path, distance):
+    found = _distance_to_path(np.array([3.0, 4.0]), np.array(path))
+    assert found == pytest.approx(distance, abs=1e-12) and isinstance(found, float)
