@@ -106,3 +106,9 @@ def test_a_run_that_neither_machine_finished_is_not_finished_by_a_merge(out, tmp
     store = Store(folders[0], create=False)
     assert [run.finished for run in store.runs()] == [False, False]
     store.close()
+
+
+def test_a_folder_without_results_is_refused_and_left_as_it_is(tmp_path):
+    done = call("export", "--parquet", tmp_path / "p", "--out", tmp_path / "none", status=2)
+    assert "out: there are no results at" in done.output and "crosscheck run makes them" in done.output
+    assert not (tmp_path / "none").exists() and not list((tmp_path / "p").glob("*.parquet"))

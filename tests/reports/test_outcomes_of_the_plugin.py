@@ -193,3 +193,13 @@ def test_an_engine_that_is_not_there_and_a_scene_that_is_none_are_wrong_calls(mo
     with pytest.raises(pytest.UsageError) as refused:
         Plugin(Config(**options))
     assert str(refused.value).startswith(said)
+
+
+def test_a_check_is_found_by_the_words_of_its_cell(monkeypatch):
+    """``pytest -k`` knows the scene, the profile and the metric, and all of them together."""
+    monkeypatch.setattr(pytest.Item, "__init__", lambda self, **named: setattr(self, "extra_keyword_matches", {"own"}))
+    item = object.__new__(_Check)
+    plugin = object()
+    _Check.__init__(item, plugin, SLOT, "speed")
+    assert (item.plugin, item.slot, item.metric) == (plugin, SLOT, "speed")
+    assert item.extra_keyword_matches == {"own", "crosscheck", "impact", "default", "speed"}

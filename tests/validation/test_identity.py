@@ -1,0 +1,34 @@
+"""What is kept of the machine that made a run."""
+
+import os
+import platform
+
+from validation import identity
+
+
+def test_a_machine_is_told_by_what_a_time_means_and_what_may_move_a_last_bit(monkeypatch):
+    monkeypatch.setattr(identity, "_cpu_name", lambda: "a fast one")
+    found = identity.machine()
+    assert list(found) == ["cpu", "cores", "memory_gib", "system", "machine", "python"]
+    assert (found["cpu"], found["cores"], found["machine"]) == ("a fast one", os.cpu_count(), platform.machine())
+    assert found["system"] == f"{platform.system()} {platform.release()}"
+    assert found["python"] == platform.python_version()
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**19 + 2**16}
+    monkeypatch.setattr(identity.os, "sysconf", pages.__getitem__)
+    monkeypatch.setattr(identity.os, "cpu_count", lambda: None)
+    found = identity.machine()
+    assert (found["memory_gib"], found["cores"]) == (2.2, 0)  # two and a quarter GiB, to a tenth
+
+
+def test_a_cpu_has_the_name_that_the_system_gives_it_or_that_of_its_kind(monkeypatch, tmp_path):
+    place = tmp_path / "cpuinfo"
+    monkeypatch.setattr(identity, "Path", lambda name: place if name == "/proc/cpuinfo" else None)
+    place.write_text("processor : 0\nmodel name\t: A Fast One @ 3 GHz: rev 2\nmodel name : another\n")
+    assert identity._cpu_name() == "A Fast One @ 3 GHz: rev 2"
+    monkeypatch.setattr(identity.platform, "processor", lambda: "")
+    monkeypatch.setattr(identity.platform, "machine", lambda: "riscv64")
+    place.write_text("processor : 0\n")
+    assert identity._cpu_name() == "riscv64"
+    place.unlink()
+    monkeypatch.setattr(identity.platform, "processor", lambda: "x86")
+    assert identity._cpu_name() == "x86"
