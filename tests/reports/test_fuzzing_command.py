@@ -151,3 +151,28 @@ def test_what_refused_stands_most_frequent_first_with_its_numbers():
     assert [row[:4] for row in cells] == [("residual", "3", "2", "1"), ("energy", "1", "0", "0")]
     assert [row[4:] for row in cells] == [("5", "1 2 3"), ("3", "2")]
     assert [column.no_wrap for column in table.columns] == [True] * 5 + [False]
+
+
+def test_while_scenes_are_attacked_it_is_said_how_many_are_through(monkeypatch):
+    said = []
+
+    class Status:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *ended):
+            said.append("over")
+
+        update = said.append
+
+    class Console:
+        def status(self, text):
+            said.append(text)
+            return Status()
+
+        def print(self, *given, **named):
+            pass
+
+    monkeypatch.setattr(fuzzing, "attacked", lambda jobs: iter([answer(5), answer(6)]))
+    assert fuzzing.show_random(Console(), False, 2, 5, (2,)) == 0
+    assert said == ["attacking", "1 of 2", "2 of 2", "over"]

@@ -459,6 +459,13 @@ ODD_MODELS: dict[str, dict[str, str]] = {
     "a keyframe": {"end": '<keyframe><key name="up" qpos="0 0 2 1 0 0 0"/></keyframe>'},
     "a keyframe too short": {"end": '<keyframe><key qpos="0 0 2"/></keyframe>'},
     "another root": {"root": "2"},
+    "defaults": {"top": '<default><motor ctrlrange="0 1"/><geom friction="0.25"/><site rgba="1 0 0 1"/></default>'},
+    "lights between": {
+        "inside": '<light/><site/><geom class="main" type="sphere" size="0.1" contype="0" conaffinity="0"/>'
+    },
+    "two motors and a weld": {
+        "end": '<actuator><motor joint="j"/></actuator><tendon/><equality/><contact><exclude body1="a" body2="b"/></contact>'
+    },
     "a light": {"world": "<light/><camera/>"},
     "a site": {"inside": "<site/>"},
 }

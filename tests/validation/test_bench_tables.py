@@ -256,3 +256,11 @@ def test_a_profile_without_a_rank_is_benched_where_it_is_named():
 
     assert benched() == ({"default", "tuned"},) * 2
     assert benched("matched") == ({"matched"},) * 2
+
+
+def test_ratios_side_by_side_have_an_iteration_count_of_none_as_nought(store):
+    first = ratios(store, planted_lane(store, 1.5, "bench one"))
+    both = agreement(first, first)
+    assert len(both) == len(first) > 0 and set(both["iterations"]) == {0.0}
+    assert list(both["params_text"]) == [repr(sorted(params.items())) for params in first["params"]]
+    assert (both["ratio_1"] == both["ratio_2"]).all() and both["agrees"].all()
