@@ -464,7 +464,8 @@ ODD_MODELS: dict[str, dict[str, str]] = {
         "inside": '<light/><site/><geom class="main" type="sphere" size="0.1" contype="0" conaffinity="0"/>'
     },
     "two motors and a weld": {
-        "end": '<actuator><motor joint="j"/></actuator><tendon/><equality/><contact><exclude body1="a" body2="b"/></contact>'
+        "end": '<actuator><motor joint="j"/></actuator><tendon/><equality/>'
+        '<contact><exclude body1="a" body2="b"/></contact>',
     },
     "a light": {"world": "<light/><camera/>"},
     "a site": {"inside": "<site/>"},
