@@ -6,7 +6,7 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.equalities import RANK, effect, list_rows, row_value, solve_rows
+from reference_solver.stepping.equalities import RANK, cluster_of, effect, join_bodies, list_rows, row_value, solve_rows
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 
@@ -177,11 +177,13 @@ def most_yield(gives: Array) -> float:
 def yield_with_others(lasting: Lasting, k: int) -> None:
     """Add to `Lasting.gives` what others do to contact k that hold on, stick and slip as they do."""
     rows = 1 + lasting.size[TANGENTS]
+    join_bodies(lasting)
+    cluster = cluster_of(lasting, k)
     for column in range(rows):
         kept, moved = 0, False
         for i in range(list_rows(lasting)):
             other, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-            if other == k:
+            if other == k or cluster_of(lasting, other) != cluster:
                 continue
             lasting.unknown[kept, 0], lasting.unknown[kept, 1] = other, row
             lasting.right[kept] = -passed_on(lasting, k, column, other, row)
