@@ -12,13 +12,9 @@ numba has no public way to say so: this rests on its lowering pass and its code 
 from __future__ import annotations
 
 import copy
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import compiler
 from numba.core import config as numba_config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -26,11 +22,11 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.cpu import CPUContext
 from numba.core.typed_passes import NativeLowering
 
+from reference_solver.compile_time import NOT_NEEDED, sparing
 from reference_solver.structure_types import Convention
 
-# numba's type hints know neither its configuration's attributes nor that methods can be replaced.
+# numba's type hints do not know its configuration's attributes.
 config: Any = numba_config
-Flags: Any = compiler.Flags
 
 
 class Module(JITCodeLibrary):
@@ -122,6 +118,12 @@ class Context(CPUContext):
         """How functions are called."""
         return Convention(self)
 
+    def refresh(self) -> None:
+        """Look for nothing new: what is compiled declares nothing, and its own pipeline has looked before.
+
+        numba does so whenever a function is none of its builtins, some ten thousand times.
+        """
+
 
 def conventional(context: Any) -> Any:
     """Return numba's context with our convention for structures."""
@@ -143,74 +145,17 @@ class Carried(CompilerBase):
         return [with_lowering(self.state, ModuleLowering)]
 
 
-#: Passes that change nothing in kernels, each of which goes through all statements and has the lives of all variables
-#: found anew: kernels have no ``with``, no functions in functions, no expressions of arrays, nothing compiled for a
-#: constant.
-NOT_NEEDED = frozenset(
-    [
-        "WithLifting",
-        "InlineClosureLikes",
-        "RewriteDynamicRaises",
-        "MakeFunctionToJitFunction",
-        "FindLiterallyCalls",
-        "LiteralUnroll",
-        "LiteralPropagationSubPipelinePass",
-        "InlineOverloads",
-        "NopythonRewrites",
-        "DumpParforDiagnostics",
-    ]
-)
-
-#: Objects made between two searches for garbage while a kernel compiles: with Python's own 700 a fifth of the time went
-#: into searches through all that is being compiled (87 s of CPU for the planar located step, 69 s now, 67 s without
-#: any), for .66 GB of memory instead of .55.
-BETWEEN_COLLECTIONS = 1_000_000
-
-
 class Whole(CompilerBase):
     """Compiles kernels."""
 
     def compile_extra(self, func: Any) -> Any:
-        """Compile, and all that is called, with few searches for garbage and with flags that are soon compared."""
-        with few_collections(), flags_soon_compared():
+        """Compile, and all that is called, without what kernels do not need."""
+        with sparing():
             return super().compile_extra(func)
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes, the lowering apart."""
         return [with_lowering(self.state, ProgramLowering)]
-
-
-@contextmanager
-def few_collections() -> Iterator[None]:
-    """Have Python search for garbage seldom."""
-    thresholds = gc.get_threshold()
-    gc.set_threshold(max(thresholds[0], BETWEEN_COLLECTIONS) if thresholds[0] else 0, *thresholds[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*thresholds)
-
-
-@contextmanager
-def flags_soon_compared() -> Iterator[None]:
-    """Have numba take flags for equal where the same ones are set to the same, before it looks at what none has set.
-
-    It looks them up for every call in every function, under a hash that is the same for all, and made two tables of
-    some forty options for each comparison: a fifteenth of the time.
-    """
-    compared = Flags.__eq__
-
-    def equal(one: Any, other: Any) -> Any:
-        return (type(one) is type(other) and one._values == other._values) or compared(one, other)
-
-    hashed, same = Flags.__hash__, hash(Flags())
-    Flags.__eq__ = equal
-    Flags.__hash__ = lambda flags: same
-    try:
-        yield
-    finally:
-        Flags.__eq__ = compared
-        Flags.__hash__ = hashed
 
 
 def with_lowering(state: Any, lowering: type) -> Any:

@@ -85,6 +85,7 @@ class Lasting(NamedTuple):
     other: Array  # (R,)
     weight: Array  # (R,)
     wanted: Array  # (T,)
+    gives: Array  # (1 + T, 1 + T): how a contact yields to forces along its rows while all others hold on [1/kg]
     order: Indices  # (R,)
     filled: Indices  # (R,): columns of a row that are not zero
     change: Array  # (V,): of the velocities of a body by a unit of force
@@ -147,6 +148,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         other=np.zeros(r),
         weight=np.zeros(r),
         wanted=np.zeros(t),
+        gives=np.zeros((1 + t, 1 + t)),
         order=np.zeros(r, np.int64),
         filled=np.zeros(r, np.int64),
         change=np.zeros(v),

@@ -1,11 +1,7 @@
 """Kernels carry all code they call, and nothing that only kernels call can be called from Python."""
 
-import gc
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from numba.core import compiler
 
 from reference_solver import linking
 from reference_solver.compilation import config, inner_kernel, kernel, njit
@@ -50,53 +46,6 @@ def test_what_only_kernels_call_refuses_python():
     trunk(1.0)
     with pytest.raises(TypeError):
         leaf(1.0)
-
-
-def test_a_kernel_that_compiles_leaves_the_garbage_collector_as_it_was():
-    before = gc.get_threshold()
-
-    @kernel
-    def fresh(x):
-        return x + 2.0
-
-    assert fresh(1.0) == 3.0 and gc.get_threshold() == before
-    try:
-        gc.set_threshold(0)
-        assert fresh(1) == 3.0 and gc.get_threshold() == (0, *before[1:])
-        gc.set_threshold(5_000_000, 3, 4)
-        assert fresh(True) == 3.0 and gc.get_threshold() == (5_000_000, 3, 4)
-    finally:
-        gc.set_threshold(*before)
-
-
-def test_passes_that_are_left_out_are_passes_of_numba():
-    """A release that calls them otherwise would run them again, and nobody would see it."""
-    state = SimpleNamespace(func_ir=None, flags=compiler.Flags())
-    known = {step.__name__ for step, _ in linking.DefaultPassBuilder.define_nopython_pipeline(state).passes}
-    assert known >= linking.NOT_NEEDED
-
-
-def test_flags_compare_as_they_do_without_us_and_are_left_as_they_were():
-    def flags(**settings):
-        made = compiler.Flags()
-        for name, value in settings.items():
-            setattr(made, name, value)
-        return made
-
-    some = [flags(), flags(nrt=True), flags(nrt=False), flags(nrt=True, boundscheck=True), flags(inline="always")]
-    methods = compiler.Flags.__eq__, compiler.Flags.__hash__
-
-    def compared():
-        return [[(one == other, hash(one) == hash(other)) for other in [*some, 3]] for one in some]
-
-    plain = compared()
-    with pytest.raises(ZeroDivisionError), linking.flags_soon_compared():
-        with linking.flags_soon_compared():
-            assert compared() == plain
-        assert compiler.Flags.__eq__ is not methods[0]
-        raise ZeroDivisionError
-    assert (compiler.Flags.__eq__, compiler.Flags.__hash__) == methods
-    assert flags() == flags(nrt=False) and flags() != flags(nrt=True)
 
 
 def test_loops_are_neither_unrolled_nor_vectorised():

@@ -7,13 +7,13 @@ from reference_solver.compilation import from_python
 from reference_solver.stepping import turning_slips
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, OPEN, SLIP, START, STICK, allocate_lasting
 
-steady_slip, follow_slip, stops_across, is_alone = (
+steady_slip, follow_slip, stops_across, most_yield = (
     from_python(each)
     for each in (
         turning_slips.steady_slip,
         turning_slips.follow_slip,
         turning_slips.stops_across,
-        turning_slips.is_alone,
+        turning_slips.most_yield,
     )
 )
 
@@ -54,14 +54,16 @@ def enter(lasting, k, pair):
 SPEED, FORCE = 1e-4 * LAST_KNOWN, np.array([2.5, 0.5])
 
 
-def moment():
-    """What is left of the time that a step can bear when the slip would have been stopped [s]."""
-    return turning_slips.BEARABLE * STEP - np.linalg.norm(SPEED) / np.linalg.norm(FRICTION)
+def moment(gives=GIVES):
+    """What is left of the time that a step can bear when the slip would have been stopped at most [s]."""
+    most = np.linalg.eigvalsh(0.5 * (gives + gives.T)).max()
+    return turning_slips.BEARABLE * STEP - np.linalg.norm(SPEED) / (MU * PRESSED * most)
 
 
-def misses(direction):
+def misses(direction, gives=GIVES, pressed=lambda d: PRESSED):
     """Sine between a direction and the slip that is left under it after that moment, and whether it is along."""
-    left = SPEED + moment() * (FORCE - MU * PRESSED * GIVES @ direction)
+    force = FORCE - MU * PRESSED * (GIVES - gives) @ LAST_KNOWN  # of all but the friction, and who holds on against it
+    left = SPEED + moment(gives) * (force - MU * pressed(direction) * gives @ direction)
     assert np.linalg.norm(left) > 1e-6
     return abs(left[0] * direction[1] - left[1] * direction[0]) / np.linalg.norm(left), left @ direction > 0.0
 
@@ -75,20 +77,82 @@ def test_a_slip_whose_body_no_other_contact_holds_goes_as_its_own_matrix_lets_it
         lasting.mode[1] = OPEN if beside == "open" else STICK
         if beside == "elsewhere":
             lasting.body[1] = 2, 2
-    assert is_alone(lasting, 0) and steady_slip(lasting, 0)
+    assert steady_slip(lasting, 0)
     off, along = misses(lasting.direction[0])
     assert off < 1e-9 and along
     assert misses((SPEED + moment() * FORCE) / np.linalg.norm(SPEED + moment() * FORCE))[0] > 0.1
 
 
-def test_a_slip_whose_body_others_hold_goes_where_it_goes_without_friction():
+@pytest.mark.parametrize("rubs", [0.0, 0.4])
+def test_a_slip_whose_body_others_hold_yields_as_they_let_it(rubs):
+    """Another contact holds the body in a row across, and rubs by that load along the first tangent, if it does.
+
+    By hand: a unit along a row moves the held one by h G; it pushes back by h G/(h h), and where it slips by its
+    friction as well: each column of the compliance loses the share of it that this takes away.
+    """
+    lasting = slow_slip(SPEED, FORCE)
+    lasting.size[CONTACTS] = 2
+    held = np.array([0.0, 1.0, 2.0, 0.0, 0.0, 0.0])  # between both tangents of the slip
+    rubbed = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    lasting.body[1], lasting.mode[1], lasting.friction[1] = (1, 2), SLIP, rubs
+    lasting.direction[1] = 1.0, 0.0
+    lasting.jacobian[1, 0, 0], lasting.response[1, 0, 0], lasting.response[1, 0, 1] = held, held, rubbed
+    rows = lasting.jacobian[0, 1]
+    push = held - rubs * rubbed
+    gives = rows @ rows.T - np.outer(rows @ push, rows @ held) / (held @ push)
+    assert steady_slip(lasting, 0)
+    assert lasting.gives == pytest.approx(gives, rel=1e-12, abs=1e-12)
+
+    # The pressure that keeps the contact held hangs on where friction goes.
+    def pressed(d):
+        friction = np.array([1.0, *(-MU * d)])
+        return PRESSED * (gives[0] @ [1.0, *(-MU * LAST_KNOWN)]) / (gives[0] @ friction)
+
+    def left(d, p):
+        gained = np.asarray(FORCE) - FRICTION
+        before = gives[1:] @ (PRESSED * np.array([1.0, *(-MU * LAST_KNOWN)]))
+        after = gives[1:] @ (p * np.array([1.0, *(-MU * d)]))
+        return SPEED + moment(gives[1:, 1:]) * (gained - before + after)
+
+    d = lasting.direction[0]
+    slip = left(d, pressed(d))
+    assert slip @ d > 1e-6 and abs(slip[0] * d[1] - slip[1] * d[0]) < 1e-9 * np.linalg.norm(slip)
+    # With others let go of, or with a pressure that is what it was, it would go elsewhere.
+    alone = slow_slip(SPEED, FORCE)
+    assert steady_slip(alone, 0)
+    assert np.linalg.norm(alone.direction[0] - d) > 1e-3
+    fixed = left(d, PRESSED)
+    assert abs(fixed[0] * d[1] - fixed[1] * d[0]) > 1e-4 * np.linalg.norm(fixed)
+
+
+def test_where_others_hold_the_normal_too_the_pressure_is_what_it_is():
+    """A face on several points: its pressure is told elsewhere, and a slip of one point changes none."""
     lasting = slow_slip(SPEED, FORCE)
     lasting.size[CONTACTS] = 2
     enter(lasting, 1, (2, 1))
-    lasting.mode[1] = STICK
-    assert not is_alone(lasting, 0) and steady_slip(lasting, 0)
-    pushed = SPEED + moment() * FORCE
-    assert lasting.direction[0] == pytest.approx(pushed / np.linalg.norm(pushed), abs=1e-14)
+    lasting.jacobian[1, :, 1:] = lasting.response[1, :, 1:] = 0.0
+    lasting.mode[1], lasting.body[1] = SLIP, (2, 1)
+    assert steady_slip(lasting, 0)
+    assert lasting.gives[0].tolist() == [0.0, 0.0, 0.0]
+    off, along = misses(lasting.direction[0])
+    assert off < 1e-9 and along
+
+
+def test_what_yields_more_across_is_as_stiff_as_it_yields_there():
+    """A slip along what yields least, at a speed between the bearable ones of both: its direction is steadied.
+
+    By what slows it alone a step could bear it, but a slip that leaves its direction comes back at the other rate.
+    """
+    assert most_yield(np.array([[9.0, 0, 0], [0, 1.0, 0.3], [0, -0.1, 2.0]])) == pytest.approx(
+        np.linalg.eigvalsh([[1.0, 0.1], [0.1, 2.0]]).max(), rel=1e-14
+    )
+    bearable = turning_slips.BEARABLE * STEP * MU * PRESSED
+    for share, steady in ((1.5, True), (2.9, True), (3.1, False)):
+        lasting = slow_slip(share * bearable * np.array([1.0, 0.0]), np.array([2.5, 0.5]))
+        lasting.direction[0] = 1.0, 0.0
+        lasting.force[0] = PRESSED, -MU * PRESSED, 0.0
+        lasting.gamma[0] = 0.0, 2.5 - MU * PRESSED, 0.5
+        assert steady_slip(lasting, 0) is steady
 
 
 @pytest.mark.parametrize(("across", "steady"), [(1e-3, True), (1e-5, True), (1e-7, False)])
