@@ -77,7 +77,10 @@ def flags_soon_compared() -> Iterator[None]:
     compared = Flags.__eq__
 
     def equal(one: Any, other: Any) -> Any:
-        return (type(one) is type(other) and one._values == other._values) or compared(one, other)
+        if type(one) is not type(other):
+            return compared(one, other)
+        mine, its = one._values, other._values  # those that are set: all others are what they are by default
+        return mine == its or all(getattr(one, name) == getattr(other, name) for name in mine.keys() | its.keys())
 
     hashed, same = Flags.__hash__, hash(Flags())
     Flags.__eq__ = equal
