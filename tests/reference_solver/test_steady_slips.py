@@ -85,7 +85,7 @@ def test_a_slip_whose_body_no_other_contact_holds_goes_as_its_own_matrix_lets_it
 
 @pytest.mark.parametrize("rubs", [0.0, 0.4])
 def test_a_slip_whose_body_others_hold_yields_as_they_let_it(rubs):
-    """Another contact holds the body in a row across, and rubs by that load along the first tangent, if it does.
+    """Another contact holds the body in a row across, and rubs by that load beside it, if it does.
 
     By hand: a unit along a row moves the held one by h G; it pushes back by h G/(h h), and where it slips by its
     friction as well: each column of the compliance loses the share of it that this takes away.
@@ -93,7 +93,7 @@ def test_a_slip_whose_body_others_hold_yields_as_they_let_it(rubs):
     lasting = slow_slip(SPEED, FORCE)
     lasting.size[CONTACTS] = 2
     held = np.array([0.0, 1.0, 2.0, 0.0, 0.0, 0.0])  # between both tangents of the slip
-    rubbed = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    rubbed = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])  # and presses the held row a little
     lasting.body[1], lasting.mode[1], lasting.friction[1] = (1, 2), SLIP, rubs
     lasting.direction[1] = 1.0, 0.0
     lasting.jacobian[1, 0, 0], lasting.response[1, 0, 0], lasting.response[1, 0, 1] = held, held, rubbed
@@ -163,6 +163,15 @@ def test_what_is_pushed_along_its_direction_keeps_it(across, steady):
     assert steady_slip(lasting, 0) is steady
     if not steady:
         assert lasting.direction[0].tolist() == LAST_KNOWN.tolist()
+
+
+@pytest.mark.parametrize(("push", "steady"), [(0.45, False), (0.55, True)])
+def test_what_pushes_half_as_much_as_friction_brakes_steadies_a_slip(push, steady):
+    """Less ends it, along the direction last known."""
+    along = np.array([1.0, 0.9]) / np.hypot(1.0, 0.9)
+    lasting = slow_slip(SPEED, push * np.linalg.norm(FRICTION) * along)
+    assert steady_slip(lasting, 0) is steady
+    assert (lasting.direction[0].tolist() == LAST_KNOWN.tolist()) is not steady
 
 
 @pytest.mark.parametrize(("turn", "ended"), [(50.0, False), (100.0, True)])
