@@ -69,7 +69,7 @@ def few_collections() -> Iterator[None]:
 
 @contextmanager
 def flags_soon_compared() -> Iterator[None]:
-    """Have numba take flags for equal where the same ones are set to the same, before it looks at what none has set.
+    """Have numba compare flags by those that are set in either: all others are what they are by default.
 
     It looks them up for every call in every function, under a hash that is the same for all, and made two tables of
     some forty options for each comparison: a fifteenth of the time.
@@ -79,7 +79,7 @@ def flags_soon_compared() -> Iterator[None]:
     def equal(one: Any, other: Any) -> Any:
         if type(one) is not type(other):
             return compared(one, other)
-        mine, its = one._values, other._values  # those that are set: all others are what they are by default
+        mine, its = one._values, other._values
         return mine == its or all(getattr(one, name) == getattr(other, name) for name in mine.keys() | its.keys())
 
     hashed, same = Flags.__hash__, hash(Flags())

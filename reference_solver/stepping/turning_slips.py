@@ -6,7 +6,16 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.equalities import RANK, cluster_of, effect, join_bodies, list_rows, row_value, solve_rows
+from reference_solver.stepping.equalities import (
+    RANK,
+    cluster_of,
+    effect,
+    join_bodies,
+    list_rows,
+    row_change,
+    row_value,
+    solve_rows,
+)
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
 
@@ -76,9 +85,7 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     if speed > NOISE * lasting.speeds[k] and along < TURNED * push * speed:
         return False
     x, y = implicit_slip(lasting, k, BEARABLE * moment - speed / brake)
-    if lasting.direction[k, 0] * x + lasting.direction[k, 1] * y < TURNED * math.sqrt(x**2 + y**2):  # it has ended
-        return False
-    if x == 0.0 and y == 0.0:
+    if lasting.direction[k, 0] * x + lasting.direction[k, 1] * y < TURNED:  # it has ended, or none is found
         return False
     lasting.direction[k, 0], lasting.direction[k, 1] = x, y
     return True
@@ -96,7 +103,7 @@ def implicit_slip(lasting: Lasting, k: int, moment: float) -> tuple[float, float
     """
     mu, gives, pressed = lasting.friction[k], lasting.gives, lasting.force[k, 0]
     d1, d2 = lasting.direction[k, 0], lasting.direction[k, 1]
-    alone = gives[0, 0] > RANK * compliance(lasting, k, 0, 0)
+    alone = gives[0, 0] > RANK * passed_on(lasting, k, 0, k, 0)
     held = pressed * (gives[0, 0] - mu * (gives[0, 1] * d1 + gives[0, 2] * d2))
     a1 = slip_gain(lasting, k, 0) - pressed * (gives[1, 0] - mu * (gives[1, 1] * d1 + gives[1, 2] * d2))
     a2 = slip_gain(lasting, k, 1) - pressed * (gives[2, 0] - mu * (gives[2, 1] * d1 + gives[2, 2] * d2))
@@ -149,21 +156,11 @@ def speed_after(w1: float, w2: float, s: float, gives: Array) -> float:
 
 
 @inner_kernel
-def compliance(lasting: Lasting, k: int, row: int, other: int) -> float:
-    """Acceleration along one row of contact k by a unit of force along another, all else free [1/kg]."""
-    total = 0.0
-    for side in range(2):
-        for d in range(lasting.size[VELOCITIES]):
-            total += lasting.jacobian[k, side, row, d] * lasting.response[k, side, other, d]
-    return total
-
-
-@inner_kernel
 def yield_alone(lasting: Lasting, k: int) -> None:
-    """Fill `Lasting.gives` with `compliance` of contact k, all else free."""
+    """Fill `Lasting.gives` with how contact k yields, all else free."""
     for row in range(1 + lasting.size[TANGENTS]):
         for column in range(1 + lasting.size[TANGENTS]):
-            lasting.gives[row, column] = compliance(lasting, k, row, column)
+            lasting.gives[row, column] = passed_on(lasting, k, column, k, row)
 
 
 @inner_kernel
@@ -195,24 +192,21 @@ def yield_with_others(lasting: Lasting, k: int) -> None:
         for i in range(kept):
             other, from_row, force = lasting.unknown[i, 0], lasting.unknown[i, 1], lasting.answer[i]
             for side in range(2):
-                for own in range(2):
-                    if lasting.body[other, side] != lasting.body[k, own]:
-                        continue
-                    for d in range(lasting.size[VELOCITIES]):
-                        change = effect(lasting, True, other, side, from_row, d) * force
-                        for row in range(rows):
-                            lasting.gives[row, column] += lasting.jacobian[k, own, row, d] * change
+                for d in range(lasting.size[VELOCITIES]):
+                    lasting.change[d] = effect(lasting, True, other, side, from_row, d) * force
+                for row in range(rows):
+                    so_far = lasting.gives[row, column]
+                    lasting.gives[row, column] = row_change(lasting, k, row, lasting.body[other, side], so_far)
 
 
 @inner_kernel
 def passed_on(lasting: Lasting, k: int, column: int, other: int, row: int) -> float:
-    """Acceleration along a row of another contact by a unit of force along one of contact k [1/kg]."""
+    """Acceleration along a row of a contact, of k as well, by a unit of force along one of contact k [1/kg]."""
     total = 0.0
-    for side in range(2):
-        for own in range(2):
-            if lasting.body[other, side] == lasting.body[k, own]:
-                for d in range(lasting.size[VELOCITIES]):
-                    total += lasting.jacobian[other, side, row, d] * lasting.response[k, own, column, d]
+    for own in range(2):
+        for d in range(lasting.size[VELOCITIES]):
+            lasting.change[d] = lasting.response[k, own, column, d]
+        total = row_change(lasting, other, row, lasting.body[k, own], total)
     return total
 
 

@@ -75,9 +75,10 @@ def worlds(scene: Scene) -> Iterator[tuple[str, Callable[[], Scene]]]:
     yield "of another shape", lambda: last(scene, shape=other)
     yield "base let go", lambda: first(scene, motion="free")
     yield "base runs", lambda: first(scene, surface_velocity=(0.5, *(0.0,) * (d - 1)))
-    if isinstance(base.shape, HalfSpace):
+    ground = base.shape
+    if isinstance(ground, HalfSpace):
         yield "base tilted", lambda: first(scene, shape=HalfSpace((SIN, *(0.0,) * (d - 2), COS), 0.0))
-        yield "base lower", lambda: first(scene, shape=HalfSpace(base.shape.normal, base.shape.offset - 1 / 256))  # type: ignore[union-attr]
+        yield "base lower", lambda: first(scene, shape=HalfSpace(ground.normal, ground.offset - 1 / 256))
         yield "on a box", lambda: first(scene, shape=Box((8.0,) * d), pose=(*up, -8.0, *far[d:]))
     yield "without gravity", lambda: replace(scene, gravity=(0.0,) * d)
     yield "with gravity", lambda: replace(scene, gravity=(*up, -4.0))

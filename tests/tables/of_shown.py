@@ -356,7 +356,7 @@ def said_of_runs() -> Sections:
                 own = type(
                     "Source", (), {"run": run, "observations": [1, 2], "rows": [1], "bench": bench if commit else None}
                 )
-                told_of = page.cite(own)  # type: ignore[arg-type]
+                told_of = page.cite(own)  # type: ignore[arg-type]  # only what it reads of a source
                 found[f"{title[:30]}, {commit}"] = {"text": told_of["text"]} | numbered(told_of["commands"], "line")
     idle = pd.DataFrame(
         {"void": ["", "", "", "it hung"], "load": [1.0, 1.1, 1.2, 9.0], "width": [0.01, 0.04, 0.1, 1.0],
