@@ -154,10 +154,10 @@ def project(bodies: Bodies, lasting: Lasting, poses: bool, most: float) -> bool:
     if count == 0:
         return True
     sliding = most > 0.0
-    solve_rows(lasting, count, sliding, 0.0)
+    solve_rows(lasting, count, sliding, 0.0, False)
     if sliding and largest(lasting, count) > most:
         sliding = False
-        solve_rows(lasting, count, False, 0.0)
+        solve_rows(lasting, count, False, 0.0, False)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             lasting.acceleration[i, d] = 0.0

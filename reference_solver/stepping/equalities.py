@@ -100,12 +100,10 @@ def assemble(lasting: Lasting, first: int, last: int, sliding: bool) -> None:
 def row_change(lasting: Lasting, k: int, row: int, body: int, before: float) -> float:
     """What row of contact k says to the `change` of a body's velocities, added to ``before``."""
     total = before
-    for d in range(lasting.size[VELOCITIES]):
-        if lasting.change[d] == 0.0:
-            continue
-        for side in range(2):
-            if lasting.body[k, side] == body:
-                total += lasting.jacobian[k, side, row, d] * lasting.change[d]
+    side = 0 if lasting.body[k, 0] == body else 1
+    if lasting.body[k, side] == body:
+        for d in range(lasting.size[VELOCITIES]):
+            total += lasting.jacobian[k, side, row, d] * lasting.change[d]
     return total
 
 
@@ -132,20 +130,20 @@ def list_entries(matrix: Array, i: int, first: int, last: int, filled: Indices) 
 
 
 @inner_kernel
-def eliminate(lasting: Lasting, first: int, last: int) -> bool:
-    """Solve for `answer` from ``first`` to before ``last``, with row interchanges; False where a pivot is round-off.
+def factorise(lasting: Lasting, first: int, last: int) -> bool:
+    """Factors L U of the equalities from ``first`` to before ``last``, with row interchanges noted in `order`.
 
-    Pivots are compared as entries over the roots of both rows' scales, squared: no root is taken, so that units of
-    powers of two change no bit.
+    False where a pivot is round-off. Pivots are compared as entries over the roots of both rows' scales, squared: no
+    root is taken, so that units of powers of two change no bit.
     """
-    factor, x, scale, filled = lasting.factor, lasting.answer, lasting.spare, lasting.filled
+    factor, order, scale, filled = lasting.factor, lasting.order, lasting.spare, lasting.filled
     for i in range(first, last):
         scale[i] = lasting.other[i] = row_scale(lasting, i)
         if scale[i] == 0.0:
             return False
         for j in range(first, last):
             factor[i, j] = lasting.matrix[i, j]
-        x[i] = lasting.right[i]
+        order[i] = i
     least = 1.0
     for j in range(first, last):
         best = j
@@ -159,21 +157,31 @@ def eliminate(lasting: Lasting, first: int, last: int) -> bool:
         if best != j:
             for c in range(first, last):
                 factor[j, c], factor[best, c] = factor[best, c], factor[j, c]
-            x[j], x[best] = x[best], x[j]
+            order[j], order[best] = order[best], order[j]
             scale[j], scale[best] = scale[best], scale[j]
         entries = list_entries(factor, j, j + 1, last, filled)
         for i in range(j + 1, last):
             if factor[i, j] != 0.0:
-                share = factor[i, j] / factor[j, j]
+                share = factor[i, j] = factor[i, j] / factor[j, j]
                 for e in range(entries):
                     factor[i, filled[e]] -= share * factor[j, filled[e]]
-                x[i] -= share * x[j]
+    return True
+
+
+@inner_kernel
+def substitute(lasting: Lasting, first: int, last: int) -> None:
+    """Solve for `answer` by the factors L U."""
+    factor, x = lasting.factor, lasting.answer
+    for i in range(first, last):
+        left = lasting.right[lasting.order[i]]
+        for c in range(first, i):
+            left -= factor[i, c] * x[c]
+        x[i] = left
     for j in range(last - 1, first - 1, -1):
         left = x[j]
         for c in range(j + 1, last):
             left -= factor[j, c] * x[c]
         x[j] = left / factor[j, j]
-    return True
 
 
 @inner_kernel
@@ -184,14 +192,8 @@ def force_weight(lasting: Lasting, i: int) -> float:
 
 
 @inner_kernel
-def least_change(lasting: Lasting, first: int, last: int, told: float) -> int:
-    """Solve redundant rows for the `answer` nearest to ``told`` times the usual forces; how well they agree.
-
-    With the matrix A and the weights W, squared, the change is W A^T y of the solution of A W A^T y = r: Cholesky's
-    method without roots, with interchanges, which ends where pivots are round-off, and corrections of what squaring
-    cost.
-    """
-    x, y, order, filled = lasting.answer, lasting.spare, lasting.order, lasting.filled
+def square(lasting: Lasting, first: int, last: int) -> int:
+    """Factors of A W A^T for the matrix A of redundant rows, W weights of forces, squared; up to which row they go."""
     largest = 0.0
     for j in range(first, last):
         largest = max(largest, force_weight(lasting, j) * row_scale(lasting, j))
@@ -199,11 +201,22 @@ def least_change(lasting: Lasting, first: int, last: int, told: float) -> int:
         scale = row_scale(lasting, j)
         weight = max(force_weight(lasting, j) * scale, LIGHT**2 * largest) if largest > 0.0 else 1.0
         lasting.weight[j] = weight / scale
-        x[j] = told * lasting.usual[lasting.unknown[j, 0], lasting.unknown[j, 1]]
-        order[j] = j
+        lasting.order[j] = j
     for i in range(first, last):
-        square_row(lasting, first, i, list_entries(lasting.matrix, i, first, last, filled))
-    rank = decompose(lasting, first, last)
+        square_row(lasting, first, i, list_entries(lasting.matrix, i, first, last, lasting.filled))
+    return int(decompose(lasting, first, last))
+
+
+@inner_kernel
+def least_change(lasting: Lasting, first: int, last: int, rank: int, told: float) -> int:
+    """Solve redundant rows for the `answer` nearest to ``told`` times the usual forces; how well they agree.
+
+    The change is W A^T y of the solution of A W A^T y = r, by the factors that `square` left: Cholesky's method without
+    roots, with interchanges, which ended where pivots were round-off, and corrections of what squaring cost.
+    """
+    x, y = lasting.answer, lasting.spare
+    for j in range(first, last):
+        x[j] = told * lasting.usual[lasting.unknown[j, 0], lasting.unknown[j, 1]]
     miss = 0.0
     for _ in range(CORRECTIONS):
         for i in range(first, last):
@@ -215,7 +228,7 @@ def least_change(lasting: Lasting, first: int, last: int, told: float) -> int:
         for i in range(first, last):
             size = abs(lasting.right[i]) + lasting.scale[lasting.unknown[i, 0]]
             miss = max(miss, abs(y[i]) / size if size > 0.0 else 0.0)
-        substitute(lasting, first, last, rank)
+        substitute_square(lasting, first, last, rank)
         change = lasting.other
         for c in range(first, last):
             change[c] = 0.0
@@ -294,7 +307,7 @@ def interchange(lasting: Lasting, first: int, last: int, j: int, best: int) -> N
 
 
 @inner_kernel
-def substitute(lasting: Lasting, first: int, last: int, rank: int) -> None:
+def substitute_square(lasting: Lasting, first: int, last: int, rank: int) -> None:
     """Solution of the decomposed system for the right side `spare`, in place; zero from row ``rank`` on."""
     factor, y, order, z = lasting.factor, lasting.spare, lasting.order, lasting.other
     for i in range(first, rank):
@@ -314,20 +327,48 @@ def substitute(lasting: Lasting, first: int, last: int, rank: int) -> None:
 
 
 @inner_kernel
-def solve_rows(lasting: Lasting, count: int, sliding: bool, told: float) -> int:
+def solve_rows(lasting: Lasting, count: int, sliding: bool, told: float, again: bool) -> int:
     """Solve the equalities, near ``told`` times the usual forces where there is a choice; what rows are.
 
     Clusters of contacts that share no body that moves are solved one after the other, and `unknown` and `right` are
     put into that order: their cost goes with the cube of a cluster, and what is redundant in one is so there alone.
+    ``again``: where no slip has turned since, forces are what they are.
     """
     join_bodies(lasting)
     found, last = INDEPENDENT, 0
     while last < count:
         first, last = last, gather_cluster(lasting, last, count)
+        if again and not turned(lasting, first, last):
+            for i in range(first, last):
+                lasting.answer[i] = lasting.force[lasting.unknown[i, 0], lasting.unknown[i, 1]]
+            continue
         assemble(lasting, first, last, sliding)
-        if not eliminate(lasting, first, last):
-            found = max(found, least_change(lasting, first, last, told))
+        found = max(found, solve_for(lasting, first, last, factors_of(lasting, first, last), told))
     return found
+
+
+@inner_kernel
+def turned(lasting: Lasting, first: int, last: int) -> bool:
+    """Whether friction of any of these equalities' contacts goes another way than when forces were found."""
+    for i in range(first, last):
+        if lasting.turned[lasting.unknown[i, 0]] == 1:
+            return True
+    return False
+
+
+@inner_kernel
+def factors_of(lasting: Lasting, first: int, last: int) -> int:
+    """Factors of the assembled matrix, for any number of right sides; the rank where its square has them, -1 else."""
+    return -1 if factorise(lasting, first, last) else square(lasting, first, last)
+
+
+@inner_kernel
+def solve_for(lasting: Lasting, first: int, last: int, rank: int, told: float) -> int:
+    """Solve for one right side by `factors_of`; what rows are."""
+    if rank >= 0:
+        return int(least_change(lasting, first, last, rank, told))
+    substitute(lasting, first, last)
+    return INDEPENDENT
 
 
 @inner_kernel
@@ -384,8 +425,11 @@ def row_value(lasting: Lasting, k: int, row: int, vectors: Array) -> float:
 
 
 @inner_kernel
-def force_contacts(lasting: Lasting) -> int:
-    """Forces and accelerations that hold all modes at the evaluated state; what the rows are."""
+def force_contacts(lasting: Lasting, again: bool) -> int:
+    """Forces and accelerations that hold all modes at the evaluated state; what the rows are.
+
+    ``again``: only slips that are noted as `Lasting.turned` differ from what the forces were found for.
+    """
     count = list_rows(lasting)
     if count < 0:
         return CONTRADICTORY
@@ -394,7 +438,7 @@ def force_contacts(lasting: Lasting) -> int:
         for i in range(count):
             k, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
             lasting.right[i] = -(row_value(lasting, k, row, lasting.free) + lasting.gamma[k, row])
-        found = solve_rows(lasting, count, True, 1.0)
+        found = solve_rows(lasting, count, True, 1.0, again)
     for k in range(lasting.size[CONTACTS]):
         for row in range(1 + lasting.size[TANGENTS]):
             lasting.force[k, row] = 0.0

@@ -65,6 +65,7 @@ class Lasting(NamedTuple):
     gamma: Array  # (k, 1 + T): (dJ/dt) v [m/s^2]
     force: Array  # (k, 1 + T): lambda [N]
     direction: Array  # (k, T): unit vector of the slip, where it slips
+    turned: Indices  # (k,): 1 where it was turned for a slow slip since forces were found, else 0
     begun: Array  # (k, T): the same at the start of the phase
     impulse: Array  # (k, D): integral of the force on B over the phase, world axes [N s]
     moment: Array  # (k, V - D): of it about the world's origin [N m s]
@@ -128,6 +129,7 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         gamma=np.zeros((k, 1 + t)),
         force=np.zeros((k, 1 + t)),
         direction=np.zeros((k, t)),
+        turned=np.zeros(k, np.int64),
         begun=np.zeros((k, t)),
         impulse=np.zeros((k, dimension)),
         moment=np.zeros((k, v - dimension)),

@@ -225,7 +225,7 @@ def decide(lasting: Lasting) -> bool:
     sweeps = FIRST_SWEEPS
     for _ in range(ATTEMPTS):
         for _ in range(REVISIONS):
-            if force_contacts(lasting) == CONTRADICTORY:
+            if force_contacts(lasting, False) == CONTRADICTORY:
                 break
             if revise(lasting) == 0:
                 keep_usual(lasting)

@@ -101,13 +101,15 @@ def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
     for k in range(lasting.size[CONTACTS]):
         if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
             follow_slip(lasting, k)
-    if force_contacts(lasting) == CONTRADICTORY:
+    if force_contacts(lasting, False) == CONTRADICTORY:
         return False
     steadied = False
     for k in range(lasting.size[CONTACTS]):
+        lasting.turned[k] = 0
         if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
-            steadied = steady_slip(lasting, k) or steadied
-    return not steadied or force_contacts(lasting) != CONTRADICTORY
+            lasting.turned[k] = 1 if steady_slip(lasting, k) else 0
+            steadied = steadied or lasting.turned[k] == 1
+    return not steadied or force_contacts(lasting, True) != CONTRADICTORY
 
 
 @inner_kernel

@@ -8,13 +8,15 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.stepping.equalities import (
     RANK,
+    assemble,
     cluster_of,
     effect,
+    factors_of,
     join_bodies,
     list_rows,
     row_change,
     row_value,
-    solve_rows,
+    solve_for,
 )
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, SLIP, START, TANGENTS, VELOCITIES, Lasting
 from reference_solver.stepping.noise import FORCE_NOISE, LOCATED, NOISE
@@ -173,22 +175,25 @@ def most_yield(gives: Array) -> float:
 @inner_kernel
 def yield_with_others(lasting: Lasting, k: int) -> None:
     """Add to `Lasting.gives` what others do to contact k that hold on, stick and slip as they do."""
-    rows = 1 + lasting.size[TANGENTS]
+    rows, kept, pushed = 1 + lasting.size[TANGENTS], 0, False
     join_bodies(lasting)
     cluster = cluster_of(lasting, k)
-    for column in range(rows):
-        kept, moved = 0, False
-        for i in range(list_rows(lasting)):
-            other, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
-            if other == k or cluster_of(lasting, other) != cluster:
-                continue
-            lasting.unknown[kept, 0], lasting.unknown[kept, 1] = other, row
-            lasting.right[kept] = -passed_on(lasting, k, column, other, row)
-            moved = moved or lasting.right[kept] != 0.0
-            kept += 1
-        if not moved:
+    for i in range(list_rows(lasting)):
+        other, row = lasting.unknown[i, 0], lasting.unknown[i, 1]
+        if other == k or cluster_of(lasting, other) != cluster:
             continue
-        solve_rows(lasting, kept, True, 0.0)
+        lasting.unknown[kept, 0], lasting.unknown[kept, 1] = other, row
+        for column in range(rows):
+            pushed = pushed or passed_on(lasting, k, column, other, row) != 0.0
+        kept += 1
+    if not pushed:
+        return
+    assemble(lasting, 0, kept, True)
+    rank = factors_of(lasting, 0, kept)
+    for column in range(rows):
+        for i in range(kept):
+            lasting.right[i] = -passed_on(lasting, k, column, lasting.unknown[i, 0], lasting.unknown[i, 1])
+        solve_for(lasting, 0, kept, rank, 0.0)
         for i in range(kept):
             other, from_row, force = lasting.unknown[i, 0], lasting.unknown[i, 1], lasting.answer[i]
             for side in range(2):
