@@ -87,6 +87,8 @@ class Lasting(NamedTuple):
     weight: Array  # (R,)
     wanted: Array  # (T,)
     gives: Array  # (1 + T, 1 + T): how a contact yields to forces along its rows while all others hold on [1/kg]
+    yields: Array  # (k, 1 + T, 1 + T): the same of each contact of which it has been asked in the step being made
+    asked: Indices  # (k,): 1 where it has been, else 0
     order: Indices  # (R,)
     filled: Indices  # (R,): columns of a row that are not zero
     change: Array  # (V,): of the velocities of a body by a unit of force
@@ -151,6 +153,8 @@ def allocate_lasting(dimension: int, bodies: int, contacts: int) -> Lasting:
         weight=np.zeros(r),
         wanted=np.zeros(t),
         gives=np.zeros((1 + t, 1 + t)),
+        yields=np.zeros((k, 1 + t, 1 + t)),
+        asked=np.zeros(k, np.int64),
         order=np.zeros(r, np.int64),
         filled=np.zeros(r, np.int64),
         change=np.zeros(v),

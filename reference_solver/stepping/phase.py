@@ -46,7 +46,7 @@ from reference_solver.stepping.operations import (
     feature_limits,
     free_accelerations,
 )
-from reference_solver.stepping.turning_slips import follow_slip, steady_slip, stops_across
+from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slip, stops_across
 
 # Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
 #: Times of the stages, as shares of the step.
@@ -160,6 +160,7 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     for k in range(lasting.size[CONTACTS]):
         for t in range(lasting.size[TANGENTS]):
             lasting.begun[k, t] = lasting.direction[k, t]
+    forget_yields(lasting)
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
@@ -203,6 +204,7 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
             lasting.moment[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
     lasting.length[0] = length
+    forget_yields(lasting)
     weigh_stage(bodies, lasting, 0, length)
     keep_slopes(bodies, lasting, 0)
     lasting.early[0] = 1.0

@@ -70,7 +70,7 @@ def steady_slip(lasting: Lasting, k: int) -> bool:
     brake = rubs * most_yield(lasting.gives)
     if across * moment <= STRAIGHT * max(math.sqrt(size) * moment, speed) or speed >= BEARABLE * moment * brake:
         return False
-    yield_with_others(lasting, k)
+    yield_in_step(lasting, k)
     brake = rubs * most_yield(lasting.gives)
     push, force, along = 0.0, 0.0, 0.0
     for t in range(lasting.size[TANGENTS]):
@@ -170,6 +170,30 @@ def most_yield(gives: Array) -> float:
     """Most that a unit of friction slows its slip along itself: the larger eigenvalue, of the symmetric part."""
     mean, half = 0.5 * (gives[1, 1] + gives[2, 2]), 0.5 * (gives[1, 1] - gives[2, 2])
     return mean + math.sqrt(half**2 + 0.25 * (gives[1, 2] + gives[2, 1]) ** 2)
+
+
+@inner_kernel
+def yield_in_step(lasting: Lasting, k: int) -> None:
+    """Have `Lasting.gives`, where contact k yields alone, tell how it yields with others, as when first asked in a step.
+
+    Modes are the same throughout a step, and rows turn little; a step is repeated for dozens of lengths, with seven
+    stages each.
+    """
+    if lasting.asked[k] == 0:
+        yield_with_others(lasting, k)
+    for row in range(1 + lasting.size[TANGENTS]):
+        for column in range(1 + lasting.size[TANGENTS]):
+            if lasting.asked[k] == 0:
+                lasting.yields[k, row, column] = lasting.gives[row, column]
+            lasting.gives[row, column] = lasting.yields[k, row, column]
+    lasting.asked[k] = 1
+
+
+@inner_kernel
+def forget_yields(lasting: Lasting) -> None:
+    """Begin a step: modes may be others."""
+    for k in range(lasting.size[CONTACTS]):
+        lasting.asked[k] = 0
 
 
 @inner_kernel
