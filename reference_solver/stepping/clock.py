@@ -24,7 +24,9 @@ ROCKING, ROCKS = 11, 12
 #: Length of the next sub-step, as a share of the step, where it is so short that nothing but a jam happens in it; and
 #: what it is where no phase is found once more.
 BRIEF, LONGER_BRIEF = 13, 14
-CLOCK_SIZE = 15
+#: What events count that follow each other within a thousandth of a step, where each is dear.
+CHAIN = 15
+CLOCK_SIZE = 16
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -51,6 +53,9 @@ HASTE = 4.0
 #: What a phase counts that its error cut to less than a thousandth of a step: a slip that turns while it ends has some
 #: fifty; and what a hop of noise counts, of which each is a share of the one before.
 CRAWL = 0.1
+#: What a chain of events may count that each follow within a thousandth of the step: bodies that jam hit one another
+#: again and again within 1e-6 of it, and get nowhere. In space 20 contacts have 16 such events in a row, 50 have 5.
+LONGEST_CHAIN = 64.0
 
 
 @kernel
@@ -63,7 +68,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = 0.0
     clock[LONGER_BRIEF] = INSTANT
 
 
@@ -103,6 +108,14 @@ def count_event(clock: Array, tally: Array, weight: float) -> None:
         hold_rest(clock, tally)
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
+
+
+@kernel
+def count_chain(clock: Array, tally: Array, hasty: bool, price: float) -> None:
+    """Enter an event of a chain, or end it: one that is too dear is a jam, however hard the impacts in it."""
+    clock[CHAIN] = clock[CHAIN] + price - 1.0 if hasty else 0.0
+    if clock[HELD] == 0.0 and clock[CHAIN] > LONGEST_CHAIN:
+        hold_rest(clock, tally)
 
 
 @kernel

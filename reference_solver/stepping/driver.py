@@ -30,6 +30,7 @@ from reference_solver.stepping.clock import (
     ROCKS,
     UNSETTLED,
     UNTIL_REST,
+    count_chain,
     count_event,
     end_instant,
     end_settling,
@@ -153,8 +154,10 @@ def make_sub_step(island: Island) -> bool:
         gained, loaded = gained_speed(island, end)
         end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
-        crawl = CRAWL * price_of_creeping(island)
-        count_event(clock, tally, (crawl if shortened else HASTE) if haste else 1.0)
+        price = price_of_creeping(island)
+        count_event(clock, tally, (CRAWL * price if shortened else HASTE) if haste else 1.0)
+        if not shortened:
+            count_chain(clock, tally, haste, price)
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

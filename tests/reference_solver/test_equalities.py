@@ -175,3 +175,50 @@ def test_forces_that_hold_what_is_held_stay_what_they_are(dimension, seed):
     sizes = np.linalg.svd(matrix, compute_uv=False)
     limit = 1e-14 * count * sizes[0] / sizes[sizes > 1e-9 * sizes[0]][-1] * np.abs(lasting.usual).max()
     assert np.abs(lasting.force - lasting.usual).max() <= limit < 1e-3
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_where_friction_turns_forces_of_its_cluster_alone_are_found_anew(dimension):
+    """Two pairs of bodies, each on the ground, slip on it; friction of one slip turns, and is noted to have."""
+    lasting, rng = drawn(dimension, 2)
+    lasting.mode[:] = OPEN
+    lasting.mode[[0, 1]], lasting.mode[[2, 3]] = STICK, SLIP
+    for k, pair in enumerate([(1, 2), (3, 4), (0, 1), (0, 3)]):
+        lasting.body[k] = pair
+        free = np.array([body != 0 for body in pair], float)
+        lasting.response[k] = lasting.jacobian[k] * free[:, None, None]
+    lasting.gamma[:] = rng.normal(size=lasting.gamma.shape)
+    lasting.friction[[2, 3]] = 0.3
+    assert force_contacts(lasting, False) == INDEPENDENT
+    before = lasting.force.copy()
+    lasting.direction[2] = -lasting.direction[2]
+    lasting.turned[:] = [k == 2 for k in range(len(lasting.turned))]
+    marked = 7.0  # stands for what was found, in the cluster that must not be asked again
+    lasting.force[1, 0] = lasting.force[3, 0] = marked
+    assert force_contacts(lasting, True) == INDEPENDENT
+    again = lasting.force.copy()
+    assert again[1, 0] == again[3, 0] == marked
+    assert (again[3, 1:] == -0.3 * marked * lasting.direction[3]).all()
+    assert force_contacts(lasting, False) == INDEPENDENT
+    assert (lasting.force[[0, 2]] == again[[0, 2]]).all() and (before[[0, 2]] != again[[0, 2]]).any()
+    assert (lasting.force[[1, 3]] == before[[1, 3]]).all()
+
+
+@pytest.mark.parametrize("redundant", [False, True])
+def test_factors_serve_any_number_of_right_sides(redundant):
+    lasting, rng = drawn(3, 3)
+    lasting.mode[:] = STICK
+    if redundant:
+        lasting.body[3], lasting.jacobian[3] = lasting.body[0], lasting.jacobian[0]
+        lasting.response[3] = lasting.response[0]
+    count = list_rows(lasting)
+    assemble(lasting, 0, count, False)
+    rank = factors_of(lasting, 0, count)
+    assert rank == (count - 3 if redundant else -1)
+    for _ in range(3):
+        wanted = dense(lasting, count) @ rng.normal(size=count)
+        lasting.right[:count] = wanted
+        found = solve_for(lasting, 0, count, rank, 0.0)
+        assert found == (REDUNDANT if redundant else INDEPENDENT)
+        left = dense(lasting, count) @ lasting.answer[:count] - wanted
+        assert np.abs(left).max() <= 1e-9 * np.abs(wanted).max()

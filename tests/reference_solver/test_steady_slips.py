@@ -7,13 +7,14 @@ from reference_solver.compilation import from_python
 from reference_solver.stepping import turning_slips
 from reference_solver.stepping.lasting import CONTACTS, LAST, ONWARD, OPEN, SLIP, START, STICK, allocate_lasting
 
-steady_slip, follow_slip, stops_across, most_yield = (
+steady_slip, follow_slip, stops_across, most_yield, forget_yields = (
     from_python(each)
     for each in (
         turning_slips.steady_slip,
         turning_slips.follow_slip,
         turning_slips.stops_across,
         turning_slips.most_yield,
+        turning_slips.forget_yields,
     )
 )
 
@@ -123,6 +124,24 @@ def test_a_slip_whose_body_others_hold_yields_as_they_let_it(rubs):
     assert np.linalg.norm(alone.direction[0] - d) > 1e-3
     fixed = left(d, PRESSED)
     assert abs(fixed[0] * d[1] - fixed[1] * d[0]) > 1e-4 * np.linalg.norm(fixed)
+
+
+def test_how_a_slip_yields_among_others_is_told_once_a_step():
+    """What holds it turns within the step: its direction is told by the first that was asked, until a step begins."""
+    lasting = slow_slip(SPEED, FORCE)
+    lasting.size[CONTACTS] = 2
+    lasting.body[1], lasting.mode[1] = (1, 2), SLIP
+    first = lasting.jacobian[1, 0, 0] = lasting.response[1, 0, 0] = np.array([0.0, 1.0, 2.0, 0.0, 0.0, 0.0])
+    assert first.any() and steady_slip(lasting, 0)
+    told, gives = lasting.direction[0].copy(), lasting.gives.copy()
+    lasting.jacobian[1, 0, 0] = lasting.response[1, 0, 0] = np.array([0.0, 2.0, -1.0, 0.0, 0.0, 0.0])
+    lasting.direction[0] = LAST_KNOWN
+    assert steady_slip(lasting, 0)
+    assert lasting.direction[0].tolist() == told.tolist() and lasting.gives.tolist() == gives.tolist()
+    forget_yields(lasting)
+    lasting.direction[0] = LAST_KNOWN
+    assert steady_slip(lasting, 0)
+    assert np.abs(lasting.gives - gives).max() > 0.1 and np.abs(lasting.direction[0] - told).max() > 1e-3
 
 
 def test_where_others_hold_the_normal_too_the_pressure_is_what_it_is():

@@ -21,6 +21,7 @@ from reference_solver.stepping.clock import (
     SOFT,
     UNSETTLED,
     UNTIL_REST,
+    count_chain,
     count_event,
     end_settling,
     hurry,
@@ -148,6 +149,29 @@ def test_few_soft_events_are_located_in_the_step_of_an_island_that_jams():
     open_step(clock, 8, DT, MOST_SOFT)
     hurry(clock)
     assert (clock[JAMMED], clock[PATIENCE]) == (1.0, JAM_PATIENCE)
+
+
+@pytest.mark.parametrize(("contacts", "most"), [(4, math.inf), (20, 16), (52, 5)])
+def test_a_chain_of_events_that_get_nowhere_ends_the_sooner_the_more_contacts_there_are(contacts, most):
+    """However hard the impacts in it; an event that takes its time ends the chain, and a new step has none."""
+    clock, tally = np.zeros(CLOCK_SIZE), new_tally()
+    open_step(clock, 20, DT, MOST_SOFT)
+    price = contacts / 4
+    for _ in range(3):
+        for _ in range(min(most, 1000)):
+            count_chain(clock, tally, True, price)
+            assert clock[HELD] == 0.0
+        count_chain(clock, tally, False, price)
+    for _ in range(min(most, 1000)):
+        count_chain(clock, tally, True, price)
+    open_step(clock, 20, DT, MOST_SOFT)
+    for _ in range(min(most, 1000)):
+        count_chain(clock, tally, True, price)
+    assert (clock[HELD], tally[STEPS_HELD]) == (0.0, 0.0)
+    count_chain(clock, tally, True, price)
+    assert clock[HELD] == tally[STEPS_HELD] == (1.0 if math.isfinite(most) else 0.0)
+    count_chain(clock, tally, True, price)  # a step is held once
+    assert tally[STEPS_HELD] <= 1.0
 
 
 def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
