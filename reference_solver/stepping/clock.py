@@ -95,27 +95,22 @@ def hurry(clock: Array) -> None:
 
 
 @kernel
-def count_event(clock: Array, tally: Array, weight: float) -> None:
-    """Enter an event, as a soft one of ``weight`` until its impact is weighed.
+def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price: float) -> None:
+    """Enter an event, as a soft one until its impact is weighed; too many of them, and the step is held from here.
 
-    Too many soft ones, and the step is held from here; too many of all kinds, and the run ends.
+    ``hasty``: it follows within a thousandth of the step; ``shortened``: the error of a phase cut it; ``price``: what a
+    phase costs. Too many events of all kinds, and the run ends.
     """
+    clock[WEIGHT] = (CRAWL * price if shortened else HASTE) if hasty else 1.0
     clock[EVENTS] += 1.0
-    clock[SOFT] += weight
-    clock[WEIGHT] = weight
+    clock[SOFT] += clock[WEIGHT]
+    if not shortened:
+        clock[CHAIN] = clock[CHAIN] + price - 1.0 if hasty else 0.0
     tally[EVENTS_LOCATED] += 1.0
-    if clock[HELD] == 0.0 and clock[SOFT] > clock[PATIENCE]:
+    if clock[HELD] == 0.0 and (clock[SOFT] > clock[PATIENCE] or clock[CHAIN] > LONGEST_CHAIN):
         hold_rest(clock, tally)
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
-
-
-@kernel
-def count_chain(clock: Array, tally: Array, hasty: bool, price: float) -> None:
-    """Enter an event of a chain, or end it: one that is too dear is a jam, however hard the impacts in it."""
-    clock[CHAIN] = clock[CHAIN] + price - 1.0 if hasty else 0.0
-    if clock[HELD] == 0.0 and clock[CHAIN] > LONGEST_CHAIN:
-        hold_rest(clock, tally)
 
 
 @kernel

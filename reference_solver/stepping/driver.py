@@ -17,9 +17,7 @@ from reference_solver.stepping.accounting import go_back, keep
 from reference_solver.stepping.clock import (
     BRIEF,
     CONFINED,
-    CRAWL,
     ESCAPED,
-    HASTE,
     HELD,
     INSTANT,
     LEFT,
@@ -30,7 +28,6 @@ from reference_solver.stepping.clock import (
     ROCKS,
     UNSETTLED,
     UNTIL_REST,
-    count_chain,
     count_event,
     end_instant,
     end_settling,
@@ -154,10 +151,7 @@ def make_sub_step(island: Island) -> bool:
         gained, loaded = gained_speed(island, end)
         end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
-        price = price_of_creeping(island)
-        count_event(clock, tally, (CRAWL * price if shortened else HASTE) if haste else 1.0)
-        if not shortened:
-            count_chain(clock, tally, haste, price)
+        count_event(clock, tally, haste, shortened, price_of_creeping(island))
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 

@@ -46,7 +46,7 @@ from reference_solver.stepping.operations import (
     feature_limits,
     free_accelerations,
 )
-from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slip, stops_across
+from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slips, stops_across
 
 # Coefficients of J. Dormand, P. Prince, J. Comput. Appl. Math. 6 (1980), RK5(4)7M.
 #: Times of the stages, as shares of the step.
@@ -103,13 +103,7 @@ def evaluate_forces(bodies: Bodies, lasting: Lasting) -> bool:
             follow_slip(lasting, k)
     if force_contacts(lasting, False) == CONTRADICTORY:
         return False
-    steadied = False
-    for k in range(lasting.size[CONTACTS]):
-        lasting.turned[k] = 0
-        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
-            lasting.turned[k] = 1 if steady_slip(lasting, k) else 0
-            steadied = steadied or lasting.turned[k] == 1
-    return not steadied or force_contacts(lasting, True) != CONTRADICTORY
+    return not steady_slips(lasting) or force_contacts(lasting, True) != CONTRADICTORY
 
 
 @inner_kernel
@@ -125,7 +119,8 @@ def begin_phase(bodies: Bodies, lasting: Lasting) -> None:
 
 @inner_kernel
 def go_back(bodies: Bodies, lasting: Lasting) -> None:
-    """Return to the start of the phase."""
+    """Return to the start of the phase, where steps begin."""
+    forget_yields(lasting)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             bodies.twist[i, d] = lasting.before[i, d]
@@ -160,7 +155,6 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     for k in range(lasting.size[CONTACTS]):
         for t in range(lasting.size[TANGENTS]):
             lasting.begun[k, t] = lasting.direction[k, t]
-    forget_yields(lasting)
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
@@ -204,7 +198,6 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
             lasting.moment[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
     lasting.length[0] = length
-    forget_yields(lasting)
     weigh_stage(bodies, lasting, 0, length)
     keep_slopes(bodies, lasting, 0)
     lasting.early[0] = 1.0

@@ -49,6 +49,18 @@ def follow_slip(lasting: Lasting, k: int) -> None:
 
 
 @inner_kernel
+def steady_slips(lasting: Lasting) -> bool:
+    """Turn friction of all slips that are too slow for an explicit step; whether there are any, and which (`turned`)."""
+    found = False
+    for k in range(lasting.size[CONTACTS]):
+        lasting.turned[k] = 0
+        if lasting.mode[k] == SLIP and lasting.friction[k] > 0.0 and lasting.size[TANGENTS] > 1:
+            lasting.turned[k] = 1 if steady_slip(lasting, k) else 0
+            found = found or lasting.turned[k] == 1
+    return found
+
+
+@inner_kernel
 def steady_slip(lasting: Lasting, k: int) -> bool:
     """Direction of a slip so slow that an explicit step cannot follow how friction turns it; False if it can.
 
@@ -191,7 +203,7 @@ def yield_in_step(lasting: Lasting, k: int) -> None:
 
 @inner_kernel
 def forget_yields(lasting: Lasting) -> None:
-    """Begin a step: modes may be others."""
+    """Begin a step anew: modes may be others."""
     for k in range(lasting.size[CONTACTS]):
         lasting.asked[k] = 0
 

@@ -21,7 +21,6 @@ from reference_solver.stepping.clock import (
     SOFT,
     UNSETTLED,
     UNTIL_REST,
-    count_chain,
     count_event,
     end_settling,
     hurry,
@@ -112,9 +111,9 @@ def test_a_step_has_patience_with_soft_events_that_does_not_depend_on_the_step_b
         open_step(clock, bodies, DT, MOST_SOFT)
         assert (clock[LEFT], clock[PATIENCE], clock[HELD]) == (DT, MOST_SOFT + bodies, 0.0)
         for _ in range(MOST_SOFT + bodies):
-            count_event(clock, tally, 1.0)
+            count_event(clock, tally, False, False, 1.0)
         assert clock[HELD] == 0.0
-        count_event(clock, tally, 1.0)
+        count_event(clock, tally, False, False, 1.0)
         assert clock[HELD] == 1.0
     assert (tally[STEPS_HELD], tally[EVENTS_LOCATED]) == (2.0, 2 * (MOST_SOFT + bodies + 1))
 
@@ -151,27 +150,41 @@ def test_few_soft_events_are_located_in_the_step_of_an_island_that_jams():
     assert (clock[JAMMED], clock[PATIENCE]) == (1.0, JAM_PATIENCE)
 
 
-@pytest.mark.parametrize(("contacts", "most"), [(4, math.inf), (20, 16), (52, 5)])
-def test_a_chain_of_events_that_get_nowhere_ends_the_sooner_the_more_contacts_there_are(contacts, most):
-    """However hard the impacts in it; an event that takes its time ends the chain, and a new step has none."""
+@pytest.mark.parametrize(
+    ("hasty", "shortened", "price", "weight"),
+    [(False, False, 5.0, 1.0), (True, False, 5.0, 4.0), (True, True, 1.0, 0.1), (True, True, 5.0, 0.5)],
+)
+def test_what_an_event_counts(hasty, shortened, price, weight):
     clock, tally = np.zeros(CLOCK_SIZE), new_tally()
-    open_step(clock, 20, DT, MOST_SOFT)
-    price = contacts / 4
-    for _ in range(3):
-        for _ in range(min(most, 1000)):
-            count_chain(clock, tally, True, price)
+    open_step(clock, 4, DT, MOST_SOFT)
+    count_event(clock, tally, hasty, shortened, price)
+    assert (clock[SOFT], clock[EVENTS], tally[EVENTS_LOCATED]) == (weight, 1.0, 1.0)
+    weigh_event(clock, 0.25)
+    assert clock[SOFT] == min(weight, 0.25)
+
+
+@pytest.mark.parametrize(("contacts", "most"), [(4, 1000), (20, 16), (52, 5)])
+def test_a_chain_of_events_that_get_nowhere_ends_the_sooner_the_more_contacts_there_are(contacts, most):
+    """However hard the impacts in it: each is weighed as one. What takes its time ends it; what creeps is none of it."""
+    clock, tally = np.zeros(CLOCK_SIZE), new_tally()
+
+    def follow(times, hasty=True, shortened=False):
+        for _ in range(times):
             assert clock[HELD] == 0.0
-        count_chain(clock, tally, False, price)
-    for _ in range(min(most, 1000)):
-        count_chain(clock, tally, True, price)
+            count_event(clock, tally, hasty, shortened, contacts / 4)
+            weigh_event(clock, 0.0)
+
     open_step(clock, 20, DT, MOST_SOFT)
-    for _ in range(min(most, 1000)):
-        count_chain(clock, tally, True, price)
+    for _ in range(3):
+        follow(most)
+        follow(1, hasty=False)
+    follow(most)
+    open_step(clock, 20, DT, MOST_SOFT)  # a step begins without one
+    follow(most)
+    follow(9, shortened=True)
     assert (clock[HELD], tally[STEPS_HELD]) == (0.0, 0.0)
-    count_chain(clock, tally, True, price)
-    assert clock[HELD] == tally[STEPS_HELD] == (1.0 if math.isfinite(most) else 0.0)
-    count_chain(clock, tally, True, price)  # a step is held once
-    assert tally[STEPS_HELD] <= 1.0
+    follow(1)
+    assert clock[HELD] == tally[STEPS_HELD] == (1.0 if contacts > 4 else 0.0)
 
 
 def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
@@ -179,10 +192,10 @@ def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
     open_step(clock, 1, DT, MOST_SOFT)
     clock[EVENTS] = EVENT_BUDGET - 2
     for _ in range(2):
-        count_event(clock, tally, 1.0)
+        count_event(clock, tally, False, False, 1.0)
         weigh_event(clock, 0.0)
         assert (clock[SOFT], clock[HELD], tally[EXHAUSTED]) == (0.0, 0.0, 0.0)
-    count_event(clock, tally, 1.0)
+    count_event(clock, tally, False, False, 1.0)
     assert tally[EXHAUSTED] == 1.0
     assert any("events" in reason for reason in reasons(tally))
 
