@@ -50,7 +50,7 @@ def follow_slip(lasting: Lasting, k: int) -> None:
 
 @inner_kernel
 def steady_slips(lasting: Lasting) -> bool:
-    """Turn friction of all slips that are too slow for an explicit step; whether there are any, and which (`turned`)."""
+    """Turn friction of all slips too slow for an explicit step; whether there are any, and which (`turned`)."""
     found = False
     for k in range(lasting.size[CONTACTS]):
         lasting.turned[k] = 0
@@ -186,7 +186,7 @@ def most_yield(gives: Array) -> float:
 
 @inner_kernel
 def yield_in_step(lasting: Lasting, k: int) -> None:
-    """Have `Lasting.gives`, where contact k yields alone, tell how it yields with others, as when first asked in a step.
+    """Have `Lasting.gives`, where contact k yields alone, tell how it does with others, as when first asked in a step.
 
     Modes are the same throughout a step, and rows turn little; a step is repeated for dozens of lengths, with seven
     stages each.

@@ -165,7 +165,7 @@ def test_what_an_event_counts(hasty, shortened, price, weight):
 
 @pytest.mark.parametrize(("contacts", "most"), [(4, 1000), (20, 16), (52, 5)])
 def test_a_chain_of_events_that_get_nowhere_ends_the_sooner_the_more_contacts_there_are(contacts, most):
-    """However hard the impacts in it: each is weighed as one. What takes its time ends it; what creeps is none of it."""
+    """However hard the impacts in it, each weighed as one. What takes its time ends it; what creeps is none of it."""
     clock, tally = np.zeros(CLOCK_SIZE), new_tally()
 
     def follow(times, hasty=True, shortened=False):
