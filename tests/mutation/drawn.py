@@ -17,7 +17,7 @@ RECORDED, SPENT = 30.0, 30.0
 #: Seconds of CPU of the shared fixtures of test files that are run against one mutant.
 SHARED = 30.0
 #: What lives meets further tests that reach its statements: seconds of CPU of these, and of their files' fixtures.
-FURTHER, SHARED_FURTHER = 150.0, 150.0
+FURTHER, SHARED_FURTHER = 90.0, 60.0
 #: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
 REST_OF, LONGEST = 2, 30.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
