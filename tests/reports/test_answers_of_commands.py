@@ -409,3 +409,15 @@ def test_a_bench_as_data_has_its_run_its_protocol_and_every_table(tmp_path):
         tmp_path, run, {"rounds": 3, "clock": "CPU"}, {"work_points": table, "overhead": table[:0]}, table
     )
     assert json.loads(written[0].read_text()) == {**found, "run": head}
+
+
+def test_a_setting_of_a_level_is_told_with_its_iterations_where_it_has_some_and_a_tie_with_its_sign():
+    row = {"cost": 2.5e-3, "dt": 1 / 240, "iterations": None, "tied": True, "rank": 1}
+    for changed, ranked, told in (
+        ({}, False, "2.5 ms 1/240"), ({"iterations": math.nan}, False, "2.5 ms 1/240"),
+        ({"iterations": 30.0}, False, "2.5 ms 1/240 x30"), ({"iterations": 0}, False, "2.5 ms 1/240 x0"),
+        ({}, True, "* 2.5 ms 1/240"), ({"rank": 2}, True, "= 2.5 ms 1/240"), ({"tied": False}, True, "2.5 ms 1/240"),
+        ({"cost": math.nan}, True, "-"), ({"cost": math.inf}, True, "-"),
+    ):  # fmt: skip
+        found = speed._level_cell(row | changed, ranked)
+        assert " ".join(found.plain.split()) == told and (found.style == "bold") == (told[0] in "*=")
