@@ -142,9 +142,10 @@ class Mjcf:
         if said["integrator"].startswith("IMPLICIT"):
             said["integrator"] = said["integrator"].lower()
         said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
-        option = ElementTree.SubElement(self._root, "option", _text(said))
         if "solver" in said:
-            option.set("solver", mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_"))
+            solver = mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_")
+            said["solver"] = {"NEWTON": "Newton"}.get(solver, solver)
+        option = ElementTree.SubElement(self._root, "option", _text(said))
         members = mj.mjtDisableBit.__members__.values()  # one of them is their number
         bits = [bit for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
         if bits:

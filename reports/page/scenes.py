@@ -16,7 +16,7 @@ from reports.page.source import Source
 from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
 from reports.wording import number
 from validation.canonical import CanonicalScene, Primary
-from validation.cells import Observation, format_dt
+from validation.cells import Observation
 from validation.posed import resolve
 from validation.questions.convergence import Convergence, Extrapolation, convergence, declared_errors, extrapolations
 from validation.running.plan import QUICK_DT
@@ -92,11 +92,6 @@ def _iterations(errors: pd.DataFrame, scene: str, dimension: int) -> Figure | No
     if primary is None:
         return None
     return figures.error_against_iterations(table, scene, dimension, QUICK_DT, with_unit(primary.name, primary.unit))
-
-
-def step_text(dts: Sequence[float]) -> str:
-    """``1/60 to 1/960``."""
-    return f"{format_dt(dts[0])} to {format_dt(dts[-1])}" if len(dts) > 1 else format_dt(dts[0])
 
 
 def split_figure(figure: str) -> tuple[list[str], str]:

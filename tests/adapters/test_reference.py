@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import fields, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -246,6 +247,13 @@ def test_the_version_names_the_package_and_the_solvers_sources() -> None:
     package, _, sources = ENGINE.version().partition("+")
     assert package and len(sources) == 8 and int(sources, 16) >= 0
     assert ENGINE.version() == ENGINE.version()
+
+
+def test_without_its_package_the_version_says_which_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    for spec in (None, SimpleNamespace(submodule_search_locations=None)):
+        monkeypatch.setattr("adapters.reference.engine.find_spec", lambda name, spec=spec: spec)
+        with pytest.raises(ImportError, match=r"^No module named 'reference_solver'$"):
+            ENGINE.version()
 
 
 def test_nothing_that_is_a_scene_is_refused() -> None:

@@ -16,6 +16,8 @@ APART = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dar
 RECORDED, SPENT = 30.0, 30.0
 #: Seconds of CPU of the shared fixtures of test files that are run against one mutant.
 SHARED = 30.0
+#: What lives meets further tests that reach its statements: seconds of CPU of these, and of their files' fixtures.
+FURTHER, SHARED_FURTHER = 90.0, 60.0
 #: Test files whose record ended early of which the rest meets what survives, and seconds of CPU of each.
 REST_OF, LONGEST = 2, 30.0
 KILLED, SURVIVED, TIMED, UNREACHED, UNSHOWN = "killed", "survived", "time", "unreached", "unshown"
@@ -53,7 +55,8 @@ MEETS = (
     f"the tests that reach its statements, the cheapest first, its file's fixtures and each earlier case counted, "
     f"for up to {SPENT:g} s of CPU, of those "
     f"that a test file begins within {RECORDED:g} s beside its shared fixtures; then, unless its form tells that it "
-    f"changes words, for {LONGEST:g} s what {REST_OF} of the files that go on has beyond them"
+    f"changes words, for up to {FURTHER:g} s more the others of them, and for {LONGEST:g} s "
+    f"what {REST_OF} of the files that go on has beyond them"
 )
 #: Without a record: test files that are asked because they name its module, and seconds of CPU of each.
 NEAR, NEAR_SECONDS = 8, 20.0

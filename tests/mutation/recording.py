@@ -82,6 +82,7 @@ def remembered(cached):
             seen.update(before)
 
     update_wrapper(call, cached)
+    call.__wrapped__ = cached.__wrapped__  # what asks for the function beneath a cache means the function
     for name in ("cache_clear", "cache_info", "cache_parameters"):
         setattr(call, name, getattr(cached, name))
     return call

@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,15 @@ def test_what_a_cache_keeps_is_reached_by_all_who_ask_for_it(asked):
     assert first == {"outer:0"} | inner | sign
     assert asked("outer", 1) == first and asked("outer", 1) == first
     assert asked("outer", -2) == {"outer:0", "inner:0", "sign:0", "sign:3"}
+
+
+def test_beneath_a_cache_lies_the_function_itself(reach):
+    """A test that asks it past its cache must not get what another test had computed."""
+    _, recorder = reach
+    asked = []
+    told = recorder.remembered(cache(asked.append))
+    told(1), told(1), told.__wrapped__(1)
+    assert asked == [1, 1]
 
 
 def test_what_a_module_computes_while_it_is_imported_is_reached_by_all_tests_of_the_file(reach, tmp_path):

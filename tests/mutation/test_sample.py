@@ -102,3 +102,37 @@ def test_a_cheap_case_of_many_is_asked_before_dear_tests_and_no_test_fills_the_t
     tests = {f"cases.py::test_each[{k:03}]": 0.0 for k in range(500)} | {"one.py::test_long": 2.0}
     order = [test for test, _ in sample.in_turn(tests, {"cases.py": 0.0, "one.py": 0.0})]
     assert order.index("one.py::test_long") == 199  # the 200th case of a hundredth of a second counts as its two
+
+
+def test_what_lives_meets_what_was_too_dear_and_is_noticed_by_what_fails_again_by_itself(tools, monkeypatch, tmp_path):
+    """A test that fails without the mutant, or only once, or whose time is over, has not noticed it."""
+    sample, drawn = tools
+    cheap, dear, last = (f"test_toy.py::test_{name}" for name in ("cheap", "dear", "last"))
+    costs = {cheap: 1.0, dear: 100.0, last: 400.0}
+    known = {"test_toy.py": sample.Record({test: (cost, []) for test, cost in costs.items()}, 0.0, True, 500.0)}
+    tree, mutations = sample.mutations_of("toy.py")
+    bench = sample.Bench(tmp_path, known, {"toy.x_twice:0": costs})
+    monkeypatch.setattr(sample, "cut_short", lambda known, module: [])
+
+    def found(*ends):
+        """Ends of further calls with the mutant, then of those without it: status of the dear test in each."""
+        calls, left = [], list(ends)
+
+        def asked(copy, tests, *rest):
+            spoilt = (copy / "toy.py").read_text() != SOURCE
+            calls.append((tuple(tests), spoilt))
+            status = 0 if tests == [cheap] else left.pop(0)
+            return status, dear if status == 1 else ""
+
+        monkeypatch.setattr(sample, "asked", asked)
+        verdict = bench.verdict("toy.py", tree, *mutations[0])
+        assert (tmp_path / "toy.py").read_text() == SOURCE
+        return verdict, calls
+
+    first, second, by_itself, plain = ((cheap,), True), ((dear,), True), ((dear,), True), ((dear,), False)
+    assert found(1, 1, 0) == ((drawn.KILLED, 2, dear), [first, second, by_itself, plain])
+    assert found(0) == ((drawn.SURVIVED, 2, ""), [first, second])
+    for ends in ((1, 0), (1, 1, 1), (sample.OUT_OF_TIME,), (1, sample.OUT_OF_TIME)):
+        assert found(*ends)[0] == (drawn.SURVIVED, 2, ""), ends
+    monkeypatch.setattr(sample, "known_by_form", lambda change: "words of a sentence")
+    assert found() == ((drawn.SURVIVED, 1, ""), [first])

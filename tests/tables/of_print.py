@@ -70,7 +70,7 @@ KINDS = (
     ("ok", "fail", "explained"), ("ok", "fail", "known"), ("ok", "fail", "new"), ("ok", "pass", None),
     ("ok", "pass", "drifted"), ("unsupported", None, "known"), ("crashed", None, None),
 )  # fmt: skip
-#: Lines of a part of a page that are told; more of the same follow.
+#: Lines of a part of a page that are told whatever they are; more of the same follow.
 LONGEST = 900
 #: Long texts in a page that are none: packed data, and what is hashed of style and script.
 #: Padding decides whether a link has quotes, and the packer's version which padding there is: they are left out.
@@ -202,14 +202,20 @@ PARTS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
 }
 
 
+def part_of(name: str) -> Source:
+    """What a page is made from, of a part of the rows and the cells that have them; without bench and replays."""
+    rows = [row for row in source().rows if PARTS[name](row)]
+    keys = {json.dumps(row["slot"], sort_keys=True) for row in rows}
+    seen = [o for o in source().observations if json.dumps(o.slot.as_dict(), sort_keys=True) in keys]
+    return Source(source().run, rows, seen, nulls=source().nulls)
+
+
 def sentences() -> Sections:
     """What the page and the terminal conclude from parts of the rows."""
     found = Sections()
-    for name, belongs in PARTS.items():
-        rows = [row for row in source().rows if belongs(row)]
-        keys = {json.dumps(row["slot"], sort_keys=True) for row in rows}
-        seen = [o for o in source().observations if json.dumps(o.slot.as_dict(), sort_keys=True) in keys]
-        part = Source(source().run, rows, seen, nulls=source().nulls)
+    for name in PARTS:
+        part = part_of(name)
+        rows = part.rows
         said = {f"sentence {k}": f"{head}: {text}" for k, (head, text) in enumerate(conclusions.sentences(part))}
         said |= {f"family {k}": str(each) for k, each in enumerate(families(part))}
         said |= {f"choice {k}": str(each) for k, each in enumerate(choosing.choices(part))}
@@ -244,17 +250,45 @@ def pages() -> tuple[str, tuple[dict[str, Any], ...]]:
 
 
 def page_parts() -> Sections:
-    """The report, tag by tag, in parts that begin with a heading; packed data is told unpacked where it is text."""
-    text = _CODE.sub(lambda found: f"<{found[1]}>", pages()[0])
-    parts, title = Sections({"top": {}}), "top"
-    for piece in re.split(r"(?=<)", _HASHED.sub("'sha256'", text)):
-        line = " ".join(unescape(_PACKED.sub(unpacked, _QUOTED.sub(r"\1", piece))).split())
+    """The report, tag by tag, in parts that begin with a heading; packed data is told unpacked where it is text.
+
+    Of a long part the first `LONGEST` lines are told, and each further one that stands nowhere before it.
+    """
+    parts, title, met = Sections({"top": {}}), "top", set[str]()
+    for line in tags(pages()[0]):
         if re.match(r"<h[12]\b", line):
             title = f"{len(parts)} {line.partition('>')[2]}"[:60]
             parts[title] = {}
-        if line and line not in ("</td>", "</tr>", "</li>", "</span>"):
-            parts[title][f"{len(parts[title]):04d}"] = line
-    return {title: dict(list(own.items())[:LONGEST]) | {"lines": str(len(own))} for title, own in parts.items()}
+        parts[title][f"{len(parts[title]):04d}"] = line
+    found = Sections()
+    for title, own in parts.items():
+        found[title] = {}
+        for k, (place, line) in enumerate(own.items()):
+            if k < LONGEST or line not in met:
+                found[title][place] = line
+            met.add(line)
+        found[title]["lines"] = str(len(own))
+    return found
+
+
+def tags(page: str) -> list[str]:
+    """A page tag by tag, each with what stands behind it; without those that only end something."""
+    text = _CODE.sub(lambda found: f"<{found[1]}>", page)
+    pieces = (_PACKED.sub(unpacked, _QUOTED.sub(r"\1", piece)) for piece in re.split(r"(?=<)", text))
+    lines = (" ".join(_HASHED.sub("'sha256'", unescape(piece)).split()) for piece in pieces)
+    return [line for line in lines if line and line not in ("</td>", "</tr>", "</li>", "</span>")]
+
+
+def pages_of_parts() -> Sections:
+    """The report over parts of the rows: what stands in each that the whole report does not say, and its charts."""
+    whole, found = set(tags(pages()[0])), Sections()
+    for name in ("none", "new", "crashed", "refused", "one scene", "two"):
+        with undrawn() as asked:
+            lines = tags(render(part_of(name)))
+        others = dict.fromkeys(line for line in lines if line not in whole and ";base64," not in line)
+        found[name] = {f"{k:03d}": line for k, line in enumerate(others)}
+        found[name] |= {"lines": str(len(lines)), "charts": str(len(asked))}
+    return found
 
 
 def unpacked(found: re.Match[str]) -> str:
@@ -325,5 +359,6 @@ def makers() -> dict[str, Callable[[], Sections]]:
         **{f"print/explain-{'-'.join(map(str, kind))}": partial(explained, kind) for kind in KINDS},
         "print/coloured": coloured, "print/sentences": sentences, "print/files": exported, "print/bench": benched,
         "print/frame": data_frame,
-        "print/page": page_parts, "print/charts": page_charts, "print/dashboard": dashboard,
+        "print/page": page_parts, "print/parts-of-page": pages_of_parts, "print/charts": page_charts,
+        "print/dashboard": dashboard,
     }  # fmt: skip
