@@ -119,8 +119,7 @@ def begin_phase(bodies: Bodies, lasting: Lasting) -> None:
 
 @inner_kernel
 def go_back(bodies: Bodies, lasting: Lasting) -> None:
-    """Return to the start of the phase, where steps begin."""
-    forget_yields(lasting)
+    """Return to the start of the phase."""
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
             bodies.twist[i, d] = lasting.before[i, d]
@@ -155,6 +154,7 @@ def start_slopes(bodies: Bodies, lasting: Lasting) -> bool:
     for k in range(lasting.size[CONTACTS]):
         for t in range(lasting.size[TANGENTS]):
             lasting.begun[k, t] = lasting.direction[k, t]
+    forget_yields(lasting)
     go_back(bodies, lasting)
     if not evaluate_forces(bodies, lasting):
         return False
@@ -198,6 +198,7 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
             lasting.moment[k, d] = 0.0
         lasting.work[k, 0] = lasting.work[k, 1] = 0.0
     lasting.length[0] = length
+    forget_yields(lasting)
     weigh_stage(bodies, lasting, 0, length)
     keep_slopes(bodies, lasting, 0)
     lasting.early[0] = 1.0

@@ -1,17 +1,15 @@
-"""How a contact yields while all others hold on, against dense algebra, and for how long that is kept (E38)."""
+"""How a contact yields while all others hold on, against dense algebra (E38)."""
 
 import numpy as np
 import pytest
 
 from reference_solver.compilation import from_python
-from reference_solver.spatial.state import BODY
-from reference_solver.stepping import phase, turning_slips
+from reference_solver.stepping import turning_slips
 from reference_solver.stepping.lasting import CONTACTS, OPEN, SLIP, STICK, allocate_lasting
 
-go_back, steady_slips, yield_alone, yield_with_others = (
+steady_slips, yield_alone, yield_with_others = (
     from_python(each)
     for each in (
-        phase.go_back,
         turning_slips.steady_slips,
         turning_slips.yield_alone,
         turning_slips.yield_with_others,
@@ -117,12 +115,3 @@ def test_which_slips_were_turned_is_noted(slow):
     assert bool(steady_slips(lasting)) is any(slow)
     assert lasting.turned.tolist() == [*map(int, slow), 0]
     assert [bool((lasting.direction[k] != before[k]).any()) for k in range(2)] == list(slow)
-
-
-def test_a_step_that_begins_knows_nothing_of_one_before():
-    """Modes and places may be others: what the first stage asks is told anew."""
-    lasting = allocate_lasting(3, 1, 2)
-    lasting.size[:2] = 2, 0
-    lasting.asked[:] = 1
-    go_back(np.zeros(1, BODY).view(np.recarray), lasting)
-    assert lasting.asked.tolist() == [0, 0]

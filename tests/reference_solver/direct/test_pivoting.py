@@ -32,11 +32,19 @@ def test_answers_agree_with_enumeration(direct, seed, mu, attempt):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_larger_answers_obey_the_law(direct, seed):
-    """Signs, complementarity, cone, and friction against the slip of 20 to 40 contacts, from W and q alone."""
+    """Signs, complementarity, cone, and friction against the slip of 20 to 40 contacts, from W and q alone.
+
+    Pivots from one covering may end nowhere: on some machines those of seed 14 do from the first. The solver asks the
+    next then, of what it had before.
+    """
     mu = 0.2 + 0.04 * seed
-    problem = direct.random(100 + seed, 20 + seed, mu=mu)
-    w, q = direct.delassus(problem)
-    assert direct.pivots(problem, 0) <= PIVOTED
+    for attempt in range(COVERINGS):
+        problem = direct.random(100 + seed, 20 + seed, mu=mu)
+        w, q = direct.delassus(problem)
+        left = direct.pivots(problem, attempt)
+        if left <= PIVOTED:
+            break
+    assert left <= PIVOTED
     p = problem.contact.impulse[:, :2]
     u = (w @ p.ravel() + q).reshape(-1, 2)
     size = np.abs(p).max()
