@@ -75,6 +75,7 @@ def planted(times):
     return np.array(pose), left_out
 
 
+@pytest.mark.long
 def test_a_series_that_is_ended_too_early_is_off_by_no_more_than_its_record_tells():
     """At a thousand times the speed: all steps leave out the same, so that other ones do not show it."""
     (pose, left_out), (other, told) = planted(1), planted(1e6)

@@ -34,7 +34,7 @@ def column(dimension):
     return Simulation(model, Settings.classical(DT))
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_the_timed_steps_reach_the_same_bits(dimension):
     timed, plain = column(dimension), column(dimension)
     stages = timeline(timed, 30, warm_up=10)

@@ -43,7 +43,7 @@ def test_a_run_that_cannot_be_solved_ends_and_says_where(monkeypatch):
     assert "no impulses keep bodies 0 and 1 apart" in observation.reason
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
     """Rounds of Newton's method leave five times the goal there, by which the planar certificate refused a cone."""
     asked = {"ratio": 1e5}
@@ -55,6 +55,7 @@ def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
     assert {row.physics for row in rows_of("run", [found])} == {"pass"}
 
 
+@pytest.mark.long
 def test_eight_blocks_that_fall_off_each_other_are_located_throughout_and_certified():
     """Slips of 5e-11 m/s end in a stack that rocks: a projection that takes them out leaves 4e-11 of a cone."""
     asked = {"n": 8.0, "margin": -0.05, "duration": 1.5}

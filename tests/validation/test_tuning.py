@@ -33,6 +33,7 @@ def test_more_sweeps_are_found_where_too_few_are_the_fault(small, monkeypatch):
     assert found.held_out[1].failing <= found.held_out[0].failing
 
 
+@pytest.mark.long
 def test_what_helps_the_cells_searched_with_and_harms_others_is_not_kept(small, monkeypatch):
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"iterations": (10, 1000)})
     monkeypatch.setattr(tuning, "_holds", lambda before, after: False)
