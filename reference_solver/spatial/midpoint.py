@@ -100,7 +100,7 @@ def drift(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Opti
     """Go to where the velocities ``first`` take bodies in ``time``, and give rows the levers of their features there.
 
     ``twist`` is ``first`` afterwards, the spin of a body with unequal moments what its momentum makes of it. Points
-    without features that can be followed keep their levers.
+    without features that can be followed keep their levers, but for what keeps them in one place (`join_levers`).
     """
     lasting, m, known = sub_step.lasting, 0, 0
     copy_vectors(bodies.first, bodies.twist)
@@ -122,6 +122,8 @@ def drift(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Opti
             m += 1
         for i in range(len(bodies)):
             place_at(bodies, i, time, bodies, i)
+        for other in range(begin, m):
+            join_levers(bodies, manifolds, other)
         for k in range(known):
             follow(bodies, lasting, k)
             take_levers(manifolds, lasting, k)
@@ -132,6 +134,22 @@ def drift(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Opti
                 set_response(bodies, manifolds, other, p, options)
         if m < len(manifolds):
             put_back(bodies, sub_step)
+
+
+@inner_kernel
+def join_levers(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
+    """Let the levers of manifold m end in one place at mid-drift: half way between where those of its start end.
+
+    One wrench at a manifold's centre acts on both bodies (`set_frame`). Beside followed points of the same manifold,
+    levers of the start would be those of another place for one of the bodies: the direct solver, which goes by levers,
+    then solved another problem than that of the sweeps and of the certificate, by 1e-4 of an impulse.
+    """
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    for p in range(manifolds.points[m]):
+        for d in range(3):
+            apart = bodies.pose[b, d] + manifolds.arm_b[m, p, d] - bodies.pose[a, d] - manifolds.arm_a[m, p, d]
+            manifolds.arm_a[m, p, d] += 0.5 * apart
+            manifolds.arm_b[m, p, d] -= 0.5 * apart
 
 
 @inner_kernel
