@@ -1,4 +1,4 @@
-"""``make run``: what it asks for and in which order, what it says last, whose status it ends with; nothing real runs."""
+"""``make run``: what it asks for, in which order, what it says last, whose status it ends with; nothing real runs."""
 
 import os
 import re
