@@ -95,7 +95,8 @@ def test_markdown_holds_no_html_and_no_field_that_ends_in_text_from_outside():
     evil = "<img src=x onerror=alert(1)> & a|b"
     row = replace(ROW, scene=f"{evil}.toml@0a1b2c3d", reason=evil, because=evil, engine="toy<b>", profile=evil)
     text = exports.as_markdown(plain(row))
-    assert re.findall(r"<[^>]*>", text.replace("<br>", "")) == [] and "alert(1)" in text and "&amp;" in text
+    ours = text.replace("<br>", "")
+    assert "<" not in ours and ">" not in ours and "alert(1)" in text and " &amp; " in text
     table = [re.findall(r"(?<!\\)\|", line) for line in text.splitlines() if line.startswith("|")]
     assert len(table) == 3 and {len(bars) for bars in table} == {3}
 
