@@ -53,9 +53,9 @@ def _heading(text: str, console: Console) -> None:
     console.print(Text(text, style="bold"))
 
 
-def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
-    """Print a listing of scenes, engines, checks or runs."""
-    columns = LISTINGS[what]
+def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool = False) -> None:
+    """Print a listing of scenes, engines, checks or runs; of checks with their reasons if they are asked for."""
+    columns = [(heading, name) for heading, name in LISTINGS[what] if reasons or name != "because"]
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
@@ -64,6 +64,8 @@ def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
             told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
         table.add_row(*map(Text, told.values()))
     console.print(table)
+    if what == "checks" and not reasons:
+        console.print(Text("Why each tolerance is what it is: --reasons, or crosscheck describe SCENE."))
     for entry in entries:
         if entry.get("reason"):
             console.print(Text(f"{entry['name']}: {entry['reason']}"))

@@ -163,10 +163,21 @@ def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
     """Each told it again, seven lines of two words at 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
     plain = json.loads(call("list", "checks", "--json").stdout)
-    lines = {line.partition(" ")[0]: line for line in call("list", "checks").stdout.splitlines()}
+    lines = {line.partition(" ")[0]: line for line in call("list", "checks", "--reasons").stdout.splitlines()}
     shared = [after["because"] == before["because"] for before, after in pairwise(plain)]
     assert any(shared)
     assert ["as above" in lines[check["name"]] for check in plain[1:]] == shared
+
+
+def test_checks_are_listed_a_line_each_and_say_where_their_reasons_stand():
+    """At 80 columns the reasons made 1801 lines of some 300."""
+    plain = json.loads(call("list", "checks", "--json").stdout)
+    told = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["list", "checks"]).stdout.splitlines()
+    body, last = told[2:-1], told[-1]
+    assert [line.partition(" ")[0] for line in body] == [check["name"] for check in plain] and len(plain) > 200
+    assert max(map(len, told)) <= 80 and "--reasons" in last and "describe SCENE" in last
+    refused = call("list", "scenes", "--reasons")
+    assert refused.exit_code == 2 and "reasons: checks have one, not scenes" in refused.stderr
 
 
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
