@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -99,7 +100,11 @@ def described(data: Plain, console: Console) -> None:
 
 def _scene(data: Plain, console: Console) -> None:
     console.print(Text(f"{data['name']}, version {data['version']}: {data['title']}", style="bold"))
-    console.print(Text(data["figure"].rstrip()), soft_wrap=True)
+    for k, block in enumerate(re.split(r"\n[ \t]*\n", data["figure"].strip("\n"))):
+        drawn = block.startswith(" ")  # what is indented is drawn, the rest is said and folds
+        if k:
+            console.print()
+        console.print(Text(block.rstrip() if drawn else " ".join(block.split())), soft_wrap=drawn)
     _heading("Parameters", console)
     table = grid("name", "default", "range", "what")
     for p in data["parameters"]:

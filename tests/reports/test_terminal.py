@@ -180,6 +180,23 @@ def test_checks_are_listed_a_line_each_and_say_where_their_reasons_stand():
     assert refused.exit_code == 2 and "reasons: checks have one, not scenes" in refused.stderr
 
 
+WIDE = [
+    *(("list", what) for what in ("scenes", "suites", "engines", "checks")), ("list", "checks", "--reasons"),
+    *(("describe", name) for name in ("bounce", "v_groove", "chipmunk")), ("doctor",), ("nulls", "impact"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WIDE, ids=" ".join)
+def test_what_is_listed_and_described_fits_every_width_and_is_cut_off_at_none(words):
+    sizes = []
+    for width in (80, 100, 120):
+        told = CliRunner(env={"COLUMNS": str(width)}).invoke(main, list(words)).stdout.splitlines()
+        assert told and max(len(line.rstrip()) for line in told) <= width
+        assert not any("…" in line for line in told)
+        sizes.append(len(told))
+    assert sizes == sorted(sizes, reverse=True)  # room that is there is used
+
+
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     """The title of a quick suite names forty-six scenes: a screen for every run."""
     store = Store(tmp_path)
