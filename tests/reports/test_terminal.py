@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import reports
-from reports import listing
+from reports import exports, listing
 from reports.command import main
 from validation.cells import Slot
 from validation.posed import pinned
@@ -139,6 +140,17 @@ def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch)
     assert flat(said).count("(1) all but (2)") == 1 and said.count("scene_number_40") == 1
     assert "scene_number_1," not in said
     assert flat(said).count("(2) scene_number_40, scene_number_41") == 1
+
+
+def test_markdown_holds_no_html_and_no_field_that_ends_in_text_from_outside(folder):
+    evil = "<img src=x onerror=alert(1)> & a|b"
+    (row, *_) = [row.as_dict() for row in exports.load_rows(folder) if row.physics == "fail"]
+    row |= {"scene": f"{evil}.toml@0a1b2c3d", "reason": evil, "because": evil, "engine": "toy<b>", "profile": evil}
+    text = exports.as_markdown([row])
+    ours = text.replace("<br>", "")
+    assert "<" not in ours and ">" not in ours and "alert(1)" in text and " &amp; " in text
+    table = [re.findall(r"(?<!\\)\|", line) for line in text.splitlines() if line.startswith("|")]
+    assert len(table) == 3 and {len(bars) for bars in table} == {3}
 
 
 def test_every_command_has_the_console_that_reads_no_markup():
