@@ -11,8 +11,18 @@ from typing import Any
 
 from adapters.engine import EngineError
 
+#: Largest whole number that a setting of a C engine can hold.
+LARGEST_INT = 2**31 - 1
 #: ``check(value)`` says in words what the value must be, or nothing if it is that.
 Check = Callable[[Any], str]
+
+
+def finite(value: Any) -> bool:
+    """Whether a number is finite as a double: a whole number of 400 digits is not."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def whole(least: int, most: int) -> Check:
@@ -29,7 +39,7 @@ def number(least: float, most: float) -> Check:
     """A finite number of this range."""
 
     def check(value: Any) -> str:
-        told = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        told = isinstance(value, int | float) and not isinstance(value, bool) and finite(value)
         return "" if told and least <= value <= most else f"a number from {least:g} to {most:g}"
 
     return check

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -53,9 +54,9 @@ def _heading(text: str, console: Console) -> None:
     console.print(Text(text, style="bold"))
 
 
-def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
-    """Print a listing of scenes, engines, checks or runs."""
-    columns = LISTINGS[what]
+def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool = False) -> None:
+    """Print a listing of scenes, engines, checks or runs; of checks with their reasons if they are asked for."""
+    columns = [(heading, name) for heading, name in LISTINGS[what] if reasons or name != "because"]
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
@@ -64,6 +65,8 @@ def listed(what: str, entries: Sequence[Plain], console: Console) -> None:
             told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
         table.add_row(*map(Text, told.values()))
     console.print(table)
+    if what == "checks" and not reasons:
+        console.print(Text("Why each tolerance is what it is: --reasons, or crosscheck describe SCENE."))
     for entry in entries:
         if entry.get("reason"):
             console.print(Text(f"{entry['name']}: {entry['reason']}"))
@@ -97,7 +100,11 @@ def described(data: Plain, console: Console) -> None:
 
 def _scene(data: Plain, console: Console) -> None:
     console.print(Text(f"{data['name']}, version {data['version']}: {data['title']}", style="bold"))
-    console.print(Text(data["figure"].rstrip()), soft_wrap=True)
+    for k, block in enumerate(re.split(r"\n[ \t]*\n", data["figure"].strip("\n"))):
+        drawn = block.startswith(" ")  # what is indented is drawn, the rest is said and folds
+        if k:
+            console.print()
+        console.print(Text(block.rstrip() if drawn else " ".join(block.split())), soft_wrap=drawn)
     _heading("Parameters", console)
     table = grid("name", "default", "range", "what")
     for p in data["parameters"]:

@@ -8,7 +8,6 @@ one       rigid-body path, one compromise for every scene
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +16,7 @@ from adapters.bullet.contact_law import ContactLaw
 from adapters.bullet.shipped import BREAKING_THRESHOLD, ITERATIONS, SLOP
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
+from adapters.settings import LARGEST_INT, finite
 
 WORLD = frozenset(
     {
@@ -35,6 +35,10 @@ WORLD = frozenset(
 )
 BODY = frozenset(
     {"angularDamping", "contactProcessingThreshold", "linearDamping", "rollingFriction", "spinningFriction"}
+)
+#: Settings that PyBullet takes as an int.
+WHOLE = frozenset(
+    {"deterministicOverlappingPairs", "iterations", "numSubSteps", "useMaximalCoordinates", "useSplitImpulse"}
 )
 
 
@@ -153,20 +157,24 @@ def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     Raises
     ------
     EngineError
-        Naming an unknown setting, a negative or a not finite value, or an iteration count below 1.
+        Naming an unknown setting, a value that is negative, not finite or no whole number where PyBullet takes an int,
+        or an iteration count below 1.
     """
     for name, value in settings.items():
         if name not in WORLD | BODY | {"useMaximalCoordinates", "iterations"}:
             raise EngineError(f"{name}: bullet has no such setting")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise EngineError(f"{name}: {value!r} is not a number")
-        if not (math.isfinite(value) and value >= 0.0):
+        if not (finite(value) and value >= 0.0):
             raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
     if settings.get("enableSAT", 0) not in (0, 1):
         raise EngineError(f"enableSAT: {settings['enableSAT']!r} must be 0 or 1")
     iterations = settings.get("iterations", 50)
     if iterations != int(iterations) or iterations < 1:
         raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")
-    world = {name: value for name, value in settings.items() if name in WORLD}
+    for name in sorted(WHOLE & set(settings)):
+        if settings[name] != int(settings[name]) or settings[name] > LARGEST_INT:
+            raise EngineError(f"{name}: {settings[name]!r} must be a whole number of at most {LARGEST_INT}")
+    world = {name: int(value) if name in WHOLE else value for name, value in settings.items() if name in WORLD}
     body = {name: value for name, value in settings.items() if name in BODY}
     return world | {"numSolverIterations": int(iterations)}, body

@@ -14,6 +14,7 @@ from typing import Any
 from adapters.chipmunk.shipped import COLLISION_BIAS, COLLISION_PERSISTENCE, COLLISION_SLOP, ITERATIONS
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
+from adapters.settings import finite
 
 SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
 
@@ -98,7 +99,7 @@ def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
             raise EngineError(f"{name}: {value!r} must be a whole number from 1 to 2147483647")
     for name, high in (("collision_slop", math.inf), ("collision_bias", 1.0), ("start_overlap", math.inf)):
         value = settings[name]
-        number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        number = isinstance(value, int | float) and not isinstance(value, bool) and finite(value)
         if not number or not 0.0 <= value <= high:
             limit = " and at most 1" if high == 1.0 else ""
             raise EngineError(f"{name}: {value!r} must be a finite number, at least 0{limit}")

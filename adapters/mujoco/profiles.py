@@ -17,6 +17,7 @@ from adapters.mujoco.matched import AGREED
 from adapters.mujoco.options import CARRIED
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
 from adapters.needs import Needs
+from adapters.settings import LARGEST_INT, finite
 
 MANUAL = f"{DOC}, modeling: solver parameters"
 FRICTION = f"{DOC}, modeling: friction, slow slippage"
@@ -229,7 +230,9 @@ def _check_solref(name: str, values: Any) -> None:
 
 def _check_number(name: str, value: Any, low: float, whole: bool) -> None:
     number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-    if not (number and math.isfinite(value) and value >= low):
+    if number and whole and value > LARGEST_INT:
+        raise EngineError(f"{name}: {value!r} must be a whole number of at most {LARGEST_INT}")
+    if not (number and finite(value) and value >= low):
         raise EngineError(f"{name}: {value!r} must be a {'whole ' if whole else ''}number of at least {low:g}")
 
 

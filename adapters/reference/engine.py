@@ -9,6 +9,7 @@ The two profiles stand in `adapters.reference.profiles`.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
@@ -30,6 +31,8 @@ from adapters.reference.simulation import ReferenceSimulation, json_ready, solve
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
 
+#: Largest whole number that a kernel can be handed.
+LARGEST = 2**63 - 1
 #: Steps cut at events, with constant accelerations between them.
 LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
 
@@ -105,13 +108,18 @@ class ReferenceEngine(Engine):
         from reference_solver import Settings
 
         known = [field.name for field in fields(Settings) if field.name != "dt"]
-        for name in settings:
+        for name, value in settings.items():
             if name not in known:
                 raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
+            if isinstance(value, int) and value > LARGEST:
+                raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
         try:
             return ReferenceSimulation(scene, solver_model(scene), Settings(dt=dt, **settings))
         except (ValueError, TypeError) as error:
             raise EngineError(str(error).splitlines()[0]) from error
+        except OverflowError as error:
+            wrong = [name for name, value in settings.items() if isinstance(value, float) and not math.isfinite(value)]
+            raise EngineError(f"{', '.join(wrong) or 'scene'}: {error}") from None
 
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array

@@ -24,12 +24,15 @@ from validation.records.store import Store
 
 @main.command("list")
 @click.argument("what", type=click.Choice(["scenes", "suites", "engines", "checks", "runs"]))
+@click.option("--reasons", is_flag=True, help="Of checks: why each tolerance is what it is.")
 @click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
 @click.option("--engine", metavar="E", help="Engine that gets the faults; our solver by default.")
 @click.option("--profile", metavar="P", help="Its profile that passes; by default the one that promises a solution.")
 @AS_JSON
 @OUT
-def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None, as_json: bool, out: Path) -> None:
+def list_(
+    what: str, reasons: bool, sensitivity: bool, engine: str | None, profile: str | None, as_json: bool, out: Path
+) -> None:
     """List scenes, the cells of each in every suite, engines, checks, or the runs in OUT.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
@@ -38,6 +41,8 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     """
     data: list[Any]
     found = Detected([], [])
+    if reasons and what != "checks":
+        raise SceneError("reasons: checks have one, not " + what)
     if sensitivity:
         if what != "checks":
             raise SceneError("sensitivity: checks have one, not " + what)
@@ -65,7 +70,7 @@ def list_(what: str, sensitivity: bool, engine: str | None, profile: str | None,
     elif sensitivity:
         tables.sensitivity(data, only_by_receipts(found.seen), found.blind, terminal())
     else:
-        tables.listed(what, data, terminal())
+        tables.listed(what, data, terminal(), reasons)
 
 
 @main.command()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,38 +51,62 @@ Plain = Mapping[str, Any]
 NO_RATIO = "-"
 
 
-def load(out: Path, run: str) -> tuple[list[Plain], list[Observation], Costs]:
-    """Judged rows of a run, its observations, and what the last bench in the same store says of costs.
+@dataclass(frozen=True)
+class Kept:
+    """What a store has of one run, read at one time."""
+
+    run: str
+    observations: list[Observation]
+    planned: int
+    missing: int
+
+    def counted(self) -> dict[str, Any]:
+        """Id of the run, how many cells it planned, and how many of them left no observation."""
+        return {"run": self.run, "planned": self.planned, "missing": self.missing}
+
+    def say_missing(self) -> None:
+        """Say on stderr how many planned cells the run lacks, if any."""
+        if self.missing:
+            click.echo(f"crosscheck: run {self.run}: {missing_text(self.missing, self.planned)}", err=True)
+
+
+@contextmanager
+def _opened(out: Path) -> Iterator[Store]:
+    store = Store(out, create=False)
+    try:
+        yield store
+    finally:
+        store.close()
+
+
+def _kept(store: Store, run: str) -> Kept:
+    chosen = store.run(run)
+    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen))
+
+
+def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
+    """Judged rows of a run, what is kept of it, and what the last bench in the same store says of costs.
 
     Raises
     ------
     StoreError
         If the folder has no results or no such run.
     """
-    store = Store(out, create=False)
-    try:
-        chosen = store.run(run)
-        observations = store.observations(chosen)
-        timed = reading.bench_runs(store)
-        return judged(chosen.id, observations), observations, speed.cheapest_passing(store, timed[-1]) if timed else {}
-    finally:
-        store.close()
+    with _opened(out) as store:
+        kept, timed = _kept(store, run), reading.bench_runs(store)
+        return judged(kept.run, kept.observations), kept, speed.cheapest_passing(store, timed[-1]) if timed else {}
 
 
-def observed(out: Path, run: str) -> tuple[str, list[Observation]]:
-    """Id and observations of a run, not judged yet: laws take their time, and what nobody asked for needs none.
+def observed(out: Path, run: str) -> Kept:
+    """What is kept of a run, not judged yet: laws take their time, and what nobody asked for needs none.
 
     Raises
     ------
     StoreError
         As `load` does.
     """
-    store = Store(out, create=False)
-    try:
-        chosen = store.run(run)
-        return chosen.id, store.observations(chosen)
-    finally:
-        store.close()
+    with _opened(out) as store:
+        return _kept(store, run)
 
 
 def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
@@ -95,34 +121,16 @@ def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
 @OUT
 def show(run: str, every: bool, as_json: bool, out: Path) -> None:
     """Show RUN (the latest by default) as `run` did at its end: matrix, short answers, where the details are."""
-    rows, _, costs = load(out, run)
+    rows, kept, costs = load(out, run)
     if as_json:
-        click.echo(json.dumps(_as_plain(rows, costs) | _counted(out, run), indent=1))
+        click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
     show_summary(rows, console, costs, every=every)
-    _say_missing(out, run)
+    kept.say_missing()
     report = out / "report.html"
     if report.is_file():
         console.print(Text(f"  report: {report}"), soft_wrap=True)
-
-
-def _counted(out: Path, run: str) -> dict[str, Any]:
-    """Id of a run, how many cells it planned, and how many of them left no observation."""
-    store = Store(out, create=False)
-    try:
-        chosen = store.run(run)
-        return {"run": chosen.id, "planned": len(chosen.plan), "missing": store.missing(chosen)}
-    finally:
-        store.close()
-
-
-def _say_missing(out: Path, run: str) -> None:
-    """Say on stderr how many planned cells a run lacks, if any."""
-    counted = _counted(out, run)
-    if counted["missing"]:
-        said = missing_text(counted["missing"], counted["planned"])
-        click.echo(f"crosscheck: run {counted['run']}: {said}", err=True)
 
 
 def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
@@ -162,8 +170,9 @@ def findings(
     if prove:
         prove_and_show(prove, wanted["engine"], as_json)
         return
-    identity, observations = observed(out, run)
-    _say_missing(out, run)
+    kept = observed(out, run)
+    identity, observations = kept.run, kept.observations
+    kept.say_missing()
     wanted["scene"] = [
         scene_of(told, {observation.slot.scene for observation in observations}) for told in wanted["scene"]
     ]
@@ -247,9 +256,9 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
     row there; SCENE may be the path of a scene file.
     """
-    identity, observations = observed(out, run)
-    observations = _where(observations, row)
-    rows = judged(identity, observations)
+    kept = observed(out, run)
+    observations = _where(kept.observations, row)
+    rows = judged(kept.run, observations)
     found = find_row(rows, row)
     better, paste, differing = _cure(rows, observations, found)
     if as_json:

@@ -1,4 +1,4 @@
-"""Bullet's adapter: physics through the one step loop, and the fact sheet's key figures."""
+"""Bullet's adapter: physics through the one step loop, and figures that were measured without it."""
 
 import math
 import subprocess
@@ -225,7 +225,7 @@ def test_pair_friction_decelerates_by_mu_g(profile):
         scene = scene_of(FLOOR, box, mu=mu, gravity=(0.0, 0.0, -9.81), duration=0.5)
         record = drive(scene, profile, linearDamping=0.0, angularDamping=0.0)
         measured = (3.0 - record.twist[-1, 1, 0]) / (9.81 * record.t[-1])
-        assert measured == pytest.approx(mu, rel=0.01)  # fact sheet: 0.7 % from contacts switching under a fast box
+        assert measured == pytest.approx(mu, rel=0.01)  # 0.7 % from contacts switching under a fast box
 
 
 def friction_of_the_probe(e, dt, **changes):
@@ -320,7 +320,7 @@ def test_corner_strike_obeys_the_impulse_formula_with_the_stated_inertia():
 def test_disc_that_starts_touching_rolls_with_its_own_moment_not_the_spheres():
     disc = Body("disc", Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0))
     record = drive(planar(FLOOR_2D, disc, mu=0.5, gravity=(0.0, -9.81), duration=0.5))
-    # Angular momentum about the contact line: 2/3 for a disc, 5/7 for a sphere; 1e-5: fact sheet, box floor.
+    # Angular momentum about the contact line: 2/3 for a disc, 5/7 for a sphere; 1e-5 on a floor that is a box.
     assert record.twist[-1, 1, 0] == pytest.approx(2.0 * 2.0 / 3.0, abs=1e-5)
 
 
@@ -365,7 +365,7 @@ def test_gravity_pulls_in_any_direction_with_semi_implicit_steps(profile):
 
 def test_default_drag_is_linear_and_quadratic_and_tuned_has_none():
     flying = scene_of(ball(5.0, (10.0, 0.0, 0.0)), duration=1.0)
-    assert drive(flying, "default").twist[-1, 0, 0] == pytest.approx(6.90, abs=0.01)  # fact sheet
+    assert drive(flying, "default").twist[-1, 0, 0] == pytest.approx(6.90, abs=0.01)
     assert drive(flying, "tuned").twist[-1, 0, 0] == 10.0
 
 
@@ -566,15 +566,15 @@ def test_declared_drag_is_what_a_second_of_flight_loses():
     assert ENGINE.declares("tuned", needs(flying), DT) == {}
 
 
-# ---- fact sheet --------------------------------------------------------------------------------------------------
+# ---- measured without the adapter --------------------------------------------------------------------------------
 
 
-def test_ten_boxes_drift_as_the_fact_sheet_says_and_carry_their_weight():
+def test_ten_boxes_drift_as_was_measured_and_carry_their_weight():
     boxes = [Body(f"b{k}", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5 + k, *UPRIGHT)) for k in range(10)]
     scene = scene_of(FLOOR, *boxes, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=5.0)
     record = drive(scene, sampling=Sampling(1, 4.0))
     drift = np.abs(record.pose[-1, :, :2] - record.pose[0, :, :2]).max()
-    assert drift == pytest.approx(0.68e-3, abs=0.01e-3)  # fact sheet, per axis
+    assert drift == pytest.approx(0.68e-3, abs=0.01e-3)  # per axis
     bottom = record.contacts.impulse_between(0, 1)[:, 2] / (10 * 9.81 * DT)
     assert bottom.mean() == pytest.approx(1.0, abs=1e-6) and bottom.std() < 1e-5
 

@@ -327,7 +327,7 @@ def test_the_tuned_column_carries_its_weight_from_the_start() -> None:
     trajectory = drive(column(5), "tuned")
     assert trajectory.contacts is not None
     load = trajectory.contacts.impulse_between(0, 1)[-60:, 1] / (5.0 * 9.81 * DT)
-    # Thirty sweeps and warm starting leave 1e-13 within the first second (fact sheet: 1e-14 at ten sweeps, 5 s).
+    # Thirty sweeps and warm starting leave 1e-13 within the first second (1e-14 at ten sweeps within 5 s).
     assert np.abs(load - 1.0).max() < 1e-9
     gap = trajectory.contacts.rows.gap[-10:]
     assert np.all((gap > -1.2 * START) & (gap < -0.8 * START))
@@ -423,14 +423,14 @@ def test_contacts_are_ordered_by_pair() -> None:
         assert pairs == sorted(pairs) and all(a < b for a, b in pairs)
 
 
-# ---- figures of the fact sheet, measured again -------------------------------------------------------------------
+# ---- figures that were measured without the adapter, measured again ----------------------------------------------
 
 
 @pytest.mark.parametrize(("sweeps", "error"), [(1, 1.8e-1), (2, 7.2e-3), (4, 1.2e-5), (10, 5e-14)])
-def test_a_flat_landing_is_iterative_and_as_wrong_as_the_fact_sheet_says(sweeps: int, error: float) -> None:
+def test_a_flat_landing_is_iterative_and_as_wrong_as_was_measured(sweeps: int, error: float) -> None:
     box = unit_box("box", 0.0, 0.5 + 2.5 * 5.0 * DT, twist=(0.0, -5.0, 0.0))
     trajectory = drive(make(FLOOR, box, e=0.5, T=5 * DT), "default", iterations=sweeps)
-    # Relative to the approach speed; two digits are given there.
+    # Relative to the approach speed; two digits were measured.
     assert abs(trajectory.twist[-1, 1, 1] - 2.5) / 5.0 == pytest.approx(error, rel=0.05, abs=5e-14)
 
 
@@ -443,7 +443,7 @@ def test_default_persistence_over_reports_impulses_of_a_settling_ball_and_tuned_
         assert trajectory.contacts is not None
         gained = trajectory.twist[-1, 1, 1] + 9.81 * trajectory.t[-1]
         excess[profile] = trajectory.contacts.impulse_between(0, 1)[:, 1].sum() / gained - 1.0
-    assert excess["default"] == pytest.approx(0.0118, abs=1e-4)  # fact sheet: 1.5 % for another drop
+    assert excess["default"] == pytest.approx(0.0118, abs=1e-4)  # 1.5 % of another drop
     assert abs(excess["tuned"]) < 1e-12
 
 
@@ -492,7 +492,7 @@ def test_the_law_of_what_passes_is_silent_about_what_is_found_before_the_middle(
         assert [each is not None for each in said] == [params == {"v": 200.0}, False]
 
 
-def test_the_stick_threshold_is_as_sharp_as_the_fact_sheet_says() -> None:
+def test_the_stick_threshold_is_as_sharp_as_was_measured() -> None:
     for ratio, slides in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
         theta = math.atan(0.5 * ratio)
         gravity = (9.81 * math.sin(theta), -9.81 * math.cos(theta))

@@ -216,7 +216,7 @@ def test_default_rebound_is_the_documented_scalar_law(mu: float) -> None:
         assert abs(measured - law.rebound_ratio(v, phase)) <= 1e-15 / (v * dt) + ROUND_OFF
 
 
-def test_default_rebound_figures_of_the_fact_sheet() -> None:
+def test_default_rebounds_have_the_mean_and_the_ends_that_were_measured() -> None:
     def ratios(dt: float) -> list[float]:
         scenes = [impact(0.8, 1.0, (k + 0.5) / 16, dt) for k in range(16)]
         return [float(drive(scene, "default", dt).twist[-1, 1, 2]) for scene in scenes]
@@ -354,7 +354,7 @@ def test_tuned_conserves_the_energy_of_a_tumbling_body() -> None:
     spin = omega + 2.0 * np.cross(v, np.cross(v, omega) + w * omega)  # into body axes
     energy = 0.5 * spin**2 @ np.array([1.0, 2.0, 2.5])
     assert np.abs(spin[:, 0]).max() > 1.0  # it did flip
-    assert np.ptp(energy) / energy[0] <= 1e-9  # fact sheet: 7e-12 at this step over 20 s
+    assert np.ptp(energy) / energy[0] <= 1e-9  # 7e-12 at this step over 20 s
 
 
 # ---- shapes, pairs, motions -----------------------------------------------------------------------------------

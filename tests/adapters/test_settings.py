@@ -4,8 +4,12 @@ import math
 
 import pytest
 
+from adapters import registry
 from adapters.engine import EngineError
+from adapters.needs import needs
 from adapters.settings import checked, checked_step, flag, number, whole, word
+from adapters.stepping import posed_for
+from validation.catalogue import CATALOGUE
 
 KINDS = {"iterations": whole(1, 20), "skin": number(0.0, 0.5), "warm": flag, "solver": word("PGS", "Newton")}
 GOOD = {"iterations": 4, "skin": 0.01, "warm": True, "solver": "Newton"}
@@ -29,7 +33,7 @@ def test_the_ends_of_a_range_and_each_word_belong_to_it(name, value):
     ("name", "value", "wanted"),
     [
         *(("iterations", v, "a whole number from 1 to 20") for v in (0, 21, True, 4.0, "4", None)),
-        *(("skin", v, "a number from 0 to 0.5") for v in (-1e-9, 0.51, True, "0.1", None, math.nan, math.inf)),
+        *(("skin", v, "a number from 0 to 0.5") for v in (-1e-9, 0.51, True, "0.1", None, math.nan, math.inf, 10**400)),
         *(("warm", v, "true or false") for v in (0, 1, "true", None)),
         *(("solver", v, "one of PGS, Newton") for v in ("pgs", "", 1, None, ["PGS"])),
     ],
@@ -52,3 +56,33 @@ def test_a_step_is_a_positive_finite_number_of_seconds():
     for dt in (0.0, -1 / 240, math.nan, math.inf):
         with pytest.raises(EngineError, match=r"^dt: .* must be a positive, finite number of seconds$"):
             checked_step(dt)
+
+
+#: Settings that engines take as an int of C.
+INTS = {
+    "chipmunk": {"iterations", "collision_persistence"},
+    "bullet": {"iterations", "useMaximalCoordinates", "deterministicOverlappingPairs", "numSubSteps"},
+    "mujoco": {"iterations", "noslip_iterations", "rounds"},
+    "reference": set(),
+}
+
+
+@pytest.mark.parametrize("name", INTS)
+def test_a_number_that_an_engine_cannot_hold_is_refused_by_the_name_of_its_setting(name):
+    """What is asked from code: a number beyond an int or a double ended in the binding's own error, or in none."""
+    engine = registry.find(name).engine
+    if engine is None:
+        pytest.skip(registry.find(name).reason)
+    scene, asked, found = posed_for(engine, CATALOGUE["impact"].scene(2, {})), 0, set()
+    for profile in engine.profiles:
+        given = {setting.name: setting.value for setting in engine.settings(profile, needs(scene), 1 / 240)}
+        numbers = {setting for setting, value in given.items() if type(value) in (int, float)}
+        assert numbers
+        for setting in numbers:
+            for value in (10**400, *(2**31, 2.0**31, 0.5, 1e300) * (setting in INTS[name])):
+                with pytest.raises(EngineError) as refused:
+                    engine.build(scene, 1 / 240, given | {setting: value})
+                assert setting in str(refused.value).partition(":")[0], refused.value
+                asked += 1
+        found |= numbers & INTS[name]
+    assert asked > 4 and found == INTS[name]

@@ -1,13 +1,16 @@
 """``accept``: shows families, asks for the reason of each, and cannot be talked into what must not be listed."""
 
 import io
+import json
 import re
+import sys
 from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
+from adapters import registry
 from reports.command import accepting, main
 from validation.findings import files
 from validation.judging.acceptance import Change
@@ -211,3 +214,61 @@ def test_a_run_fails_on_a_planned_cell_that_left_nothing(tmp_path, monkeypatch):
     result = call(*cell, "--out", tmp_path)
     assert result.exit_code == 1
     assert "MISSING" in result.stdout
+
+
+# ---- an adapter with a fault of two per cent cannot be blessed away ------------------------------------------------
+
+FAULTY = """
+from dataclasses import replace
+from adapters.chipmunk import ChipmunkEngine
+from adapters.planted_faults import Planted
+
+
+class {name}(Planted):
+    def __init__(self):
+        super().__init__(ChipmunkEngine(), "{fault}", 0.02)
+        self.facts = replace(self.inner.facts, name="weak{fault}", title="Weak", package="weak")
+
+    facts = replace(ChipmunkEngine.facts, name="weak{fault}", title="Weak", package="weak")
+    profiles = ChipmunkEngine.profiles
+"""
+
+
+@pytest.fixture
+def weak(tmp_path, monkeypatch):
+    """Chipmunk with two per cent of its reported impulses missing, and with two per cent less friction."""
+    folder = tmp_path / "site"
+    info = folder / "weak-1.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: weak\nVersion: 1\n")
+    entries = ""
+    for fault in ("impulse", "friction"):
+        (folder / f"weak_{fault}.py").write_text(FAULTY.format(name=fault.title(), fault=fault))
+        entries += f"weak{fault} = weak_{fault}:{fault.title()}\n"
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{entries}")
+    monkeypatch.syspath_prepend(str(folder))
+    registry.find.cache_clear()
+    yield
+    registry.find.cache_clear()
+    for fault in ("impulse", "friction"):
+        sys.modules.pop(f"weak_{fault}", None)
+
+
+@pytest.mark.parametrize(("fault", "cell"), [("impulse", ["impact", "--param", "v=6"]),
+                                             ("friction", ["incline", "--param", "ratio=1.1"])])  # fmt: skip
+def test_a_fault_of_two_per_cent_fails_the_run_and_nothing_of_it_can_be_listed(weak, findings, tmp_path, fault, cell):
+    """It became known as what the engine's ways are: 288 rows of a reason that was another's."""
+    findings = findings.with_name(f"weak{fault}")
+    findings.mkdir()
+    family = FAMILY.replace("default", "tuned").replace('"stack"', f'"{cell[0]}"')
+    (findings / files.FAMILIES).write_text(family.replace('"drift"', '"impulse", "acceleration"'))
+    own = ["--engine", f"weak{fault}", "--out", tmp_path / "out"]
+    run = ["run", *cell, "--profile", "tuned", "--dim", 2, "--jobs", 1, *own]
+    ran = call(*run, "--json")
+    assert ran.exit_code == 1
+    assert {row["outcome"] for row in json.loads(ran.stdout)} == {"invalid"}
+    blessed = call("accept", "--family", "starved", *own)
+    assert blessed.exit_code == 1, blessed.output
+    assert "its receipts or its certificate do not hold" in blessed.stderr
+    assert not (findings / files.MEMBERS).exists() or members(findings) == []
+    assert call(*run).exit_code == 1

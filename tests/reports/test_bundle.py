@@ -48,6 +48,15 @@ def test_the_bundle_holds_what_it_lists_and_its_checksums_hold(page_folder, page
     assert f"run {page_source.run.id}" in texts["CITATION.cff"].decode()
 
 
+def test_a_bundle_is_told_as_data_with_its_files(page_folder, tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("reports.bundle.write_bundle", lambda *given: written.append(given) or ["README.txt", "a"])
+    result = CliRunner().invoke(main, ["bundle", "-o", str(tmp_path / "b.zip"), "--out", str(page_folder), "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout) == {"path": str(tmp_path / "b.zip"), "files": ["README.txt", "a"]}
+    assert written == [(page_folder, "latest", tmp_path / "b.zip")]
+
+
 def test_scene_files_that_ran_are_in_the_bundle_as_they_were(tmp_path):
     pytest.importorskip("pymunk")
     texts = {}

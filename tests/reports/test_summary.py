@@ -277,6 +277,33 @@ def test_show_speaks_json(two_engines):
     assert [a for a in plain["answers"] if (a["engine"], a["scene"]) == ("mujoco", "bounce")]
 
 
+@pytest.mark.parametrize("arguments", [("show",), ("show", "--json"), ("findings",)])
+def test_a_store_is_opened_once(two_engines, monkeypatch, arguments):
+    """What is counted is of the run that is shown: a run that begins in between is another latest one."""
+    out, _ = two_engines
+    opened = []
+
+    class Counted(Store):
+        def __init__(self, *given, **named):
+            opened.append(given)
+            super().__init__(*given, **named)
+
+    monkeypatch.setattr(showing, "Store", Counted)
+    assert call(*arguments, "--out", out).exit_code == 0
+    assert len(opened) == 1
+
+
+def test_what_is_shown_ends_with_the_path_of_the_report_where_there_is_one(two_engines):
+    out, text = two_engines
+    assert "report:" not in text
+    report = Path(out) / "report.html"
+    report.write_text("<!doctype html>")
+    try:
+        assert call("show", "--out", out).stdout.splitlines()[-1] == f"  report: {report}"
+    finally:
+        report.unlink()
+
+
 def call(*arguments):
     return CliRunner(env={"COLUMNS": "100"}).invoke(main, [str(a) for a in arguments])
 
@@ -329,7 +356,8 @@ def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeyp
 def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(two_engines, monkeypatch):
     """`explain` and `findings --scene` judge what they show and no more, studies and ids included."""
     out, _ = two_engines
-    rows, observations, _ = showing.load(Path(out), "latest")
+    rows, kept, _ = showing.load(Path(out), "latest")
+    observations = kept.observations
     by_id = {row_id(row): row for row in rows}
     assert {name for name, _ in showing.ids_of(observations)} == set(by_id) and len(by_id) == len(rows)
     for engine, scene in dict.fromkeys((row["engine"], row["scene"]) for row in rows):

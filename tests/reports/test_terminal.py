@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import reports
-from reports import listing
+from reports import exports, listing
 from reports.command import main
 from validation.cells import Slot
 from validation.posed import pinned
@@ -141,6 +142,17 @@ def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch)
     assert flat(said).count("(2) scene_number_40, scene_number_41") == 1
 
 
+def test_markdown_holds_no_html_and_no_field_that_ends_in_text_from_outside(folder):
+    evil = "<img src=x onerror=alert(1)> & a|b"
+    (row, *_) = [row.as_dict() for row in exports.load_rows(folder) if row.physics == "fail"]
+    row |= {"scene": f"{evil}.toml@0a1b2c3d", "reason": evil, "because": evil, "engine": "toy<b>", "profile": evil}
+    text = exports.as_markdown([row])
+    ours = text.replace("<br>", "")
+    assert "<" not in ours and ">" not in ours and "alert(1)" in text and " &amp; " in text
+    table = [re.findall(r"(?<!\\)\|", line) for line in text.splitlines() if line.startswith("|")]
+    assert len(table) == 3 and {len(bars) for bars in table} == {3}
+
+
 def test_every_command_has_the_console_that_reads_no_markup():
     made, names = [], ("Console", "_Terminal")
     for path in Path(reports.__file__).parent.rglob("*.py"):
@@ -163,10 +175,38 @@ def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
     """Each told it again, seven lines of two words at 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
     plain = json.loads(call("list", "checks", "--json").stdout)
-    lines = {line.partition(" ")[0]: line for line in call("list", "checks").stdout.splitlines()}
+    lines = {line.partition(" ")[0]: line for line in call("list", "checks", "--reasons").stdout.splitlines()}
     shared = [after["because"] == before["because"] for before, after in pairwise(plain)]
     assert any(shared)
     assert ["as above" in lines[check["name"]] for check in plain[1:]] == shared
+
+
+def test_checks_are_listed_a_line_each_and_say_where_their_reasons_stand():
+    """At 80 columns the reasons made 1801 lines of some 300."""
+    plain = json.loads(call("list", "checks", "--json").stdout)
+    told = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["list", "checks"]).stdout.splitlines()
+    body, last = told[2:-1], told[-1]
+    assert [line.partition(" ")[0] for line in body] == [check["name"] for check in plain] and len(plain) > 200
+    assert max(map(len, told)) <= 80 and "--reasons" in last and "describe SCENE" in last
+    refused = call("list", "scenes", "--reasons")
+    assert refused.exit_code == 2 and "reasons: checks have one, not scenes" in refused.stderr
+
+
+WIDE = [
+    *(("list", what) for what in ("scenes", "suites", "engines", "checks")), ("list", "checks", "--reasons"),
+    *(("describe", name) for name in ("bounce", "v_groove", "chipmunk")), ("doctor",), ("nulls", "impact"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WIDE, ids=" ".join)
+def test_what_is_listed_and_described_fits_every_width_and_is_cut_off_at_none(words):
+    sizes = []
+    for width in (80, 100, 120):
+        told = CliRunner(env={"COLUMNS": str(width)}).invoke(main, list(words)).stdout.splitlines()
+        assert told and max(len(line.rstrip()) for line in told) <= width
+        assert not any("…" in line for line in told)
+        sizes.append(len(told))
+    assert sizes == sorted(sizes, reverse=True)  # room that is there is used
 
 
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):

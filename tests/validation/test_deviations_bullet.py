@@ -169,7 +169,7 @@ def test_sticking_box_has_no_law():
 # ---- the laws themselves -----------------------------------------------------------------------------------------
 
 
-def test_recurrence_reduces_to_the_closed_forms_of_the_fact_sheet():
+def test_recurrence_reduces_to_closed_forms():
     v, e, dt = 3.0, 0.6, 1 / 240
     assert DEFAULT.contact(0.004, -v, -v, e, dt)[0] == pytest.approx(e * v - (0.004 + 1e-5) / dt, rel=1e-15)
     assert DEFAULT.contact(-0.004, -v, -v, e, dt)[0] == pytest.approx(e * v + 0.08 * (0.004 - 1e-5) / dt, rel=1e-15)

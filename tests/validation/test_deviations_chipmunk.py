@@ -86,7 +86,7 @@ def test_an_elastic_ball_keeps_its_energy_in_the_recurrence() -> None:
     assert np.abs(energy / energy[0] - 1.0).max() < 1e-12
 
 
-def test_per_bounce_the_apex_is_as_the_fact_sheet_says() -> None:
+def test_per_bounce_the_apex_is_as_its_closed_form_says() -> None:
     # h+ = e^2 h + (1 - e^2) x_p + dt |v| e (1 - e)/2, with position and velocity sampled at the impact step;
     # sampling of the apex leaves g dt^2/8.
     e, g, dt = 0.5, 9.81, 1 / 1000

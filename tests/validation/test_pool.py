@@ -51,7 +51,8 @@ def run(monkeypatch):
     """Run slots on so many workers; no more of them start. What came back, and what was raised."""
 
     def _run(slots, told, workers, jobs=1, **options):
-        left = iter([Worker(told) for _ in range(workers)])
+        _run.workers = [Worker(told) for _ in range(workers)]
+        left = iter(_run.workers)
 
         _run.begun = 0
 
@@ -121,6 +122,16 @@ def test_a_process_that_a_cell_changed_is_renewed_and_its_answer_stands(run):
     assert run(slots, {}, 2) == (slots, None) and run.begun == 1
     assert run(slots, {slots[0]: {"changed": "open files"}}, 2) == (slots, None) and run.begun == 2
     assert run([*slots, cell("mujoco", 1.0)], {}, 2) == ([*slots, cell("mujoco", 1.0)], None)
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_a_worker_is_asked_by_one_engine_alone(run, jobs):
+    """What an engine does to its process can then reach no other's, whether or not it is noticed."""
+    slots = [cell(engine, v) for v in (1.0, 2.0, 3.0) for engine in ("chipmunk", "mujoco", "bullet")]
+    found, raised = run(slots, {}, 9, jobs=jobs)
+    assert sorted(found, key=slots.index) == slots and raised is None
+    asked = [{slot["engine"] for slot in worker.asked} for worker in run.workers if worker.asked]
+    assert all(len(engines) == 1 for engines in asked) and len(asked) >= 3
 
 
 def test_cells_of_a_plugin_that_ends_its_importer_reach_no_worker(monkeypatch):

@@ -216,10 +216,11 @@ def test_a_box_touches_a_half_space_with_its_lowest_corners(place, turn, normal)
     n = np.asarray(normal) / np.linalg.norm(normal)
     plane = Body(HalfSpace(tuple(n)), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     heights = corners(half, place, turn) @ n
+    assume(not -1e-9 <= heights.min() <= 0.0021)  # within the margin either may be
     contacts = touch(plane, body(Box(half), place, turn))
     if heights.min() > 0.0021:
         assert len(contacts) == 0
-    elif heights.min() < -1e-9:
+    else:
         assert contacts.gap.min() == pytest.approx(heights.min(), abs=1e-13)
         assert contacts.normal == pytest.approx(np.tile(n, (len(contacts), 1)), abs=1e-14)
         for point, gap in zip(contacts.point, contacts.gap, strict=True):
@@ -239,12 +240,13 @@ def test_a_sphere_touches_the_nearest_point_of_a_box(place, turn):
     local = matrix(turn).T @ place
     nearest = np.clip(local, -half, half)
     distance = np.linalg.norm(local - nearest)
+    assume(not 0.0019 <= distance - radius <= 0.0021)  # the margin's edge, to round-off
     if distance == 0.0:
         distance = (np.abs(local) - half).max()
         assert contacts.gap[0] == pytest.approx(distance - radius, abs=1e-13)
     elif distance - radius > 0.0021:
         assert len(contacts) == 0
-    elif distance - radius < 0.0019:
+    else:
         assert contacts.gap[0] == pytest.approx(distance - radius, abs=1e-13)
         if distance > 1e-6:
             assert contacts.normal[0] == pytest.approx(matrix(turn) @ (local - nearest) / distance, abs=1e-9)
