@@ -110,8 +110,8 @@ def test_elastic_smooth_balls_keep_all_but_roundings():
     assert law(scene, DT, None) is not None
     for other in (
         balls({"shape": Box((0.5, 0.5))}), balls({"motion": "fixed", "twist": (0.0,) * 3}),
-        balls({"force": (0.0, 0.1)}), balls({"torque": (0.1,)}), balls(gravity=(0.0, -1.0)), balls(pairs=(Pair(restitution=0.999, friction=0.0),)),
-        balls(pairs=(Pair(restitution=1.0, friction=0.1),)),
+        balls({"force": (0.0, 0.1)}), balls({"torque": (0.1,)}), balls(gravity=(0.0, -1.0)),
+        balls(pairs=(Pair(restitution=0.999, friction=0.0),)), balls(pairs=(Pair(restitution=1.0, friction=0.1),)),
         balls(pairs=(Pair("a", "b", 0.5, 0.0), Pair(restitution=1.0, friction=0.0))),
     ):  # fmt: skip
         assert law(other, DT, None) is None
