@@ -14,7 +14,6 @@ import pytest
 
 from validation.workers import state
 
-
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what a process shares is asked of Linux here")
 
 
@@ -143,8 +142,8 @@ def test_the_library_of_numbers_is_asked_by_its_name_where_it_has_one(monkeypatc
         return "the library"
 
     monkeypatch.setattr(ctypes, "CDLL", library)
-    for platform, name in (("linux", "libm.so.6"), ("darwin", None), ("win32", None)):
-        monkeypatch.setattr(sys, "platform", platform)
+    for system, name in (("linux", "libm.so.6"), ("darwin", None), ("win32", None)):
+        monkeypatch.setattr(sys, "platform", system)
         assert state._libm() == "the library" and asked.pop() == name and not asked
     for error in (OSError, TypeError):
         tell["wrong"] = error
