@@ -21,11 +21,10 @@ RUN = Run("20260102-030405", "2026-01-02T03:04:05", "abc+", {}, "quick: impact",
 EARLIER = Run("20260101-030405", "2026-01-01T03:04:05", "def", {}, "quick: impact", (), True)
 FLAT = Slot("impact", (("v", 2.0), ("e", 0.5)), 2, "chipmunk", "tuned", 1 / 240, 7, 3)
 SOLID = Slot("impact", (), 3, "mujoco", "default", 1 / 60)
-TOLD = Observation(
-    FLAT, "cell-1", CATALOGUE["impact"].version, "7.2.0", Outcome.OK, "", {"rebound_ratio": (0.25, ""), "impulse": (None, "it has none")},
-    "hash-1", 120, 0.5,
-)  # fmt: skip
-LOST = Observation(SOLID, "cell-2", CATALOGUE["impact"].version, "3.2.7", Outcome.CRASHED, "signal 11")
+METRICS = {"rebound_ratio": (0.25, ""), "impulse": (None, "it has none")}
+VERSION = CATALOGUE["impact"].version
+TOLD = Observation(FLAT, "cell-1", VERSION, "7.2.0", Outcome.OK, "", METRICS, "hash-1", 120, 0.5)
+LOST = Observation(SOLID, "cell-2", VERSION, "3.2.7", Outcome.CRASHED, "signal 11")
 
 
 def test_every_metric_is_a_line_with_its_cell_and_a_cell_without_any_is_one():
