@@ -47,10 +47,9 @@ SLOT = Slot("stack", (("n", 2.0), ("mu", 0.1)), 3, "chipmunk", "tuned", 1 / 240,
 
 def said(arguments: list[str]) -> dict[str, str]:
     """What a command prints, and its status."""
-    with patch.dict("os.environ", {**COLOURS, "COLUMNS": "120"}):
-        result = CliRunner().invoke(main, arguments, color=True)
-    told_of = numbered(marks(result.stdout), "out") | numbered(marks(result.stderr), "err")
-    return {"status": str(result.exit_code)} | told_of
+    with patch.dict("os.environ", {"COLUMNS": "120", "NO_COLOR": "1", "TERM": "dumb"}):
+        result = CliRunner().invoke(main, arguments)
+    return {"status": str(result.exit_code)} | numbered(result.stdout, "out") | numbered(result.stderr, "err")
 
 
 def sensitivity() -> Sections:
