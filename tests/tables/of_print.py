@@ -105,18 +105,45 @@ def said(arguments: Sequence[str], width: int) -> Sections:
     return {"said": told}
 
 
+#: What tells a command that its terminal has colours.
+COLOURS = {"COLUMNS": "110", "FORCE_COLOR": "1", "TERM": "xterm", "COLORTERM": ""}
+
+
+def marks(text: str) -> str:
+    """A text for a terminal: what switches styles is told in braces, what moves the cursor is left out."""
+    return re.sub(r"\x1b\[[0-9;?]*[A-Zhl]", "", re.sub(r"\x1b\[([0-9;]*)m", r"{\1}", text))
+
+
+def screen(width: int) -> Console:
+    """A terminal with colours of which all is kept, styles and what stands out by itself as well."""
+    return Console(
+        file=io.StringIO(), width=width, markup=False, emoji=False, force_terminal=True, color_system="standard",
+        legacy_windows=False, _environ={"TERM": "xterm"},
+    )  # fmt: skip
+
+
+def on(console: Console, name: str = "out") -> dict[str, str]:
+    """What a terminal of that kind was told, line by line, with its styles as marks."""
+    assert isinstance(console.file, io.StringIO)
+    return numbered(marks(console.file.getvalue()), name)
+
+
 def coloured() -> Sections:
     """What stands out on a terminal with colours: bold, dim and red are told as marks around it."""
     row = row_id(next(row for row in source().rows if row["standing"] == "new"))
     calls = {"show": ("show",), "all": ("show", "--all"), "findings": ("findings",), "explain": ("explain", row),
-             "compare": ("compare", "20260101-000000", "20260103-000000"), "runs": ("list", "runs")}  # fmt: skip
+             "compare": ("compare", "20260101-000000", "20260103-000000"), "runs": ("list", "runs"),
+             "scenes": ("list", "scenes"), "suites": ("list", "suites"), "scene": ("describe", "bounce"),
+             "engine": ("describe", "chipmunk"), "nulls": ("nulls", "impact"),
+             "prune": ("prune", "--keep", "1", "--dry-run"), "wrong": ("show", "20200101-000000"),
+             "unknown": ("describe", "nothing")}  # fmt: skip
     found = Sections()
     for name, call in calls.items():
-        environment = {"COLUMNS": "110", "FORCE_COLOR": "1", "TERM": "xterm", "COLORTERM": ""}
-        with patch.dict("os.environ", environment):
-            result = CliRunner().invoke(main, [*call, "--out", str(folder())], color=True)
-        text = re.sub(r"\x1b\[([0-9;]*)m", r"{\1}", result.stdout)
-        found[name] = {"status": str(result.exit_code)} | numbered(text, "out")
+        out = ("--out", str(folder())) if takes_out(call[0]) else ()
+        with patch.dict("os.environ", COLOURS):
+            result = CliRunner().invoke(main, [*call, *out], color=True)
+        found[name] = {"status": str(result.exit_code)}
+        found[name] |= numbered(marks(result.stdout), "out") | numbered(marks(result.stderr), "err")
     return found
 
 
@@ -162,15 +189,14 @@ def benched() -> Sections:
     """Tables about speed: on the terminal, and as data."""
     bench = source().bench
     assert bench is not None
-    out, tables = io.StringIO(), bench.tables
-    console = Console(file=out, width=140, markup=False, emoji=False, no_color=True)
+    console, tables = screen(140), bench.tables
     for table in (
         *speed.level_tables(tables["work_points"]), *speed.level_tables(tables["work_points"], ranked=False),
         speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"]),
     ):  # fmt: skip
         console.print(table)
     console.print(speed.quality_line(tables["timings"]), speed.busy(tables["timings"]), speed.key(True))
-    found = {"terminal": numbered(out.getvalue(), "line")}
+    found = {"terminal": on(console, "line")}
     for name, table in tables.items():
         found[name] = {
             f"{k:03d}": json.dumps(row, sort_keys=True, default=str) for k, row in enumerate(speed.plain(table)[:12])
@@ -220,9 +246,9 @@ def sentences() -> Sections:
         said |= {f"family {k}": str(each) for k, each in enumerate(families(part))}
         said |= {f"choice {k}": str(each) for k, each in enumerate(choosing.choices(part))}
         said |= {f"answer {k}": each.line for k, each in enumerate(answers(rows))}
-        out = io.StringIO()
-        show_summary(rows, Console(file=out, width=100, markup=False, emoji=False, no_color=True))
-        found[name] = said | numbered(out.getvalue(), "terminal")
+        console = screen(100)
+        show_summary(rows, console)
+        found[name] = said | on(console, "terminal")
     return found
 
 

@@ -5,12 +5,11 @@ The results are made up, or are those that are kept; what tells them is the comm
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from unittest.mock import patch
 
-from of_print import folder, numbered
+from of_print import folder, numbered, on, screen
 from rich.console import Console
 from telling import Sections
 
@@ -38,9 +37,9 @@ CHECK = Check("m", "m/s", 0.8, 0.1, "because", "source")
 
 def printed(show: Callable[[Console], object], width: int = 110) -> dict[str, str]:
     """What is printed to a console of its own."""
-    out = io.StringIO()
-    show(Console(file=out, width=width, markup=False, emoji=False, no_color=True))
-    return numbered(out.getvalue(), "out")
+    console = screen(width)
+    show(console)
+    return on(console)
 
 
 def told(data: object) -> dict[str, str]:
@@ -129,10 +128,10 @@ def field_notes() -> Sections:
         found.append(Finding(note, note.said if k % 3 else "not seen", before, after))
     out = Sections()
     for commands in (True, False):
-        console = Console(file=io.StringIO(), width=120, markup=False, emoji=False, no_color=True)
+        console = screen(120)
         with patch.object(asking, "terminal", lambda console=console: console):
             asking._show(found, commands)
-        out[f"commands: {commands}"] = numbered(console.file.getvalue(), "out")  # type: ignore[attr-defined]
+        out[f"commands: {commands}"] = on(console)
     return out | {"data": told([asking._as_plain(each) for each in found])}
 
 
@@ -141,10 +140,10 @@ def laws_of_contact() -> Sections:
     slots = [Slot("stack", (("n", 2.0),), 2, engine, "tuned", 1 / 240) for engine in ("chipmunk", "mujoco")]
     some = {name: (10.0**-k, "") for k, name in enumerate(LAWS)}
     none = dict.fromkeys(LAWS, (None, "nothing touched"))
-    console = Console(file=io.StringIO(), width=120, markup=False, emoji=False, no_color=True)
+    console = screen(120)
     with patch.object(weighing, "terminal", lambda: console):
         weighing._show([Residuals(slots[0], some, 7), Residuals(slots[1], none)])
-    return {"text": numbered(console.file.getvalue(), "out")}  # type: ignore[attr-defined]
+    return {"text": on(console)}
 
 
 def releases() -> Sections:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Callable
@@ -13,9 +12,8 @@ from unittest.mock import patch
 
 import pandas as pd
 from click.testing import CliRunner
-from of_print import _flat, numbered
+from of_print import COLOURS, _flat, marks, numbered, on, screen
 from of_results import printed, told
-from rich.console import Console
 from telling import Sections
 
 from adapters.conformance import self_test
@@ -83,14 +81,13 @@ def clocked_piles() -> Sections:
     found = Sections()
     with patch.object(piles, "laps", laps):
         for most, as_data in ((80, False), (20, False), (20, True)):
-            shown = io.StringIO()
-            console = Console(file=shown, width=120, markup=False, emoji=False, no_color=True)
+            console = screen(120)
             runner = CliRunner()
             with runner.isolation() as streams:
                 piles.show_piles(console, as_data, most, len(KINDS))
                 out = streams[0].getvalue().decode()
             title = f"up to {most}{', as data' * as_data}"
-            found[title] = numbered(shown.getvalue(), "shown") | numbered(out, "out")
+            found[title] = on(console, "shown") | numbered(out, "out")
     return found
 
 
@@ -226,12 +223,13 @@ def posed() -> Sections:
             runner = CliRunner()
             with (
                 patch.object(posing, "compare", lambda slot, changes=changes: changes),
-                patch.dict("os.environ", {"COLUMNS": "120", "NO_COLOR": "1", "TERM": "dumb"}),
-                runner.isolation() as streams,
+                patch.dict("os.environ", {**COLOURS, "COLUMNS": "120"}),
+                runner.isolation(color=True) as streams,
             ):
                 fine = posing.compare_and_show(slots[:2], as_data)
-                out = streams[0].getvalue().decode()
-            found[f"{title}{', as data' * as_data}"] = {"fine": str(fine)} | numbered(out, "out")
+                out, err = (marks(stream.getvalue().decode()) for stream in streams[:2])
+            told_of = numbered(out, "out") | numbered(err, "err")
+            found[f"{title}{', as data' * as_data}"] = {"fine": str(fine)} | told_of
     return found
 
 

@@ -25,7 +25,10 @@ SHARE, NOTHING = 1e-9, 1e-14
 KEPT = Path(__file__).parent / "kept"
 #: Stands for a line of the first section that a later one does not have.
 ABSENT = "(absent)"
+#: Share of a band by which machines may differ, however narrow it is: round-offs of a motion may be part of it.
+BAND_SHARE = 0.4
 _NUMBER = re.compile(r"(?<![\w.])-?\d+\.?\d*(?:e[+-]?\d+)?(?![\w.])")
+_BANDED = re.compile(rf"({_NUMBER.pattern}) \+- ({_NUMBER.pattern})")
 
 
 def lines(thing: Any, path: str = "") -> Iterator[tuple[str, str]]:
@@ -125,7 +128,21 @@ def agree(told: str, kept: str, share: float = SHARE, nothing: float = NOTHING) 
     if _NUMBER.sub("#", told) != _NUMBER.sub("#", kept):
         return False
     pairs = zip(_NUMBER.findall(told), _NUMBER.findall(kept), strict=True)
-    return all(math.isclose(float(a), float(b), rel_tol=share, abs_tol=nothing) for a, b in pairs)
+    alike = all(math.isclose(float(a), float(b), rel_tol=share, abs_tol=nothing) for a, b in pairs)
+    return alike and _bands_agree(told, kept, share)
+
+
+def _bands_agree(told: str, kept: str, share: float) -> bool:
+    """Of ``value +- band``: whether bands are of one size, and values apart by less than half of it.
+
+    What is nothing beside other numbers may be all that a band is.
+    """
+    both = _BANDED.fullmatch(told), _BANDED.fullmatch(kept)
+    if both[0] is None or both[1] is None:
+        return True
+    (value, band), (before, wide) = ([float(each) for each in found.groups()] for found in both if found)
+    within = max(NOTHING, 0.5 * wide)
+    return math.isclose(band, wide, rel_tol=BAND_SHARE) and math.isclose(value, before, rel_tol=share, abs_tol=within)
 
 
 def differences(made: Sections, kept: Sections, share: float = SHARE, nothing: float = NOTHING) -> list[str]:

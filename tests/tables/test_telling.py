@@ -59,3 +59,14 @@ def test_every_table_that_is_kept_is_made_by_something():
     assert made <= kept
     # Tables of engines that are not installed here are kept as well.
     assert {name.partition("/")[0] for name in kept - made} <= {"settings", "held"}
+
+
+def test_a_band_is_kept_in_its_size_however_narrow_it_is():
+    def same(told, kept="0.5 +- 1e-13"):
+        return agree(told, kept, share=1e-7, nothing=1e-10)
+
+    assert same("0.5 +- 1.1e-13") and same("0.50000000001 +- 1e-13")
+    assert not same("0.5 +- 2e-13") and not same("0.5 +- 5e-14") and not same("0.5 +- 0")
+    assert same("1e-14 +- 1e-12", "4e-14 +- 1e-12") and not same("1e-12 +- 1e-12", "2e-12 +- 1e-12")
+    assert same("says nothing", "says nothing") and not same("says nothing")
+    assert not agree("1 +- 2e-16", "1 +- 4e-16") and agree("None +- 1", "None +- 1.0")

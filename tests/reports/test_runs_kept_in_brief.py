@@ -1,0 +1,93 @@
+"""A run in brief: judged once, by those who judged it; kept as it was, and made anew where nothing can be kept."""
+
+import sqlite3
+from dataclasses import replace
+
+import pytest
+
+from reports import brief
+from reports.brief import Kept, Summary, keep, summarise
+from validation.catalogue import CATALOGUE
+from validation.cells import Observation, Outcome, Slot
+from validation.judging.rows import rows_of
+from validation.running.plan import QUICK_DT
+
+SLOT = Slot("impact", (("e", 0.5), ("v", 2.0)), 2, "chipmunk", "tuned", QUICK_DT)
+PANEL = ("chipmunk", "tuned", "impact", 2)
+
+
+def cell(slot=SLOT, ratio=0.75, outcome=Outcome.OK, version="7.2"):
+    metrics = {"rebound_ratio": (ratio, ""), "rebound_speed": (1.0, "")}
+    return Observation(slot, "c", CATALOGUE["impact"].version, version, outcome, "", metrics)
+
+
+def test_a_run_that_has_been_judged_is_not_judged_again(tmp_path, monkeypatch):
+    rows = rows_of("", [cell()])
+    failing = sum(row.physics == "fail" for row in rows)
+
+    def judge(*given):
+        raise AssertionError("it was judged already")
+
+    monkeypatch.setattr(brief, "rows_of", judge)
+    keep(tmp_path, "run", [cell()], iter(rows))
+    kept = Kept(tmp_path)
+    found = kept.get("run")
+    assert found == summarise([cell()], rows) and kept.get("another") is None
+    error, fails, judged, sure = found.cells[PANEL][SLOT.key()]
+    assert fails == sure == failing > 0 and judged == sum(row.physics is not None for row in rows) > failing
+    assert error == pytest.approx(0.25) and found.versions == {"chipmunk": "7.2"} and found.times == {}
+    kept.close()
+    none = summarise([cell()], []).cells[PANEL][SLOT.key()]
+    assert none == (pytest.approx(0.25), 0, 0, 0), "no row is not the same as not judged"
+
+
+def test_a_failure_that_a_moved_start_mends_is_not_sure():
+    moved = cell(replace(SLOT, ulp=3), ratio=0.5)
+    alone, both = (summarise(cells).cells[PANEL][SLOT.key()] for cells in ([cell()], [cell(), moved]))
+    assert both[:3] == alone[:3] and both[3] < alone[3]
+    assert summarise([cell(), cell(replace(SLOT, ulp=3), ratio=0.75)]).cells[PANEL][SLOT.key()] == alone
+    assert summarise([moved]).cells == {} and summarise([moved]).versions == {}
+
+
+@pytest.mark.parametrize(
+    "other", [{"iterations": 4}, {"dt": 1 / 60}, {"switched": (("iterations", 4),)}, {"ulp": 1}],
+)  # fmt: skip
+def test_cells_at_other_steps_or_settings_are_not_shown(other):
+    assert summarise([cell(replace(SLOT, **other))], []).cells == {}
+    assert list(summarise([cell(replace(SLOT, **other)), cell()]).cells) == [PANEL]
+
+
+def test_what_crashed_has_no_error_and_counts_no_check():
+    lost = Observation(SLOT, "c", CATALOGUE["impact"].version, "7.2", Outcome.CRASHED, "signal 11")
+    assert summarise([lost]) == Summary({}, {"chipmunk": "7.2"})
+    assert brief._error(cell(outcome=Outcome.DIVERGED)) == pytest.approx(0.25)
+    assert brief._error(cell(outcome=Outcome.INVALID)) is None
+
+
+def test_a_summary_of_other_code_or_a_spoilt_one_is_none_and_a_later_one_takes_its_place(tmp_path, monkeypatch):
+    one, other = Summary({PANEL: {"a": (0.5, 1, 2, 1)}}, {"chipmunk": "1"}, {PANEL: (2.5, "bullet")}), Summary({}, {})
+    kept = Kept(tmp_path)
+    kept.put("run", other)
+    kept.put("run", one)
+    assert kept.get("run") == one
+    kept.close()
+    kept = Kept(tmp_path)
+    assert kept.get("run") == one, "of a later process as well"
+    monkeypatch.setattr(brief, "judging_code", lambda: "other")
+    assert kept.get("run") is None
+    kept.put("run", other)
+    assert kept.get("run") == other
+    for body in ("no json", "{}", "[1]", '{"panels": ["[1]"], "versions": {}, "times": []}'):
+        with sqlite3.connect(tmp_path / brief.FILE) as db:
+            db.execute("UPDATE summaries SET body = ?", (body,))
+        assert kept.get("run") is None, body
+    kept.close()
+
+
+def test_where_nothing_can_be_kept_nothing_is_and_nothing_ends(tmp_path):
+    kept = Kept(tmp_path / "nowhere")
+    kept.put("run", Summary({}, {}))
+    assert kept.get("run") is None
+    kept.close()
+    keep(tmp_path / "nowhere", "run", [], [])
+    assert not (tmp_path / "nowhere").exists()
