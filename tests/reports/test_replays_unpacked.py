@@ -3,6 +3,7 @@
 import base64
 import io
 import zlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -74,6 +75,20 @@ def test_a_replay_gives_back_every_number_to_half_of_its_level(dimension):
         assert np.abs(force - own.impulse / strongest).max() <= 0.5 * head["arrow"] * (1.0 + 1e-9)
     assert np.abs(take(len(t), dimension, True) * head["unit"] - exact).max() <= 0.5 * head["unit"] * (1.0 + 1e-9)
     assert levels == []
+
+
+def test_what_should_stay_stands_still_wherever_it_is_and_what_should_move_along_one_axis_does_not():
+    body = Body("one", Box((0.25, 0.25)), 1.0, 0.1)
+    scene = Scene("toy", 1, 2, (body,), (), (0.0, 0.0), 1.0, {})
+    run = recording(2, 8, 1)
+    members = [(Slot("toy", (), 2, *WHO[0], 1 / 240), replace(run, pose=run.pose[:, :1]))]
+    place = np.broadcast_to([3.0, 1.0], (8, 2))
+    ramp = np.linspace(0.0, 0.25, 8)[:, None]
+    for exact, still in (
+        (None, False), (place, True), (place * 0.0, True), (place + ramp * [1.0, 0.0], False),
+        (place + ramp * [0.0, 1.0], False),
+    ):  # fmt: skip
+        assert replay._packed(SimpleNamespace(columns=WHO), scene, members, run.t, exact, 0)[0]["static"] is still
 
 
 def test_a_bar_goes_on_by_one_for_each_part_that_is_compiled(monkeypatch):
