@@ -172,7 +172,7 @@ def test_a_command_of_the_readme_runs(results, monkeypatch, line):
 
 @pytest.mark.parametrize("line", ["show", "findings --all", "explain mujoco/default/bounce", "compare latest latest",
                                   "list runs", "describe bounce", "doctor", "list suites", "nulls impact",
-                                  "merge crosscheck-out --out both", "prune --keep 50 --dry-run", "dashboard",
+                                  "merge crosscheck-out --out again", "prune --keep 50 --dry-run", "dashboard",
                                   "export --parquet again"])  # fmt: skip
 def test_json_is_json(results, monkeypatch, line):
     monkeypatch.chdir(results)

@@ -8,7 +8,6 @@ from functools import partial
 import of_engines
 import of_kit
 import of_laws
-import of_looks
 import of_motions
 import of_options
 import of_other_worlds
@@ -83,7 +82,6 @@ def tables() -> Makers:
         | PRINTED
         | of_results.MAKERS
         | of_shown.MAKERS
-        | of_looks.MAKERS
         | of_refusals.MAKERS
         | of_installed()
     )
