@@ -15,6 +15,7 @@ from rich.table import Table
 
 from adapters import registry
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.selection import JOBS
 from reports.progress import run_plan
 from reports.terminal import terminal
 from reports.wording import number, plural
@@ -42,7 +43,7 @@ SHOWN = 12
 @click.argument("run", default="latest")
 @click.option("--engine", required=True, metavar="E", help="Whose findings to write.")
 @click.option("--family", "families", multiple=True, metavar="ID", help="Accept this family (repeat for more).")
-@click.option("--jobs", default=0, type=click.IntRange(0), help="Worker processes; 0: one per core.")
+@click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
 @AS_JSON
 @OUT
 def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:

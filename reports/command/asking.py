@@ -11,6 +11,7 @@ from rich.text import Text
 
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
+from reports.command.selection import WORKERS
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import Finding, ask, matching
@@ -19,7 +20,7 @@ from validation.settings.switching import Reading
 
 @main.command("field")
 @click.argument("words", nargs=-1)
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--commands", is_flag=True, help="Print the command of every note.")
 @AS_JSON
 def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:

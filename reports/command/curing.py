@@ -16,6 +16,7 @@ from adapters.engine_folder import CURES, folder_of
 from adapters.registry import load, profile_of
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
+from reports.command.selection import WORKERS
 from reports.cures import cure_paste, cure_text, setting_text
 from reports.speed import duration
 from reports.terminal import terminal
@@ -28,7 +29,7 @@ from validation.settings.cures import Changes, Cure, Unsearched, cures_of, searc
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--keep", is_flag=True, help="Write what is found into cures.csv of the engine's folder.")
 @AS_JSON
 def cure(engine: str, scenes: tuple[str, ...], dim: tuple[int, ...], jobs: int, keep: bool, as_json: bool) -> None:

@@ -15,7 +15,7 @@ from adapters import registry
 from reports.command import statuses
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
-from reports.command.selection import missing
+from reports.command.selection import WORKERS, missing
 from reports.terminal import terminal
 from reports.wording import reproduce
 from validation.catalogue import matching
@@ -31,7 +31,7 @@ FEW = 6
 @click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
 @click.option("--quick/--full", "quick", default=True, help="Ends a factor 1.3 or 1.03 apart; quick is the default.")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--commands", is_flag=True, help="Print the commands of both ends of every bracket.")
 @AS_JSON
 def frontier(

@@ -43,7 +43,10 @@ WHAT_SUITES_ARE: dict[Suite, str] = {
 LONGEST = 7 * 86400.0
 SECONDS = _Seconds()
 #: More workers than any machine has cores are a slip of the pen; how many are started the machine decides.
-JOBS = click.IntRange(0, 4096)
+MOST_JOBS = 4096
+JOBS = click.IntRange(0, MOST_JOBS)
+#: Where one worker is the rule, and none would mean nothing.
+WORKERS = click.IntRange(1, MOST_JOBS)
 
 
 def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:

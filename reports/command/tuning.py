@@ -15,6 +15,7 @@ from adapters.engine import EngineError
 from adapters.engine_folder import DECISIVE, candidates_of, cured_of, folder_of
 from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
+from reports.command.selection import WORKERS
 from reports.terminal import terminal
 from validation.settings.decisive import measure_all, measured_of, write
 from validation.settings.tuning import Score, Search, groups, search
@@ -33,7 +34,7 @@ def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, .
 @click.option("--profile", help="Profile to start from; the tuned one by default.")
 @click.option("--group", multiple=True, callback=known_groups, help="Scenes of one kind; all by default.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--decisive", "which", is_flag=True, help="Measure which settings of its cures matter, and keep it.")
 @AS_JSON
 def tune(

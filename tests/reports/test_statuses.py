@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from reports.command import main, statuses
+from reports.command import main, selection, statuses
 from validation.records.store import FILE, VERSION
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,6 +47,20 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
     assert result.exit_code == statuses.WRONG_CALL
     assert "seconds" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "command", [name for name, each in main.commands.items() if "jobs" in {p.name for p in each.params}]
+)
+def test_more_workers_than_any_machine_has_cores_are_a_wrong_call(command):
+    """A number that was meant for another option started processes until the machine had none left."""
+    (jobs,) = (each for each in main.commands[command].params if each.name == "jobs")
+    assert jobs.type.max == selection.MOST_JOBS <= 4096
+    asked = {"bisect": ["chipmunk", "7.0.0..7.3.1"], "cure": ["chipmunk", "stack"], "tune": ["chipmunk"],
+             "releases": ["chipmunk", "7.3.1"], "sweep": ["impact", "--grid", "e=0:1:3"]}  # fmt: skip
+    result = call(command, *asked.get(command, []), "--jobs", selection.MOST_JOBS + 1)
+    assert result.exit_code == statuses.WRONG_CALL
+    assert "--jobs" in result.stderr and "4097" in result.stderr
 
 
 @pytest.mark.parametrize("command", ["run", "bench", "compile", "residuals"])
