@@ -113,3 +113,26 @@ def test_what_was_asked_at_several_counts_is_drawn_by_engine_and_profile_and_not
     primary = resolve("impact").primary
     assert any(primary.name in (node.text or "") for node in tree.iter())
     assert _iterations(found, "impact", 3) is None and _iterations(found, "bounce", 2) is None
+
+
+def test_times_are_drawn_with_the_interval_in_which_their_median_lies():
+    """A half and twice as long are as far from the mark as a factor of two is on the axis of times."""
+    spread = {"chipmunk": 10.0**0.25, "bullet": 2.0}
+    points = pd.DataFrame([
+        {"scene": "impact", "dimension": 2, "engine": engine, "profile": "default", "dt": 1 / 240, "iterations": None,
+         "cost": cost, "cost_low": cost / factor, "cost_high": cost * factor, "error": error, "best": True,
+         "on_front": True}
+        for engine, factor in spread.items() for cost, error in ((1e-3, 0.1), (1e-2, 0.01))
+    ])  # fmt: skip
+    tree = ElementTree.fromstring(str(figures.work_precision(points, "impact", 2).picture))
+    marks = {(node.get("data-is").partition("/")[0], float(node.get("cy"))): float(node.get("cx"))
+             for node in tree.iter() if node.get("cx")}  # fmt: skip
+    assert len(marks) == 4
+    decade = max(marks.values()) - min(marks.values())
+    (group,) = (node for node in tree.iter() if node.get("stroke-width") == "1.6")
+    bars = {(node.get("data-is").partition("/")[0], end[0, 1]): end[:, 0]
+            for node in group for end in [corners(node.get("d"))]}  # fmt: skip
+    assert set(bars) == set(marks)
+    for (engine, height), (low, high) in bars.items():
+        here = decade * math.log10(spread[engine])
+        assert (low, high) == pytest.approx((marks[engine, height] - here, marks[engine, height] + here), abs=0.3)
