@@ -24,7 +24,9 @@ from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
 from adapters.scene import Hull, Polygon
 from validation.catalogue import CATALOGUE
-from validation.cells import plane_of
+from validation.cells import Slot, plane_of
+from validation.running.execution import execute
+from validation.settings.switching import switched
 
 ENGINE = BulletEngine()
 #: Bullet's laws by path and settings, stated here once more: the profiles' own settings must give the same.
@@ -589,6 +591,24 @@ def test_tuned_box_sticks_below_the_cone_and_slides_above(ratio, slides):
         assert end == pytest.approx(9.81 * (math.sin(theta) - 0.5 * math.cos(theta)), rel=5e-3)
     else:
         assert abs(end) < 1e-6
+
+
+@pytest.mark.parametrize("profile", ["tuned", "one"])
+def test_points_that_drift_far_in_a_step_are_kept_where_a_box_slides_and_change_nothing_where_it_rests(profile):
+    """Of a box at twice the angle of friction the shipped threshold loses a thousandth of the acceleration."""
+
+    def measured(scene, metric, params, **changed):
+        slot = switched(Slot(scene, tuple(params.items()), 3, "bullet", profile, DT), changed)
+        return execute(slot).metrics[metric][0]
+
+    canonical = CATALOGUE["incline"]
+    truth = canonical.exact(canonical.scene(3, {"ratio": 2.0}))["acceleration"]
+    assert measured("incline", "acceleration", {"ratio": 2.0}) == pytest.approx(truth, rel=1e-10)
+    shipped = measured("incline", "acceleration", {"ratio": 2.0}, contactBreakingThreshold=0.02)
+    assert abs(shipped / truth - 1.0) > 8e-4
+    column = {"n": 3.0, "duration": 1.5}
+    sunk = [measured("stack", "penetration", column, **changed) for changed in ({}, {"contactBreakingThreshold": 0.02})]
+    assert sunk[0] == sunk[1] > 0.0
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.6, 0.0, 0.8), (0.48, -0.64, -0.6)])

@@ -6,8 +6,12 @@ import pytest
 from click.testing import CliRunner
 
 from adapters.engine_folder import experiments_of
-from reports.command import main
+from reports.command import main, proving, statuses
 from reports.command.proving import chosen
+from validation.canonical import Check
+from validation.cells import Slot
+from validation.settings.proofs import Proof
+from validation.settings.switching import Reading
 
 
 def run(*arguments):
@@ -32,13 +36,46 @@ def test_all_means_every_experiment_of_the_chosen_engines():
     assert set(chosen("stack-sweeps", [])) == {"bullet"}
 
 
-def test_a_reason_is_proven_on_its_engine():
-    pytest.importorskip("pymunk", reason="pymunk is an optional engine")
-    result = run("--prove", "stack-touching-start", "--engine", "chipmunk", "--json")
+#: Reasons that took the place of false ones: what was blamed before is switched off alone, in vain, in these cells.
+BLAMED_IN_VAIN = {
+    ("chipmunk", "stack-touching-start"): ("pymunk", {"collision_slop": 1e-5}, ({"n": 2.0}, {"n": 10.0})),
+    ("bullet", "incline-residual-creep"): (
+        "pybullet", {"solverResidualThreshold": 0.0}, ({"ratio": 0.99}, {"ratio": 0.999})
+    ),
+    ("mujoco", "incline-pyramid-threshold"): ("mujoco", {"tolerance": 0.0}, ({},)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("engine", "reason"), BLAMED_IN_VAIN)
+def test_a_reason_is_proven_on_its_engine(engine, reason):
+    package, blamed, cells = BLAMED_IN_VAIN[engine, reason]
+    pytest.importorskip(package)
+    result = run("--prove", reason, "--engine", engine, "--json")
     assert result.exit_code == 0, result.output
     proofs = json.loads(result.stdout)
-    assert len(proofs) == len(chosen("stack-touching-start", ["chipmunk"])["chipmunk"])
+    asked = chosen(reason, [engine])[engine]
+    assert len(proofs) == len(asked)
     assert all(proof["holds"] and proof["why_not"] == "" for proof in proofs)
+    in_vain = [dict(each.params) for each in asked if blamed in [dict(idle) for idle in each.idle]]
+    assert all(cell in in_vain for cell in cells)
+
+
+def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
+    (experiment, *_) = experiments_of("chipmunk")
+    slot = Slot(experiment.scene, tuple(dict(experiment.params).items()), 2, "chipmunk", experiment.profile, 1 / 240)
+    check = Check(experiment.metric, "m", 0.0, 1e-3, "because", "a law")
+    value = {True: 1.0, False: 0.0}
+
+    def prove(engine, experiments):
+        return [Proof(engine, each, Reading(slot, check, value[True], ""), Reading(slot, check, value[mended], ""),
+                      tuple(Reading(slot, check, value[True], "") for _ in each.idle))
+                for each, mended in ((experiment, False), (experiment, True))]  # fmt: skip
+
+    monkeypatch.setattr(proving, "prove", prove)
+    result = run("--prove", experiment.family, "--engine", "chipmunk")
+    assert result.exit_code == statuses.ALARM
+    said = [line.split()[0] for line in result.stdout.splitlines() if "PROVEN" in line]
+    assert said == ["PROVEN", "NOT"] and "1 of 2 experiments show what they say" in result.stdout
 
 
 def test_a_ratio_is_told_without_its_unit_of_one():
