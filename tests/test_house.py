@@ -1,10 +1,13 @@
 """The house: four packages in one line, no engine imported by importing them, no stray rooms."""
 
 import ast
+import io
 import re
 import subprocess
 import sys
+import tokenize
 from difflib import SequenceMatcher
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -341,3 +344,79 @@ def test_what_is_measured_is_not_compared_by_a_max_that_passes_over_no_numbers()
                 named = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
                 found += [f"{path}:{name.lineno}" for name in named if isinstance(name, ast.Name) and name.id == "max"]
     assert not found
+
+
+# ---- tests that could say nothing ----------------------------------------------------------------------------------
+
+
+def own(body):
+    """Statements of a body and of what stands in it, but for functions of its own."""
+    for statement in body:
+        if not isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            yield statement
+            for part in ("body", "orelse", "handlers", "finalbody"):
+                yield from own(getattr(statement, part, []))
+
+
+def asserts(body):
+    """Whether every way through these statements meets an assertion, or an error that is expected."""
+    for statement in body:
+        if isinstance(statement, ast.Assert):
+            return True
+        if isinstance(statement, ast.With) and "raises" in ast.unparse(statement.items[0]):
+            return True
+        if isinstance(statement, ast.For | ast.With | ast.Try) and asserts(statement.body):
+            return True
+        if isinstance(statement, ast.If):
+            if asserts(statement.body) and asserts(statement.orelse):
+                return True
+            if any(isinstance(each, ast.Return) for each in statement.body) and not asserts(statement.body):
+                return False
+    return False
+
+
+@cache
+def all_tests():
+    return [*_all_tests()]
+
+
+def _all_tests():
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                yield f"{path.relative_to(ROOT)}::{node.name}", node
+
+
+def test_no_test_ends_before_it_has_asserted_anything():
+    """An early `return` is a case that passes whatever happens: `assume` it away, or do not ask for it."""
+    found = [name for name, test in all_tests() for each in own(test.body) if isinstance(each, ast.If)
+             and any(isinstance(last, ast.Return) for last in each.body) and not asserts(each.body)]  # fmt: skip
+    assert not found
+
+
+def test_every_drawn_example_is_asserted_about():
+    """An assertion under an `if` without `else` passes where nothing of the kind is drawn: that is what `assume` is."""
+    drawn = {name: test for name, test in all_tests()
+             if any("given(" in ast.unparse(each) for each in test.decorator_list)}  # fmt: skip
+    assert len(drawn) > 20
+    called = {name for name, test in drawn.items() if not any(isinstance(each, ast.Assert) for each in ast.walk(test))}
+    assert not [name for name, test in drawn.items() if name not in called and not asserts(test.body)]
+
+
+def test_documents_that_tests_cite_are_in_the_repository():
+    """A figure of a sheet that nobody else has cannot be looked up."""
+    document = re.compile(
+        r"[\w./-]+\.(?:md|py|toml|txt|csv|html|pdf|ipynb)\b|fact sheet|lab book|appendix|dossier", re.I
+    )
+    folders = [ROOT / name for name in (*LINE, "tests")]
+    there = {path.name for path in (*ROOT.glob("*"), *(path for folder in folders for path in folder.rglob("*")))}
+    cited = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        text = path.read_text()
+        if all(Path(name).name in there for name in document.findall(text)):
+            continue
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.COMMENT or token.string.startswith('"""'):
+                named = document.findall(token.string)
+                cited += [(str(path), token.start[0], name) for name in named if Path(name).name not in there]
+    assert not cited
