@@ -25,9 +25,9 @@ SHARE, NOTHING = 1e-9, 1e-14
 KEPT = Path(__file__).parent / "kept"
 #: Stands for a line of the first section that a later one does not have.
 ABSENT = "(absent)"
-#: Share of a band by which machines may differ: round-offs of a motion may be part of it. What is narrower than the
-#: second number [its own unit] may be round-off altogether, of which other machines make up to thirty times as much.
-BAND_SHARE, NARROW, ROUND_OFFS = 0.4, 1e-10, 30.0
+#: How often a band that is nothing beside other numbers may go into that of another machine, or the other into it: it
+#: may be round-off altogether. Wider ones are numbers like all others.
+ROUND_OFFS = 30.0
 _NUMBER = re.compile(r"(?<![\w.])-?\d+\.?\d*(?:e[+-]?\d+)?(?![\w.])")
 _BANDED = re.compile(rf"({_NUMBER.pattern}) \+- ({_NUMBER.pattern})")
 
@@ -144,9 +144,7 @@ def _bands_agree(told: str, kept: str, share: float) -> bool:
     (value, band), (before, wide) = ([float(each) for each in found.groups()] for found in both if found)
     within = max(NOTHING, 0.5 * wide)
     near = math.isclose(value, before, rel_tol=share, abs_tol=within)
-    if 0.0 < max(band, wide) < NARROW:
-        return near and max(band, wide) <= ROUND_OFFS * min(band, wide)
-    return near and math.isclose(band, wide, rel_tol=BAND_SHARE)
+    return near and max(band, wide) <= ROUND_OFFS * min(band, wide)
 
 
 def differences(made: Sections, kept: Sections, share: float = SHARE, nothing: float = NOTHING) -> list[str]:

@@ -67,7 +67,7 @@ def test_a_band_is_kept_in_its_size_however_narrow_it_is():
 
     assert same("0.5 +- 1.1e-13") and same("0.50000000001 +- 1e-13")
     assert same("0.5 +- 1e-12") and not same("0.5 +- 4e-12") and not same("0.5 +- 3e-15") and not same("0.5 +- 0")
-    assert same("0.5 +- 1.3e-3", "0.5 +- 1e-3") and not same("0.5 +- 2e-3", "0.5 +- 1e-3")
+    assert same("0.5 +- 1.00000001e-3", "0.5 +- 1e-3") and not same("0.5 +- 1.1e-3", "0.5 +- 1e-3")
     assert same("1e-14 +- 1e-12", "4e-14 +- 1e-12") and not same("1e-12 +- 1e-12", "2e-12 +- 1e-12")
     assert same("says nothing", "says nothing") and not same("says nothing")
     assert not agree("1 +- 2e-17", "1 +- 1e-15") and agree("None +- 1", "None +- 1.0")
