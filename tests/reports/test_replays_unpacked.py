@@ -132,16 +132,3 @@ def test_a_bar_goes_on_by_one_for_each_part_that_is_compiled(monkeypatch):
         ("made", True, True), ("compiling, about 1 min 00 s", 3),
         *((7, 1, f"compiled {part}; about 1 min 00 s in all") for part in ("a 2-D", "a 3-D", "b 2-D")),
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize(("moves", "static"), [((0.0, 0.0), True), ((0.0, 1e-3), False), ((1e-3, 0.0), False)])
-def test_a_truth_that_stays_where_it_is_is_static_wherever_that_is(moves, static):
-    bodies = (Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"), *(
-        Body(name, Box((0.25, 0.25)), 1.0, 0.1) for name in ("one", "two")
-    ))  # fmt: skip
-    scene = Scene("toy", 1, 2, bodies, (), (0.0, 0.0), 1.0, {})
-    members = [(Slot("toy", (), 2, *WHO[0], 1 / 240), recording(2, 10, 0))]
-    exact = np.array([0.25, 0.75]) + np.linspace(0.0, 1.0, 10)[:, None] * moves
-    asked = SimpleNamespace(columns=WHO), scene, members, members[0][1].t
-    assert replay._packed(*asked, exact, 1)[0]["static"] is static
-    assert replay._packed(*asked, None, None)[0]["static"] is False
