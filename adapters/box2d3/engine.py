@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS, checked
+from adapters.box2d3.releases import RELEASES
 from adapters.box2d3.script import python
 from adapters.box2d3.shipped import SUBSTEPS
 from adapters.box2d3.simulation import Box2D3Simulation
@@ -80,6 +81,7 @@ class Box2D3Engine(Engine):
         ),
     )
     profiles = PROFILES
+    releases = RELEASES
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:

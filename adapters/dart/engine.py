@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.dart.profiles import CONES, MOST_BOXES, PROFILES, checked, solved
+from adapters.dart.releases import RELEASES, refusal
 from adapters.dart.script import python
 from adapters.dart.shipped import MIXING, PUSH_OUT, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
@@ -79,6 +80,7 @@ class DartEngine(Engine):
         ),
     )
     profiles = PROFILES
+    releases = RELEASES
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -99,7 +101,7 @@ class DartEngine(Engine):
             return "pairs: restitution of a pair is a product of two factors here, this table has none"
         if frictions(scene) is None:
             return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
-        return None
+        return refusal(profile)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

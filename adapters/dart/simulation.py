@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Array, Contacts, Simulation
 from adapters.ground import reach
@@ -31,10 +32,9 @@ class DartSimulation(Simulation):
         self.world: Any = dartpy.simulation.World()
         self.world.setTimeStep(dt)
         self.world.setGravity(list(scene.gravity))
-        self.world.setCollisionDetector(getattr(dartpy.collision, DETECTORS[settings["detector"]])())
-        rest = self.world.getDeactivationOptions()
-        rest.mEnabled = False
-        self.world.setDeactivationOptions(rest)
+        detector = getattr(dartpy.collision, DETECTORS[settings["detector"]])()
+        self.world.getConstraintSolver().setCollisionDetector(detector)
+        keep_awake(self.world)
         self.solver: Any = self._solver(dartpy, settings)
         self.reach = reach(scene)
         self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
@@ -57,7 +57,9 @@ class DartSimulation(Simulation):
         first = ("iterations", "tolerance") if name == "pgs" else ("second_sweeps", "second_tolerance")
         option.mMaxIteration, option.mRelativeDeltaXTolerance = (settings[key] for key in first)
         option.mDeltaXThreshold = settings[first[1]] * (1.0 if name == "pgs" else 1e-3)
-        held.getSecondaryBoxedLcpSolver().setOption(option)
+        second = second_choice(held)
+        if second is not None:
+            second.setOption(option)
         if name == "dantzig":
             return held.getBoxedLcpSolver()
         if name == "pgs":
@@ -157,9 +159,9 @@ class DartSimulation(Simulation):
             "dt": self.world.getTimeStep(),
             "gravity": [float(g) for g in self.world.getGravity()],
             "solver": type(held.getBoxedLcpSolver()).__name__,
-            "detector": type(self.world.getCollisionDetector()).__name__,
-            "may_sleep": bool(self.world.getDeactivationOptions().mEnabled),
-            "split_impulse": bool(held.isSplitImpulseEnabled()),
+            "detector": type(held.getCollisionDetector()).__name__,
+            "may_sleep": may_sleep(self.world),
+            "split_impulse": splits_impulses(held),
             "bodies": {
                 asked.name: {
                     "mass": node.getMass(),

@@ -16,6 +16,7 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.rapier.profiles import PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
+from adapters.rapier.releases import RELEASES
 from adapters.rapier.script import python
 from adapters.rapier.simulation import RapierSimulation
 from adapters.scene import Scene
@@ -81,6 +82,7 @@ class RapierEngine(Engine):
         ),
     )
     profiles = PROFILES
+    releases = RELEASES
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:

@@ -1,5 +1,6 @@
 """What adapters know of older releases: one table each, and code that does there what it does on the newest."""
 
+import sys
 from importlib.metadata import version
 from types import SimpleNamespace
 
@@ -166,3 +167,42 @@ def test_impulses_of_an_opaque_arbiter_are_equal_parts_of_its_total():
 def test_pymunk_s_version_is_that_of_its_distribution():
     pytest.importorskip("pymunk")
     assert registry.load("chipmunk").version() == version("pymunk")
+
+
+# ---- DART ----
+
+
+class WorldOf618:
+    """A world of dartpy 6.18: bodies are never deactivated, and the solver has no second choice."""
+
+    def getConstraintSolver(self):
+        return SimpleNamespace()
+
+
+def test_a_dart_world_without_deactivation_is_left_as_it_is():
+    from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
+
+    world = WorldOf618()
+    keep_awake(world)
+    assert may_sleep(world) is False
+    assert second_choice(world.getConstraintSolver()) is None
+    assert splits_impulses(world.getConstraintSolver()) is False
+
+
+def test_a_dart_world_that_deactivates_bodies_is_kept_awake():
+    from adapters.dart.releases import keep_awake, may_sleep
+
+    options = SimpleNamespace(mEnabled=True)
+    world = SimpleNamespace(getDeactivationOptions=lambda: options, setDeactivationOptions=lambda new: None)
+    assert may_sleep(world) is True
+    keep_awake(world)
+    assert may_sleep(world) is False
+
+
+def test_profiles_of_dart_that_a_release_cannot_have_are_refused(monkeypatch):
+    from adapters.dart.releases import refusal
+
+    for names, refused in (({}, ["pgs", "nsgs", "fbf"]), ({"NsgsFrictionSolver": object}, [])):
+        monkeypatch.setitem(sys.modules, "dartpy", SimpleNamespace(constraint=SimpleNamespace(**names)))
+        profiles = ("default", "pgs", "nsgs", "fbf")
+        assert [name for name in profiles if refusal(name)] == refused

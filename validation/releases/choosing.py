@@ -7,8 +7,11 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import requires
 
+from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 from packaging.version import InvalidVersion, Version
 
 from adapters import registry
@@ -58,21 +61,30 @@ class Release:
 
 
 def known_releases(engine: str) -> Releases:
-    """What the adapter of an engine says of its releases; of one that says nothing, its package is the distribution.
+    """What the adapter of an engine says of its releases.
+
+    Of one that says nothing its package is the only distribution. An adapter of ours then knows the releases that its
+    extra installs; one of another package is asked any release.
 
     Raises
     ------
     EngineError
-        If there is no such engine, or it has no releases of its own.
+        If there is no such engine, or it is the solver of this package, which has no releases of its own.
     """
     registry.find(engine)
-    adapter = registry.adapter(engine)
+    adapter, facts = registry.adapter(engine), registry.facts(engine)
     if adapter is not None and adapter.releases is not None:
         return adapter.releases
-    facts = registry.facts(engine)
-    if facts is None or adapter is not None:
+    if facts is None or engine == registry.solver():
         raise EngineError(f"engine: {engine} has no releases of its own to choose from")
-    return Releases((Distribution(facts.package),))
+    return Releases((Distribution(facts.package),), known=_range(facts.package) if adapter is not None else "")
+
+
+def _range(package: str) -> str:
+    """Versions of a package that this project's extras install, as a specifier; "" where none names it."""
+    asked = [Requirement(text) for text in requires("contact-crosscheck") or ()]
+    name = canonicalize_name(package)
+    return next((str(each.specifier) for each in asked if canonicalize_name(each.name) == name), "")
 
 
 def chosen(engine: str, text: str) -> list[Release]:

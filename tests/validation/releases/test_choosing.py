@@ -74,6 +74,23 @@ def test_an_engine_of_this_project_has_commits_and_no_releases():
         chosen("reference", "latest")
 
 
+@pytest.mark.parametrize(
+    ("engine", "distribution", "inside", "outside"),
+    [
+        ("rapier", "rapier3d", "0.36.0", "0.35.0"),
+        ("box2d3", "pyb2d3", "0.6.0", "0.5.6"),
+        ("dart", "dartpy", "6.16.2", "6.15.0"),
+        ("drake", "drake", "1.51.0", "1.50.0"),
+        ("newton", "newton", "1.8.0", "1.7.0"),
+    ],
+)
+def test_releases_of_optional_engines_can_be_chosen(engine, distribution, inside, outside):
+    """Drake and Newton have no table of releases: known are those that their extra installs."""
+    known, unknown = chosen(engine, f"{inside},{outside}")[::-1]
+    assert (known.distribution, known.unknown) == (distribution, "")
+    assert unknown.unknown.endswith("--try asks it all the same")
+
+
 def test_a_registry_that_does_not_answer_is_one_line(toy, monkeypatch, tmp_path):
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path))
     offered.cache_clear()

@@ -1,0 +1,57 @@
+"""dartpy over its releases: what changed in what the adapter calls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.releases import Difference, Distribution, Releases
+
+RELEASES = Releases(
+    distributions=(Distribution("dartpy"),),
+    known=">=6.16.2,<6.21",
+    differences=(
+        Difference("<6.20", "a world has no setter for its detector",
+                   "the detector of its solver is set, in every release",
+                   "measured: 6.19.5 has none, 6.20.0 has it"),
+        Difference("<6.19", "bodies at rest are never deactivated, and there is no option for it", "nothing is set",
+                   "measured: 6.18.0 has no DeactivationOptions, 6.19.0 has them"),
+        Difference("<6.20", "positions are not corrected by split impulses, and nothing asks for it",
+                   "it reads as off", "measured: 6.19.5 has no isSplitImpulseEnabled"),
+        Difference("<6.20", "the solver that answers where Dantzig's finds nothing is out of reach, and so are the "
+                   "solvers of the exact cone",
+                   "`default` leaves it as shipped; the other profiles are refused",
+                   "measured: 6.19.5 has no getSecondaryBoxedLcpSolver, NsgsFrictionSolver or FbfFrictionSolver"),
+    ),
+)  # fmt: skip
+
+
+def keep_awake(world: Any) -> None:
+    """Let no body of a world be deactivated."""
+    if hasattr(world, "getDeactivationOptions"):
+        rest = world.getDeactivationOptions()
+        rest.mEnabled = False
+        world.setDeactivationOptions(rest)
+
+
+def may_sleep(world: Any) -> bool:
+    """Whether bodies of a world may be deactivated."""
+    return hasattr(world, "getDeactivationOptions") and bool(world.getDeactivationOptions().mEnabled)
+
+
+def splits_impulses(solver: Any) -> bool:
+    """Whether a solver corrects positions by split impulses."""
+    return hasattr(solver, "isSplitImpulseEnabled") and bool(solver.isSplitImpulseEnabled())
+
+
+def refusal(profile: str) -> str | None:
+    """Why the installed release has no such profile; None if it has."""
+    import dartpy
+
+    if profile in ("pgs", "nsgs", "fbf") and not hasattr(dartpy.constraint, "NsgsFrictionSolver"):
+        return f"profile: {profile} needs solvers that dartpy has from 6.20.0 on"
+    return None
+
+
+def second_choice(solver: Any) -> Any:
+    """Return the solver that answers where the first finds nothing; None where a release keeps it to itself."""
+    return solver.getSecondaryBoxedLcpSolver() if hasattr(solver, "getSecondaryBoxedLcpSolver") else None
