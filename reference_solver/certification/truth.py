@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.certification.audit import Finding, audit, ends_of_series
+from reference_solver.certification.audit import Finding, audit, ends_of_series, shared_loads
 from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
@@ -124,14 +124,17 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         raise ValueError(f"steps: {steps!r} must be a whole number of at least 1")
     run = Simulation(model, settings)
     record = run.record(steps, stride, pieces=True)
-    findings = audit(model, record, settings.dt, located=settings.scheme == "located")
+    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
+    apart, shared = shared_loads(model, record, settings.dt, horizon)
+    findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
-    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
-    error = np.maximum.accumulate(_error(model, run, record, steps, stride) + round_off)
+    # What loads that are shared otherwise would have moved grows as that disturbance does.
+    error = _error(model, run, record, steps, stride) + round_off + np.maximum(growth, 1.0) * apart
+    error = np.maximum.accumulate(error)
     if not np.isfinite(error[record.t < horizon]).all():
         reasons.append("the run at half the step is no numbers")
     holds = not reasons

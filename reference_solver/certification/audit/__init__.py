@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit import contact, energy, motion, space, touching
+from reference_solver.certification.audit import contact, energy, motion, sharing, space, touching
 from reference_solver.certification.audit.run import Run
 from reference_solver.model import Model
 from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
@@ -86,6 +86,8 @@ CHECKS = {
     # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
     "overlap": Check(1e-6, "bodies are in each other: a contact or an impact was missed"),
     "start": Check(1e-6, "bodies overlap at the start"),
+    # As far as bodies may be in each other.
+    "shared": Check(1e-6, "the motion is not determined"),
     # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
     "gained": Check(1e-9, "energy was gained"),
     # As much as may be gained.
@@ -138,6 +140,25 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     which, place = np.unique(run.contact_owner[ends], return_inverse=True)
     sums = [np.bincount(place, part[ends], len(which)) for part in contact.left_out_by_series(run, ends)]
     return record.pieces.begin[which], sums[0], sums[1]
+
+
+def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
+    """Return how far apart (s,) motions may be that the laws allow beside a recorded one [m], and the finding of it.
+
+    Loads that redundant contacts share are not told by the laws, and friction follows them. The finding is of what
+    this moves before ``until`` [s], as a share of the smallest half width (`sharing.ways_apart`).
+
+    Raises
+    ------
+    ValueError
+        If the record has no pieces.
+    """
+    if record.pieces is None:
+        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
+    run = Run(model, record.pieces, dt)
+    ways, told = sharing.ways_apart(run, record.t)
+    limit, meaning = CHECKS["shared"]
+    return ways, Finding("shared", float(ways[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
 
 
 def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:
