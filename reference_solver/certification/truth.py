@@ -13,7 +13,9 @@ What is decided within round-off (which of two corners strikes first, whether wh
 order of bodies and by signs: the mirrored world, its bodies in reverse order, is as true, and ends where the run does.
 What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
 tells that is made to a hundredth of the accuracy.
-To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below).
+To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
+far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
+(`audit.sharing`). Where that distance is visible before the horizon, the run is refused.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -74,8 +76,8 @@ class Certificate:
     t
         (s,) times of the samples [s].
     error
-        (s,) bound of the distance between the run and the exact motion: of any point of any free body, for its finite
-        step and round-off [m].
+        (s,) bound of the distance between the run and any exact motion: of any point of any free body, for its finite
+        step, round-off, and loads that the laws do not determine [m].
     growth
         (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
     horizon
@@ -132,11 +134,11 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
-    # What loads that are shared otherwise would have moved grows as that disturbance does.
-    error = _error(model, run, record, steps, stride) + round_off + np.maximum(growth, 1.0) * apart
-    error = np.maximum.accumulate(error)
+    error = _error(model, run, record, steps, stride) + round_off
     if not np.isfinite(error[record.t < horizon]).all():
         reasons.append("the run at half the step is no numbers")
+    # A difference of two motions that obey the laws grows as that disturbance does.
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart)
     holds = not reasons
     if horizon < record.t[-1]:
         reasons.append(

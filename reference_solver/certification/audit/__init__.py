@@ -86,7 +86,7 @@ CHECKS = {
     # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
     "overlap": Check(1e-6, "bodies are in each other: a contact or an impact was missed"),
     "start": Check(1e-6, "bodies overlap at the start"),
-    # As far as bodies may be in each other.
+    # Two motions are one while they differ by no more than bodies may overlap.
     "shared": Check(1e-6, "the motion is not determined"),
     # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
     "gained": Check(1e-9, "energy was gained"),
@@ -143,10 +143,10 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
 
 
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
-    """Return how far apart (s,) motions may be that the laws allow beside a recorded one [m], and the finding of it.
+    """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
 
-    Loads that redundant contacts share are not told by the laws, and friction follows them. The finding is of what
-    this moves before ``until`` [s], as a share of the smallest half width (`sharing.ways_apart`).
+    They differ where contacts share a load in more than one way and friction follows the shares (`sharing`). The
+    finding is the distance before ``until`` [s], as a share of the smallest half width.
 
     Raises
     ------
@@ -156,9 +156,10 @@ def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple
     if record.pieces is None:
         raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
     run = Run(model, record.pieces, dt)
-    ways, told = sharing.ways_apart(run, record.t)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        apart, told = sharing.distances(run, record.t)
     limit, meaning = CHECKS["shared"]
-    return ways, Finding("shared", float(ways[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
+    return apart, Finding("shared", float(apart[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
 
 
 def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:

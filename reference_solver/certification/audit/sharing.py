@@ -1,10 +1,12 @@
-"""Whether a motion hangs on how contacts share a load, where the laws do not say how they do.
+"""Whether the motion depends on how contacts share a load where the laws do not tell how they share it.
 
-Four corners of a box carry its weight in more than one way. That is of no consequence while all of them stick, or while
-all slip one way with one mu; else the ways differ in friction, and so in motion. Of one piece the ways are the forces
-(of an impact: impulses) that leave the held directions as they are: normals of contacts that stay closed, loaded or
-not, and tangents of those that stick. They push, have ``mu p_n`` against a slip, and stay within the cone where nothing
-slips: a convex set, whose extremes tell by how much velocities may differ.
+The four corners of a box can carry its weight in more than one way. The motion is the same while all corners stick, or
+while all slip in one direction with one mu; otherwise friction, and with it the motion, depends on the shares.
+
+In one piece the modes of the contacts are those of the record: closed or open, sticking or slipping. The forces (in an
+impact: impulses) that the laws admit then are a convex set. They keep closed contacts closed, loaded now or not, and
+sticking contacts sticking; normal forces push; friction is ``mu p_n`` against a slip, and within its cone where a
+contact sticks. The extremes of the velocities over that set tell by how much two motions can differ.
 """
 
 from __future__ import annotations
@@ -14,48 +16,50 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certification.audit.contact import SLIP_NOISE, speeds
+from reference_solver.certification.audit.contact import SLIP_NOISE, reduced_mass, speeds
 from reference_solver.certification.audit.run import Indices, Run, cross, scaled_along
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
 
-#: Share of the speeds that meet by which a closed contact may seem to open: what `CHECKS` allows normal impulses.
+#: Share of the speeds at a contact up to which it stays closed, and of the momentum there up to which it carries
+#: nothing: the limit of the check ``normal``.
 HELD = 1e-9
-#: Share of their levers by which contacts may miss being redundant: points are known to that (`CHECKS`, ``place``).
+#: Singular value, as a share of the largest, up to which contacts are redundant: points are known to that share of a
+#: body (the check ``place``).
 REDUNDANT = 1e-9
-#: Share of what the forces of redundant contacts do that is round-off where they cancel: some thousand last places.
+#: Share of unit forces up to which what is left of their sum is round-off: some thousand last places.
 ROUND_OFF = 1e-12
-#: Sides of the polygon that stands for the circle of sticking friction in space; it is a fiftieth too wide.
+#: Sides of the polygon that stands for the circle of sticking friction in space: it is 2 % too wide at its corners.
 SIDES = 16
 
 
-class Shared(NamedTuple):
-    """Of each row, a body in a piece: what it may gain otherwise than it did, and by which contacts."""
+class Spread(NamedTuple):
+    """By how much the change of velocity of a body in a piece can differ, for each row of the run."""
 
-    gain: Array  # (m,) spread of the change of velocity in the piece, of the body's fastest point [m/s]
-    contacts: dict[int, Indices]  # of rows with a spread: the contacts that share
+    gain: Array  # (m,) largest difference at any point of the body [m/s]
+    contacts: dict[int, Indices]  # the contacts that share a load, for each row with a difference
 
 
 class _Contacts(NamedTuple):
-    """What an admissible force of each contact (c,) is made of.
+    """Modes of all contacts (c,), and what unit impulses at them do.
 
-    Pushes are what unit impulses do to the bodies on both sides, as changes of their twists times the root of M: along
-    the normal, along the normal and against the slip by mu, and along the tangents.
+    ``push`` has changes of the twists of both bodies times the root of M: by a unit impulse along the normal, by the
+    same with the friction that goes with it, and by unit impulses along the tangents.
     """
 
     held: NDArray[np.bool_]  # (c,) closed throughout its piece
-    rubs: NDArray[np.bool_]  # (c,) held, and slips with friction
-    sticks: NDArray[np.bool_]  # (c,) held, and friction keeps it from slipping
+    rubs: NDArray[np.bool_]  # (c,) held, slips, and has friction
+    sticks: NDArray[np.bool_]  # (c,) held, does not slip, and has friction
     mu: Array  # (c,)
     given: Array  # (c, d) impulse: along the normal, along the tangents [N s]
     row: Indices  # (c, 2) rows of body A and body B; -1 where it is not free
     push: Array  # (c, 2, 1 + d, 3 | 6)
 
 
-def shared_loads(run: Run) -> Shared:
-    """Return what the laws leave open of each row; impulse-level pieces, which are no truth, are not asked."""
+def shared_loads(run: Run) -> Spread:
+    """Return the spread of every row; pieces of the impulse-level scheme, which is no truth, have none."""
     pieces, owner = run.pieces, run.contact_owner
-    found = Shared(np.zeros(len(pieces.body)), {})
+    found = Spread(np.zeros(len(pieces.body)), {})
     if not len(owner):
         return found
     contacts = _contacts(run)
@@ -67,44 +71,39 @@ def shared_loads(run: Run) -> Shared:
     return found
 
 
-def ways_apart(run: Run, t: Array) -> tuple[Array, str]:
-    """Return how far apart (s,) two motions may be at times ``t`` (s,) that both obey the laws [m], and why.
+def distances(run: Run, t: Array) -> tuple[Array, str]:
+    """Return how far apart (s,) two motions that both obey the laws can be at times ``t`` (s,) [m], and why.
 
-    Velocities that differ go on doing so until their body rests. The sentence names the body that this moves farthest,
-    with the contacts of the piece that adds most; it is empty where the laws leave nothing open.
+    A difference of velocities lasts until the body rests. The sentence names the body that moves farthest, and the
+    contacts of its piece with the largest spread; it is empty where there is none.
     """
-    shared, pieces = shared_loads(run), run.pieces
+    spread, pieces = shared_loads(run), run.pieces
     found, told = np.zeros(len(t)), ""
-    for i in np.unique(pieces.body[list(shared.contacts)]):
+    for i in np.unique(pieces.body[list(spread.contacts)]):
         rows = np.flatnonzero(pieces.body == i)
         speed, way, ways = 0.0, 0.0, []
-        for gain, length, rests in zip(shared.gain[rows], run.length[rows], _rests(run, rows), strict=True):
+        for gain, length, rests in zip(spread.gain[rows], run.length[rows], _rests(run, rows), strict=True):
             speed = 0.0 if rests else speed + gain
-            way += speed * length
+            way += speed * length if length > 0.0 else 0.0
             ways.append(way)
         own = np.interp(t, (pieces.begin[run.owner] + run.length)[rows], ways, left=0.0)
         if own[-1] > found[-1]:
-            most = rows[shared.gain[rows].argmax()]
-            told = _told(run, int(i), shared.contacts[int(most)], float(own[-1]))
+            contacts = spread.contacts[int(rows[spread.gain[rows].argmax()])]
+            *others, last = np.unique([pieces.body_a[contacts], pieces.body_b[contacts]])
+            told = (
+                f"the motion is not determined: bodies {', '.join(map(str, others))} and {last} can share their load "
+                f"among {len(contacts)} contacts with friction in more than one way, which moves body {i} by up to "
+                f"{own[-1]:.2g} m"
+            )
         found = np.maximum(found, own)
     return found, told
 
 
 def _rests(run: Run, rows: Indices) -> NDArray[np.bool_]:
-    """Whether (s,) a body stands still in a piece."""
+    """Whether (s,) a body stands still at the end of a piece."""
     twist, i = run.pieces.twist_after[rows], run.pieces.body[rows]
     speed = np.linalg.norm(twist[:, : run.d], axis=1) + run.reach[i] * np.linalg.norm(twist[:, run.d :], axis=1)
     return np.asarray(speed <= SLIP_NOISE * run.pull * run.dt)
-
-
-def _told(run: Run, i: int, contacts: Indices, way: float) -> str:
-    a, b = run.pieces.body_a[contacts], run.pieces.body_b[contacts]
-    others = [str(j) for j in np.unique([a, b]) if j != i]
-    who = f"body {others[0]}" if len(others) == 1 else f"bodies {', '.join(others[:-1])} and {others[-1]}"
-    return (
-        f"the motion is not determined: how body {i} and {who} share their load among {len(contacts)} contacts with "
-        f"friction is open, and moves body {i} by up to {way:.2g} m"
-    )
 
 
 def _contacts(run: Run) -> _Contacts:
@@ -120,8 +119,10 @@ def _contacts(run: Run) -> _Contacts:
     closed = (impact | (np.abs(approach) <= HELD * speed)) & (np.abs(ends - rebound) <= HELD * speed)
     asked = impact | (run.is_forces & ~run.is_impulse_level & (pieces.length > 0.0))[owner]
     row = np.column_stack([np.where(run.free[i], side, -1) for i, side in zip(sides, run.side, strict=True)])
-    held = asked & (closed | (pressed > 0.0)) & (row >= 0).any(axis=1)
-    # Forces answer to the slip that there is, or that begins; impulses, and those of a fixed step, to that they leave.
+    carries = pressed > HELD * reduced_mass(run) * speed
+    held = asked & (closed | carries) & (row >= 0).any(axis=1)
+    # Friction of a force is against the slip at its start, or against the slip that begins; friction of an impact, and
+    # of a fixed step, against the slip that is left.
     first, last = (u - (u * n).sum(axis=1)[:, None] * n for u in (before, after))
     begins = run.is_frozen[owner] & (np.linalg.norm(first, axis=1) <= SLIP_NOISE * speed)
     slip = np.where((impact | run.is_fixed[owner] | begins)[:, None], last, first)
@@ -135,11 +136,12 @@ def _contacts(run: Run) -> _Contacts:
     for side, sign in ((0, -1.0), (1, 1.0)):
         for j in range(along.shape[1]):
             push[:, side, j] = _pushed(run, row[:, side], pieces.point, sign * along[:, j])
+    held &= np.isfinite(push).all(axis=(1, 2, 3))
     return _Contacts(held, held & ~still & (mu > 0.0), held & still & (mu > 0.0), mu, given, row, push)
 
 
 def _pushed(run: Run, row: Indices, point: Array, impulse: Array) -> Array:
-    """What impulses (c, d) at points do to the bodies of rows, as changes of twists (c, 3 | 6) times the root of M."""
+    """Changes of the twists (c, 3 | 6) of the bodies of rows by impulses (c, d) at points, times the root of M."""
     body = run.pieces.body[row]
     moment = cross(point - run.pieces.pose_before[row, : run.d], impulse)
     found = np.column_stack([impulse / np.sqrt(run.mass[body])[:, None], _by_root_of_inertia(run, row, moment)])
@@ -153,7 +155,7 @@ def _by_root_of_inertia(run: Run, row: Indices, moment: Array) -> Array:
 
 
 def _next_approach(run: Run, approach: Array, leaves: Array) -> Array:
-    """Normal velocity (c,) with which the next piece finds a contact, where it has it; else that which this one has."""
+    """Normal velocity (c,) of each contact as the next piece begins; where that has no such contact, ``leaves``."""
     pieces, owner, found = run.pieces, run.contact_owner, leaves.copy()
     order = np.lexsort((owner, pieces.feature, pieces.body_b, pieces.body_a))
     one, other = order[:-1], order[1:]
@@ -173,7 +175,7 @@ def _tangents(n: Array) -> Array:
 
 
 def _clusters(own: Indices, row: Indices) -> list[Indices]:
-    """Contacts of one piece, together those that share a free body."""
+    """Contacts of one piece in groups that share no free body."""
     groups: list[tuple[set[int], list[int]]] = []
     for c, rows in zip(own.tolist(), row[own].tolist(), strict=True):
         bodies, members = set(rows) - {-1}, [c]
@@ -184,8 +186,8 @@ def _clusters(own: Indices, row: Indices) -> list[Indices]:
     return [np.array(members) for _, members in groups]
 
 
-def _share(run: Run, contacts: _Contacts, own: Indices, found: Shared) -> None:
-    """Enter what a cluster of contacts leaves open."""
+def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
+    """Enter the spread of a cluster of contacts."""
     d, many = run.d, len(own)
     rows = np.unique(contacts.row[own])
     rows = rows[rows >= 0]
@@ -194,14 +196,13 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Shared) -> None:
     stuck = np.flatnonzero(contacts.sticks[own])
     of = np.concatenate([np.arange(many), np.repeat(stuck, d - 1)])
     part = np.concatenate([np.ones(many, int), np.tile(np.arange(2, d + 1), len(stuck))])
-    moves = np.zeros((len(of), len(rows), contacts.push.shape[3]))
-    held = moves.copy()
+    pushed = np.zeros((2, len(of), len(rows), contacts.push.shape[3]))
     for side in range(2):
         known = contacts.row[own[of], side] >= 0
         at, body = np.flatnonzero(known), where[of[known], side]
-        moves[at, body] += contacts.push[own[of[at]], side, part[at]]
-        held[at, body] += contacts.push[own[of[at]], side, np.where(part[at] == 1, 0, part[at])]
-    moves, held = moves.reshape(len(of), -1), held.reshape(len(of), -1)
+        for which, column in enumerate((np.where(part == 1, 0, part), part)):
+            pushed[which, at, body] += contacts.push[own[of[at]], side, column[at]]
+    held, moves = pushed.reshape(2, len(of), -1)
     size = np.linalg.norm(moves, axis=1)
     held, moves = held / np.linalg.norm(held, axis=1)[:, None], moves / size[:, None]
     _, strength, ways = np.linalg.svd(held @ moves.T)
@@ -221,13 +222,14 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Shared) -> None:
         gain = np.linalg.norm(motion[:, :d], axis=1) / np.sqrt(run.mass[run.pieces.body[rows]])
         gain += reach * np.linalg.norm(_by_root_of_inertia(run, rows, motion[:, d:]), axis=1)
         taking = own[np.unique(of[np.abs(turn[k] @ ways) * size > REDUNDANT])]
-        for row in rows[spread * gain > 0.0].tolist():
-            found.contacts[row] = np.union1d(found.contacts.get(row, taking), taking)
-        found.gain[rows] += spread * gain
+        if spread > 0.0:
+            for row in rows[gain > 0.0].tolist():
+                found.contacts[row] = np.union1d(found.contacts.get(row, taking), taking)
+            found.gain[rows[gain > 0.0]] += spread * gain[gain > 0.0]
 
 
 def _limits(mu: Array, stuck: Indices, d: int) -> Array:
-    """Rows (k, ..) that must not fall below zero: normal impulses, and what is left of the cone where a contact sticks."""
+    """Rows (k, ..) whose products with admissible impulses are not negative: contacts push, friction is in its cone."""
     size = len(mu) + len(stuck) * (d - 1)
     angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
     sides = np.array([[1.0], [-1.0]]) if d == 2 else np.column_stack([np.cos(angle), np.sin(angle)])
@@ -239,12 +241,14 @@ def _limits(mu: Array, stuck: Indices, d: int) -> Array:
 
 
 def farthest(aim: Array, limits: Array, room: Array) -> float:
-    """Return the largest ``aim @ y`` of all y with ``limits @ y >= -room``; infinite where there is none.
+    """Return the largest ``aim @ y`` of all y (k,) with ``limits @ y >= -room``, infinite if it is not bounded.
 
-    From y = 0, which is one of them (room >= 0), along the edges of what is allowed: a linear program by active sets,
-    the first of several that tie (R. G. Bland, Math. Oper. Res. 2, 1977).
+    A linear program, solved by active sets from y = 0, which is admissible as ``room`` (r,) is not negative. Of several
+    limits (r, k) to let go of, or to meet, it takes the first, so that it does not go in circles (R. G. Bland, *Math.
+    Oper. Res.* 2, 1977).
     """
-    y, active = np.zeros(len(aim)), []
+    y = np.zeros(len(aim))
+    active: list[int] = []
     for _ in range(50 * len(limits)):
         rows = limits[active]
         weight = np.linalg.lstsq(rows.T, aim, rcond=None)[0] if active else np.zeros(0)
