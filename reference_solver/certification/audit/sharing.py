@@ -90,10 +90,10 @@ def distances(run: Run, t: Array) -> tuple[Array, str]:
         if own[-1] > found[-1]:
             contacts = spread.contacts[int(rows[spread.gain[rows].argmax()])]
             *others, last = np.unique([pieces.body_a[contacts], pieces.body_b[contacts]])
+            far = f"by up to {own[-1]:.2g} m" if np.isfinite(own[-1]) else "by any distance"
             told = (
                 f"the motion is not determined: bodies {', '.join(map(str, others))} and {last} can share their load "
-                f"among {len(contacts)} contacts with friction in more than one way, which moves body {i} by up to "
-                f"{own[-1]:.2g} m"
+                f"among {len(contacts)} contacts with friction in more than one way, which moves body {i} {far}"
             )
         found = np.maximum(found, own)
     return found, told
@@ -247,20 +247,20 @@ def farthest(aim: Array, limits: Array, room: Array) -> float:
     limits (r, k) to let go of, or to meet, it takes the first, so that it does not go in circles (R. G. Bland, *Math.
     Oper. Res.* 2, 1977).
     """
-    y = np.zeros(len(aim))
+    y, size = np.zeros(len(aim)), float(np.linalg.norm(aim))
     active: list[int] = []
     for _ in range(50 * len(limits)):
         rows = limits[active]
         weight = np.linalg.lstsq(rows.T, aim, rcond=None)[0] if active else np.zeros(0)
         along = aim - weight @ rows
-        if np.linalg.norm(along) <= ROUND_OFF * np.linalg.norm(aim) or len(active) == len(aim):
+        if np.linalg.norm(along) <= REDUNDANT * size or len(active) == len(aim):
             back = [i for i, share in zip(active, weight, strict=True) if share > ROUND_OFF]
             if not back:
                 return float(aim @ y)
             active.remove(min(back))
             continue
         slope = limits @ along
-        falls = slope < -ROUND_OFF * np.linalg.norm(limits, axis=1) * np.linalg.norm(along)
+        falls = slope < -ROUND_OFF * np.linalg.norm(limits, axis=1) * size
         falls[active] = False
         if not falls.any():
             return float("inf")
