@@ -247,6 +247,26 @@ def test_impulses_of_a_landing_are_shared_in_more_than_one_way():
     assert found.gain[kinds == IMPACT].max() > 1e-2
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_corner_that_an_impact_leaves_without_load_could_carry_as_well(restitution):
+    """The spread of a landing is the same where all four corners are hit and where the record has one that is not."""
+    model = spinning(0.3, (1.0, 3.0, -1.0), restitution, 0.01)
+    record = Simulation(model, Settings.reference(DT)).record(6, pieces=True)
+    pieces = record.pieces
+    k = int(np.flatnonzero(pieces.kind == IMPACT)[0])
+    own, row = slice(pieces.first_contact[k], pieces.first_contact[k + 1]), pieces.first_body[k] + 1
+    r, twist, load = pieces.point[own] - pieces.pose_before[row, :3], pieces.twist_after[row], pieces.impulse[own, 2]
+    slip = (twist[:3] + np.cross(twist[3:], r))[:, :2]
+    push = np.column_stack([-0.3 * slip / np.linalg.norm(slip, axis=1)[:, None], np.ones(4)])
+    way = np.linalg.svd(np.vstack([np.ones(4), np.cross(r, push)[:, :2].T]))[2][3]
+    load = load + np.min(-load[way < 0.0] / way[way < 0.0]) * way
+    assert (load < 1e-12).sum() == 1 and (load > -1e-12).all()
+    impulse = pieces.impulse.copy()
+    impulse[own] = load[:, None] * push
+    gains = [sharing.shared_loads(Run(model, x, DT)).gain[row] for x in (pieces, replace(pieces, impulse=impulse))]
+    assert gains[1] == pytest.approx(gains[0], rel=1e-9) and gains[0] > 1e-2
+
+
 def test_a_load_without_bound_is_a_spread_without_bound():
     """A box that fits between a floor and a ceiling: they may squeeze it as hard as they like, and brake it so."""
     ceiling = Body(HalfSpace((0.0, -1.0)), pose=(0.0, 0.2, 0.0), motion="fixed")
