@@ -49,7 +49,7 @@ def turned_contacts(run: Run) -> Turned:
     owner = run.contact_owner
     turning = ~run.is_frozen[owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    alone = _alone(owner, pairs)
+    alone, off = _alone(owner, pairs), unseen(run)
     if turning.any():
         change = np.where(turning, changes_of_force(run), 0.0)
     for pair in np.unique(pairs[turning]):
@@ -78,7 +78,8 @@ def turned_contacts(run: Run) -> Turned:
         sure = sure & told & alone[rows]
         point[rows] = np.where(sure[:, None], (place[0] + 4.0 * place[1] + place[2]) / 6.0, point[rows])
         last_point[rows] = np.where(sure[:, None], place[2], last_point[rows])
-        far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size + _unseen(run, rows)
+        far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size
+        far += sum(np.where(row[rows] >= 0, off[row[rows]], 0.0) for row in run.side)
         stray[rows] = np.where(sure, far, np.inf)
     return Turned(normal, last_normal, point, last_point, lean, stray, change)
 
@@ -200,18 +201,12 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
     return place, sure
 
 
-def _unseen(run: Run, rows: Indices) -> Array:
-    """How far (s,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
-    pieces, length = run.pieces, run.pieces.length[run.contact_owner[rows]]
-    found = np.zeros(len(rows))
-    for k, body in enumerate((pieces.body_a, pieces.body_b)):
-        row = run.side[k][rows]
-        arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body[rows]]
-        first, last = (x[row, run.d :] for x in (pieces.twist_before, pieces.twist_after))
-        spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
-        turn = (length * spin) ** 2 + length * np.linalg.norm(last - first, axis=1)
-        found += np.where(row >= 0, arm * turn * turn / 128.0, 0.0)
-    return found
+def unseen(run: Run) -> Array:
+    """How far (m,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
+    first, last = (x[:, run.d :] for x in (run.pieces.twist_before, run.pieces.twist_after))
+    spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
+    turn = (run.length * spin) ** 2 + run.length * np.linalg.norm(last - first, axis=1)
+    return np.where(np.isfinite(run.reach), run.reach, 0.0)[run.pieces.body] * turn * turn / 128.0
 
 
 def _fastest(run: Run, rows: Indices) -> Array:
