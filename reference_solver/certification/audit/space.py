@@ -123,9 +123,10 @@ def _bent(run: Run, paths: list[Path]) -> list[Path]:
             path.bend[:, k] = bend[which]
         for pair in np.unique(np.column_stack([pieces.body_a, pieces.body_b])[carries], axis=0):
             of = run.contact_owner[carries & (pieces.body_a == pair[0]) & (pieces.body_b == pair[1])]
-            for share in BETWEEN:
-                a, b = ((run.model.bodies[i].shape, _pose_when(paths[i], pieces.begin[of], share * pieces.length[of])) for i in pair)
-                off[which, of] = np.maximum(off[which, of], np.abs(distinct(*a, *b).gap))
+            a, b = (run.model.bodies[i].shape for i in pair)
+            for late in (share * pieces.length[of] for share in BETWEEN):
+                pose_a, pose_b = (_pose_when(paths[i], pieces.begin[of], late) for i in pair)
+                off[which, of] = np.maximum(off[which, of], np.abs(distinct(a, pose_a, b, pose_b).gap))
     best = off.argmin(axis=0)
     for path, k, bend, r in zip(paths, at, bends, rows, strict=True):
         path.bend[:, k] = bend[best[run.owner[r]], :, np.arange(len(r))].swapaxes(0, 1)
@@ -218,7 +219,8 @@ def _vector_rate(psi: Array, w: Array) -> Array:
 
 def _cubic(path: Path, k: Indices, t: Array) -> tuple[Array, Array]:
     """Displacements (s, 3 | 6) on intervals k after t (s, 1), and their rates, by cubic Hermite polynomials."""
-    h, way, first, last = np.where(path.length > 0.0, path.length, 1.0)[k][:, None], path.way[k], path.first[k], path.last[k]
+    way, first, last = path.way[k], path.first[k], path.last[k]
+    h = np.where(path.length > 0.0, path.length, 1.0)[k][:, None]
     if way.shape[1] == 6:
         last = np.concatenate([last[:, :3], _vector_rate(way[:, 3:], last[:, 3:])], axis=1)
     s = t / h
