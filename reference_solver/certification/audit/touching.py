@@ -12,17 +12,23 @@ from typing import Any
 import numpy as np
 
 from reference_solver.certification.audit.choice import closes_sooner, is_cornered, strayed
+from reference_solver.certification.audit.contact import reduced_mass
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
-from reference_solver.certification.geometry import distinct, rotation
+from reference_solver.certification.audit.turning import SAME, pose_within, unseen
+from reference_solver.certification.geometry import core_of, distinct, rotation
 from reference_solver.model import Array, HalfSpace
+from reference_solver.shapes import smallest_extent
 
 #: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
 NO_GAP = 1e-13
+#: Share of a step up to which a piece is an instant: slips that have all but ended are taken out in 1e-8 of one (E54).
+INSTANT = 1e-7
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts that carry something, and of all pairs at impacts."""
     yield from zip(("apart", "direction", "place", "choice"), _touching(run), strict=True)
+    yield "stays", _opened(run)
     yield "together", _left_out(run)
 
 
@@ -65,6 +71,63 @@ def _touching(run: Run) -> tuple[float, float, float, float]:
         here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), off_surface)
         worst = np.maximum(worst, [*here, sooner])
     return float(worst[0]), float(worst[1]), float(worst[2]), float(worst[3])
+
+
+def _opened(run: Run) -> float:
+    """How far contacts that carry something open by the middle and the end of their pieces, as a share of the extent.
+
+    No feature carries beyond its end. Then the bodies are apart, or a corner is off the face that it stood on within
+    its edges; where one of them is round they go apart along the normal of where they are, as a share of the speeds.
+    """
+    pieces, owner, worst = run.pieces, run.contact_owner, 0.0
+    coarse = run.is_fixed | run.is_impulse_level | (pieces.length <= INSTANT * run.dt)
+    asked = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse[owner]
+    doubt, mass, pairs = unseen(run), reduced_mass(run), pieces.body_a * len(run.free) + pieces.body_b
+    for pair in np.unique(pairs[asked]):
+        rows = np.flatnonzero(asked & (pairs == pair))
+        bodies = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+        shapes = [run.model.bodies[i].shape for i in bodies]
+        size, still = min(run.extent[i] for i in bodies), min(run.still[i] for i in bodies)
+        start, middle, end = (
+            [pose_within(run, i, run.side[k][rows], at) for k, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)
+        )
+        noise = 16.0 * np.spacing(max(np.abs(pieces.point[rows]).max(), np.abs(end[1][:, : run.d]).max()))
+        standing = [_corner_on_face(shapes[k], start[k], shapes[1 - k], start[1 - k], pieces.point[rows]) for k in (0, 1)]
+        # Half-way bodies are where polynomials have them: as near as an overlap counts.
+        unsure = 1e-6 * size + sum(np.where(row[rows] >= 0, doubt[row[rows]], 0.0) for row in run.side)
+        for poses, unsure in ((middle, unsure), (end, 0.0)):
+            found = distinct(shapes[0], poses[0], shapes[1], poses[1])
+            off = np.abs(found.gap)
+            for k in (0, 1):
+                at, corner = standing[k]
+                if len(at):
+                    place = placed(core_of(shapes[k], poses[k][at]).vertex[np.arange(len(at)), corner], run.d)
+                    off[at] = np.maximum(off[at], np.abs(distinct(shapes[1 - k], poses[1 - k][at], POINT, place).gap))
+            worst = max(worst, float(((off - noise - unsure) / size).max()))
+        if (radius := _radius(shapes[0]) + _radius(shapes[1])) > 0.0:
+            point = 0.5 * (found.point_a + found.point_b)
+            first, last = (_moving(run, i, run.side[k][rows], point, end[k]) for k, i in enumerate(bodies))
+            speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
+            parting = ((last - first) * found.normal).sum(axis=1) - noise / radius * speed - still
+            parting = np.minimum(parting, np.linalg.norm(pieces.impulse[rows], axis=1) / mass[rows])
+            worst = max(worst, float((parting.clip(min=0.0) / (speed + run.pull * run.dt + still)).max()))
+    return worst
+
+
+def _corner_on_face(shape: Any, pose: Array, other: Any, pose_other: Array, point: Array) -> tuple[Indices, Indices]:
+    """Which points (s, d) are a corner of one body within a face of the other (k,), and which corner of it it is (k,)."""
+    if _radius(shape) + _radius(other) > 0.0 or isinstance(shape, HalfSpace):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    far = np.linalg.norm(core_of(shape, pose).vertex - point[:, None], axis=2)
+    found = far.min(axis=1) <= SAME * smallest_extent(shape)
+    if not isinstance(other, HalfSpace):
+        core, near = core_of(other, pose_other), SAME * smallest_extent(other)
+        if point.shape[1] == 2:
+            found &= (np.linalg.norm(core.vertex - point[:, None], axis=2) > near).all(axis=1)
+        else:
+            local = np.einsum("sij,si->sj", core.axes, point - core.centre)
+            found &= (core.half - np.abs(local) <= near).sum(axis=1) == 1
+    return np.flatnonzero(found), far.argmin(axis=1)[found]
 
 
 def _left_out(run: Run) -> float:

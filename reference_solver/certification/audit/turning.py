@@ -57,7 +57,7 @@ def turned_contacts(run: Run) -> Turned:
         a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
         shapes = run.model.bodies[a].shape, run.model.bodies[b].shape
         seen = [
-            nearest(shapes[0], _pose(run, a, run.side[0][rows], at), shapes[1], _pose(run, b, run.side[1][rows], at))
+            nearest(shapes[0], pose_within(run, a, run.side[0][rows], at), shapes[1], pose_within(run, b, run.side[1][rows], at))
             for at in (0.0, 0.5, 1.0)
         ]
         most = _largest_turn(run, rows)
@@ -156,7 +156,7 @@ def _largest_turn(run: Run, rows: Indices) -> Array:
         first, last = (np.where(known, x[row], 0.0) for x in (pieces.twist_before, pieces.twist_after))
         spins += np.maximum(np.linalg.norm(first[:, run.d :], axis=1), np.linalg.norm(last[:, run.d :], axis=1))
         passing += sign * 0.5 * (first + last)[:, : run.d]
-        places.append(_pose(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
+        places.append(pose_within(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
     apart = np.linalg.norm(places[0] - places[1], axis=1)
     apart = np.where(apart > 0.0, apart, run.size)
     shapes = [run.model.bodies[int(i[rows[0]])].shape for i in (pieces.body_a, pieces.body_b)]
@@ -187,7 +187,7 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
         return place, sure
     place, sure = [start, start, start], np.zeros(len(rows), bool)
     for k in range(2):
-        poses = [[_pose(run, i, run.side[j][rows], at) for j, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)]
+        poses = [[pose_within(run, i, run.side[j][rows], at) for j, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)]
         own = np.einsum("sji,sj->si", rotation(poses[0][k]), start - poses[0][k][:, : run.d])
         later = [np.einsum("sij,sj->si", rotation(x[k]), own) + x[k][:, : run.d] for x in poses]
         other = [
@@ -222,7 +222,7 @@ def _fastest(run: Run, rows: Indices) -> Array:
     return np.asarray(pieces.length[run.contact_owner[rows]] * found)
 
 
-def _pose(run: Run, i: int, rows: Indices, at: float) -> Array:
+def pose_within(run: Run, i: int, rows: Indices, at: float) -> Array:
     """Poses (s, P) of body i in the pieces of ``rows``: at their start, end, or middle by a cubic polynomial."""
     own = np.array(run.model.bodies[i].pose, dtype=float)
     pieces, d = run.pieces, run.d
