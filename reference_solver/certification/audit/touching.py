@@ -92,7 +92,9 @@ def _opened(run: Run) -> float:
             [pose_within(run, i, run.side[k][rows], at) for k, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)
         )
         noise = 16.0 * np.spacing(max(np.abs(pieces.point[rows]).max(), np.abs(end[1][:, : run.d]).max()))
-        standing = [_corner_on_face(shapes[k], start[k], shapes[1 - k], start[1 - k], pieces.point[rows]) for k in (0, 1)]
+        standing = [
+            _corner_on_face(shapes[k], start[k], shapes[1 - k], start[1 - k], pieces.point[rows]) for k in (0, 1)
+        ]
         # Half-way bodies are where polynomials have them: as near as an overlap counts.
         unsure = 1e-6 * size + sum(np.where(row[rows] >= 0, doubt[row[rows]], 0.0) for row in run.side)
         for poses, unsure in ((middle, unsure), (end, 0.0)):
@@ -105,12 +107,16 @@ def _opened(run: Run) -> float:
                     off[at] = np.maximum(off[at], np.abs(distinct(shapes[1 - k], poses[1 - k][at], POINT, place).gap))
             worst = max(worst, float(((off - noise - unsure) / size).max()))
         if (radius := _radius(shapes[0]) + _radius(shapes[1])) > 0.0:
-            point = 0.5 * (found.point_a + found.point_b)
+            point, before = (
+                0.5 * (x.point_a + x.point_b) for x in (found, distinct(shapes[0], start[0], shapes[1], start[1]))
+            )
+            known = np.linalg.norm(before - pieces.point[rows], axis=1) <= SAME * size  # and neither end of a rod
             first, last = (_moving(run, i, run.side[k][rows], point, end[k]) for k, i in enumerate(bodies))
             speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
             parting = ((last - first) * found.normal).sum(axis=1) - noise / radius * speed - still
             parting = np.minimum(parting, np.linalg.norm(pieces.impulse[rows], axis=1) / mass[rows])
-            worst = max(worst, float((parting.clip(min=0.0) / (speed + run.pull * run.dt + still)).max()))
+            share = parting.clip(min=0.0) / (speed + run.pull * run.dt + still)
+            worst = max(worst, float(share[known].max(initial=0.0)))
     return worst
 
 

@@ -57,7 +57,12 @@ def turned_contacts(run: Run) -> Turned:
         a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
         shapes = run.model.bodies[a].shape, run.model.bodies[b].shape
         seen = [
-            nearest(shapes[0], pose_within(run, a, run.side[0][rows], at), shapes[1], pose_within(run, b, run.side[1][rows], at))
+            nearest(
+                shapes[0],
+                pose_within(run, a, run.side[0][rows], at),
+                shapes[1],
+                pose_within(run, b, run.side[1][rows], at),
+            )
             for at in (0.0, 0.5, 1.0)
         ]
         most = _largest_turn(run, rows)
