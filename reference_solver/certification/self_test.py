@@ -59,13 +59,11 @@ def _hill(friction: float, speed: float = 1.0) -> Scene:
 
 def _edge(shape: Disc | Sphere, half: tuple[float, ...], inertia: Any, speed: float = 1.0) -> Scene:
     """A ball that rolls off the end of a fixed box, .1 m ahead, and about its edge until it leaves it."""
-    r, up = shape.radius, half[-1] + shape.radius
-    if len(half) == 2:
-        pose, twist, gravity = (0.4, up, 0.0), (speed, 0.0, -speed / r), (0.0, -G)
-    else:
-        pose, twist, gravity = (0.4, 0.0, up, *UPRIGHT), (speed, 0.0, 0.0, 0.0, speed / r, 0.0), (0.0, 0.0, -G)
+    d, r, aside = len(half), shape.radius, (0.0,) * (len(half) - 2)
+    pose = (0.4, *aside, half[-1] + r, *(UPRIGHT if aside else (0.0,)))
+    twist = (speed, 0.0, -speed / r) if d == 2 else (speed, 0.0, 0.0, 0.0, speed / r, 0.0)
     box = Body(Box(half), pose=(0.0, 0.0, 0.0, *UPRIGHT)[: len(pose)], motion="fixed")
-    return Scene(Model(len(half), [box, Body(shape, 1.0, inertia, pose, twist)], gravity, 0.0, 0.8), 50, REFERENCE)
+    return Scene(Model(d, [box, Body(shape, 1.0, inertia, pose, twist)], (*aside, 0.0, -G), 0.0, 0.8), 50, REFERENCE)
 
 
 def _disc(x: float, y: float, *twist: float, **fields: Any) -> Body:

@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_solver.certification.audit.motion import integrated_turn
 from reference_solver.certification.audit.run import Indices, Run, scaled_along, twist_of
-from reference_solver.certification.audit.turning import unseen
+from reference_solver.certification.audit.turning import cubic, moved_by, unseen, vector_rate, way_between
 from reference_solver.certification.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
 
@@ -46,7 +46,7 @@ def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
 def _overlaps(run: Run, start: Array) -> tuple[float, float]:
     """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width."""
     paths = _bent(run, [_path(run, i, start) for i in range(len(run.free))])
-    low, high = (np.array([x(path) for path in paths]) for x in (_low, _high))
+    low, high = np.array([_extremes(path) for path in paths]).swapaxes(0, 1)
     arm = np.where(np.isfinite(run.reach), run.reach, np.inf)[:, None]
     worst, first = 0.0, 0.0
     for i in range(len(paths)):
@@ -62,20 +62,13 @@ def _overlaps(run: Run, start: Array) -> tuple[float, float]:
     return worst, first
 
 
-def _low(path: Path) -> Array:
+def _extremes(path: Path) -> Array:
+    """Lowest and highest coordinates (2, d) of a path, which may leave the straight line between two ends."""
     d = 2 if path.pose.shape[1] == 3 else 3
-    return np.asarray((np.minimum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) - _bulge(path, d)).min(axis=0))
-
-
-def _high(path: Path) -> Array:
-    d = 2 if path.pose.shape[1] == 3 else 3
-    return np.asarray((np.maximum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) + _bulge(path, d)).max(axis=0))
-
-
-def _bulge(path: Path, d: int) -> Array:
-    """How far a path may leave the straight line between its ends (k, 1) [m]."""
-    change = np.linalg.norm(path.last[:, :d] - path.first[:, :d], axis=1)
-    return np.asarray((0.5 * path.length * change)[:, None])
+    bulge = 0.5 * path.length * np.linalg.norm(path.last[:, :d] - path.first[:, :d], axis=1)
+    ends = path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]
+    low, high = np.minimum(*ends) - bulge[:, None], np.maximum(*ends) + bulge[:, None]
+    return np.array((low.min(axis=0), high.max(axis=0)))
 
 
 def _path(run: Run, i: int, start: Array) -> Path:
@@ -93,14 +86,7 @@ def _path(run: Run, i: int, start: Array) -> Path:
         poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
         return Path(begin, length, poses, length[:, None] * twists, twists, twists, np.zeros((2, count, v)))
     begin, length, before, after, first, last = _parts(run, rows)
-    return Path(begin, length, before, _way(before, after), first, last, np.zeros((2, len(begin), v)))
-
-
-def _way(before: Array, after: Array) -> Array:
-    """Displacements and turns (s, 3 | 6) from poses to poses."""
-    if before.shape[1] == 3:
-        return np.asarray(after - before)
-    return np.concatenate([after[:, :3] - before[:, :3], rotation_vector(before[:, 3:], after[:, 3:])], axis=1)
+    return Path(begin, length, before, way_between(before, after), first, last, np.zeros((2, len(begin), v)))
 
 
 def _bent(run: Run, paths: list[Path]) -> list[Path]:
@@ -127,7 +113,7 @@ def _bent(run: Run, paths: list[Path]) -> list[Path]:
             for late in (share * pieces.length[of] for share in BETWEEN):
                 pose_a, pose_b = (_pose_when(paths[i], pieces.begin[of], late) for i in pair)
                 off[which, of] = np.maximum(off[which, of], np.abs(distinct(a, pose_a, b, pose_b).gap))
-    best = off.argmin(axis=0)
+    best = np.nan_to_num(off, nan=np.inf).argmin(axis=0)
     for path, k, bend, r in zip(paths, at, bends, rows, strict=True):
         path.bend[:, k] = bend[best[run.owner[r]], :, np.arange(len(r))].swapaxes(0, 1)
     return paths
@@ -145,10 +131,10 @@ def _bend(path: Path, k: Indices, beside: int) -> Array:
     h = path.length[k][:, None]
     t = -path.length[other][:, None] if beside < 0 else h + path.length[other][:, None]
     far = path.pose[other] if beside < 0 else _pose_at(path, other, path.length[other])
-    way, rate = _way(path.pose[k], far), path.first[other] if beside < 0 else path.last[other]
+    way, rate = way_between(path.pose[k], far), path.first[other] if beside < 0 else path.last[other]
     if way.shape[1] == 6:
-        rate = np.concatenate([rate[:, :3], _vector_rate(way[:, 3:], rate[:, 3:])], axis=1)
-    moved, passing = _cubic(path, k, t)
+        rate = np.concatenate([rate[:, :3], vector_rate(way[:, 3:], rate[:, 3:])], axis=1)
+    moved, passing = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         grown = 1.0 / (t * (h - t))
         share = (way - moved) * grown**2
@@ -193,42 +179,6 @@ def _state(run: Run, rows: Indices, share: Array) -> tuple[Array, Array]:
     return pose, twist
 
 
-def rotation_vector(q: Array, p: Array) -> Array:
-    """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
-    # p times the conjugate of q
-    scalar = (p * q).sum(axis=1)
-    vector = -p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
-    vector *= np.where(scalar < 0.0, -1.0, 1.0)[:, None]
-    sine = np.linalg.norm(vector, axis=1)
-    angle = 2.0 * np.arctan2(sine, np.abs(scalar))
-    return np.asarray(vector * np.where(sine > 1e-12, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
-
-
-def _vector_rate(psi: Array, w: Array) -> Array:
-    """Rates (s, 3) of rotation vectors psi at angular velocities w, world axes (J. Stuelpnagel, SIAM Rev. 6, 1964).
-
-    ``psi' = w - psi x w / 2 + c psi x (psi x w)``, ``c = (1 - (a/2) cot(a/2))/a^2`` of the angle a.
-    """
-    half = 0.5 * np.linalg.norm(psi, axis=1)
-    large = half > 1e-3  # below it the next term of the series is 1e-9 of this one
-    safe = np.where(large, half, 1.0)
-    share = np.where(large, (1.0 - safe / np.tan(safe)) / (4.0 * safe * safe), 1.0 / 12.0)
-    across = np.cross(psi, w)
-    return np.asarray(w - 0.5 * across + share[:, None] * np.cross(psi, across))
-
-
-def _cubic(path: Path, k: Indices, t: Array) -> tuple[Array, Array]:
-    """Displacements (s, 3 | 6) on intervals k after t (s, 1), and their rates, by cubic Hermite polynomials."""
-    way, first, last = path.way[k], path.first[k], path.last[k]
-    h = np.where(path.length > 0.0, path.length, 1.0)[k][:, None]
-    if way.shape[1] == 6:
-        last = np.concatenate([last[:, :3], _vector_rate(way[:, 3:], last[:, 3:])], axis=1)
-    s = t / h
-    moved = s * s * (3.0 - 2.0 * s) * way + t * (1.0 - s) ** 2 * first + t * s * (s - 1.0) * last
-    rate = 6.0 * s * (1.0 - s) / h * way + (1.0 - s) * (1.0 - 3.0 * s) * first + s * (3.0 * s - 2.0) * last
-    return moved, rate
-
-
 def _pose_when(path: Path, begin: Array, late: Array) -> Array:
     """Poses (s, P) at times ``late`` after ``begin``, when intervals of this or of other bodies began."""
     k = np.searchsorted(path.begin, begin, "right") - 1
@@ -237,17 +187,10 @@ def _pose_when(path: Path, begin: Array, late: Array) -> Array:
 
 def _pose_at(path: Path, k: Indices, t: Array) -> Array:
     """Poses (s, P) on intervals k after the time t (s,) of each."""
-    d, h = 2 if path.pose.shape[1] == 3 else 3, path.length[k][:, None]
+    h = path.length[k][:, None]
     t = np.clip(t[:, None], 0.0, h)
-    moved = _cubic(path, k, t)[0] + (t * (h - t)) ** 2 * (path.bend[0, k] + path.bend[1, k] * t)
-    place = path.pose[k][:, :d] + moved[:, :d]
-    if d == 2:
-        return np.concatenate([place, path.pose[k][:, 2:] + moved[:, 2:]], axis=1)
-    angle = np.linalg.norm(moved[:, 3:], axis=1, keepdims=True)
-    half = 0.5 * np.sinc(0.5 * angle / np.pi) * moved[:, 3:]
-    scalar, (w, v) = np.cos(0.5 * angle), (path.pose[k][:, 3:4], path.pose[k][:, 4:])
-    q = [scalar * w - (half * v).sum(axis=1, keepdims=True), scalar * v + w * half + np.cross(half, v)]
-    return np.concatenate([place, *q], axis=1)
+    moved, _ = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
+    return moved_by(path.pose[k], moved + (t * (h - t)) ** 2 * (path.bend[0, k] + path.bend[1, k] * t))
 
 
 def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:

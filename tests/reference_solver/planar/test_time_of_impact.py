@@ -117,7 +117,8 @@ def test_a_gap_bends_by_what_its_corners_turn(spins):
 @pytest.mark.parametrize(("rate", "bend"), [(-2.0, 0.0), (-2.0, -9.0), (1.0, -9.0), (0.0, -0.3), (-4.0, 9.0)])
 def test_a_safe_time_is_the_first_zero_of_its_parabola(rate, bend):
     """A disc over a wall: of ``c + r t + b t^2 / 2``."""
-    meeting = on_paths(WALL, Disc(0.5), (np.zeros(3), (0.0, 1.2, 0.0)), (np.zeros((3, 1)), np.array([[3.0], [rate], [0.0]])))
+    paths = np.zeros((3, 1)), np.array([[3.0], [rate], [0.0]])
+    meeting = on_paths(WALL, Disc(0.5), (np.zeros(3), (0.0, 1.2, 0.0)), paths)
     for act, *more in ((time_of_impact.introduce, 0, 1), (time_of_impact.watch_all,), (time_of_impact.stand, 0.0)):
         from_python(act)(meeting, *more)
     from_python(time_of_impact.separate)(meeting)
