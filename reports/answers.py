@@ -14,7 +14,7 @@ from typing import Any
 
 from adapters.registry import is_ranked
 from reports.cures import decided_by, told_cures
-from reports.findings import REFUSED, severity
+from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
 from validation.catalogue import CATALOGUE
@@ -157,6 +157,8 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
     failed = _failing(own[profile])
     engine = failed[0]["engine"]
+    if all(mark_of(row) == "invalid" for row in failed):
+        return "nothing is said of the engine, so that there is nothing to cure"
     others = {name: group for name, group in own.items() if name != profile and is_ranked(engine, name)}
     good = [name for name, group in others.items() if not _failing(group)]
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
@@ -197,7 +199,7 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
-    lost = [row for row in failing if row["value"] is None]
+    lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"{len(lost)} of {len(rows)} rows have no answer ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
     kinds: dict[str, list[Plain]] = defaultdict(list)

@@ -21,7 +21,7 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, how_measured, pasteable, told_cure
-from reports.findings import ALARMING, Family, families, grouped, severity
+from reports.findings import ALARMING, Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
@@ -225,7 +225,7 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str) -> 
 
 
 def _worst(row: Plain) -> str:
-    if row["value"] is None:
+    if not has_answer(row):
         return f"{row['dimension']}-D {row['metric']}: {row['reason']}"
     asked = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
     where = " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), asked) if text)
@@ -396,6 +396,13 @@ def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
     return ""
 
 
+def _measured_text(row: Plain) -> str:
+    if row["value"] is None:
+        return f"no value: {row['reason']}"
+    text = f"{row['metric']} = {measured(row, 8)}"
+    return text if has_answer(row) else f"{text}, which does not count: the measurement is broken"
+
+
 def _print_explanation(
     row: Plain, beside: str, better: str, paste: str, differing: Sequence[Change], console: Console
 ) -> None:
@@ -409,10 +416,7 @@ def _print_explanation(
         ("row", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
         ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
         ("asked", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
-        (
-            "measured",
-            f"{row['metric']} = {measured(row, 8)}" if row["value"] is not None else f"no value: {row['reason']}",
-        ),
+        ("measured", _measured_text(row)),
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from reports.answers import answers, choices
 from reports.command import main, showing
-from reports.findings import grouped
+from reports.findings import finding_line, grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity, row_id
@@ -235,6 +235,18 @@ def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
     rows = [row("impact", 3, "chipmunk", "tuned", "unsupported") | REFUSED, row("impact", 3, "bullet", "tuned")]
     text = "\n".join(shown(rows, 100))
     assert "chipmunk is planar" not in text and "Nothing was judged" not in text
+
+
+def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
+    why = "receipt size: measured 0.98, declared 1 +- 0.0035"
+    broken = [row("impact", 2, "bullet", "tuned", value=1.0, truth=1.0) | {
+        "outcome": "invalid", "reason": why, "physics": None, "metric": metric} for metric in ("a", "b[1]", "b[2]")]  # fmt: skip
+    rows = [*broken, row("impact", 2, "bullet", "one")]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 rows)" in text
+    assert f"bullet/tuned impact: 3 of 3 rows have no answer (INVALID: {why}); nothing is said of the engine" in text
+    assert "truth 1" not in text and "one cures it" not in text
+    assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
 
 
 # ---- a real run ----

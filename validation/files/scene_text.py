@@ -18,8 +18,8 @@ from adapters.scene import SceneError
 
 #: Largest file that is read [bytes]: some 5000 bodies, parsed in about a second.
 MOST_BYTES = 2**20
-#: Most bodies: every pair that can meet is measured at every sample, and 1000 bodies have half a million pairs.
-MOST_BODIES = 1000
+#: Most bodies: what is ours of a cell of columns takes some 5 ms a body, so that these cost half a minute.
+MOST_BODIES = 5000
 #: Wrong fields that are named before the rest is counted.
 MOST_ERRORS = 10
 
