@@ -10,6 +10,7 @@ import numpy as np
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Array, Contacts, Simulation
 from adapters.ground import reach
+from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Names of the detectors' classes.
@@ -173,7 +174,7 @@ class DartSimulation(Simulation):
                     "restitution": self.restitutions[i] * self.restitutions[j],
                     "friction": min(self.frictions[i], self.frictions[j]),
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             },
         }
 
