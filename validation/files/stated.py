@@ -13,6 +13,7 @@ from typing import Any
 
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
+from validation import metrics
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.files import invariants
 from validation.files.expressions import value_of
@@ -95,12 +96,14 @@ def _metric(name: str, at: float | None = None) -> str:
 
 
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
+    overlaps: invariants.Overlaps = {}
     try:
-        beyond, depth = invariants.deepest(read.scene, trajectory)
+        overlaps = metrics.overlaps(read.scene, trajectory)
+        beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
         beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
     measured: dict[str, Measured] = {
-        "energy_growth": invariants.energy_growth(read.scene, trajectory),
+        "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
         "deepest_overlap": depth,
     }
