@@ -282,17 +282,11 @@ def _alike(sampling: Sampling, dt: float, done: int, most: int) -> tuple[int, bo
 
 
 def _fastest(scene: Scene) -> float:
-    """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add.
-
-    Where all is at rest without loads it is the speed that takes a free body across its own size within the run:
-    whoever moves at it has an answer that is wrong, and a number. What is nothing at all is a number of roundings.
-    """
+    """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add."""
     d = scene.dimension
     initial = max(top_speed(b) + reach(b.shape) * math.hypot(*b.twist[d:]) for b in scene.bodies)
-    free = [body for body in scene.bodies if body.motion == "free"]
-    pull = max((_pull(body) for body in free), default=0.0)
-    across = min((reach(body.shape) for body in free), default=0.0) / scene.duration
-    return max(initial + (math.hypot(*scene.gravity) + pull) * scene.duration, across) + 1e-9
+    pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
+    return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
 
 
 def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:

@@ -7,7 +7,7 @@ tuned cures it". Everything is read off the judged rows at the profiles' own ite
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -16,7 +16,7 @@ from adapters.registry import is_ranked
 from reports.cures import decided_by, told_cures
 from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
-from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
+from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
 from validation.catalogue import CATALOGUE
 from validation.metrics import SILENT, WORDS
 from validation.posed import is_file, resolve
@@ -98,7 +98,12 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         good = [key for key, group in own.items() if not _failing(group)]
         price = {key: _price(costs or {}, scene, key) for key in good}
         good.sort(key=lambda key: price[key])
-        names = [_named(key, own[key], dimensions[scene], price[key]) for key in good]
+        untold = Counter(
+            (row["engine"], row["profile"])
+            for row in rows
+            if row["scene"] == scene and row["outcome"] == "unsupported" and row["iterations"] is None
+        )
+        names = [_named(key, own[key], dimensions[scene], price[key], untold[key]) for key in good]
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
         near = min(shares, key=lambda key: shares[key], default=None)
         nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
@@ -113,10 +118,12 @@ def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
     return known[0] if known else math.inf
 
 
-def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float) -> str:
-    """``engine/profile (2-D only, 1.2 ms/s)``."""
+def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float, untold: int) -> str:
+    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many rows it tells no number for."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
+    if untold and is_file(rows[0]["scene"]) and own >= wanted:
+        notes.append(f"{plural(untold, 'row')} not told")
     if math.isfinite(price):
         notes.append(f"{1e3 * price:.2g} ms/s")
     return "/".join(key) + (f" ({', '.join(notes)})" if notes else "")

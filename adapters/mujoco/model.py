@@ -12,7 +12,7 @@ rebound, since MJCF states none.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,27 @@ def _shown(root: Element, refused: Refused) -> str:
     return f"{where}: {one_line(refused.name, 60)}"
 
 
+def filled_in(root: Element) -> Iterator[str]:
+    """Numbers that MuJoCo takes where no geom and no default of geoms states one: friction, and density of bodies."""
+    defaults = [e for top in root.children if top.tag == "default" for e in top.walk() if e.tag == "geom"]
+    said = {name for each in defaults for name in each.attributes}
+    owners = [(e, [g for g in e.children if g.tag == "geom"]) for e in root.walk() if e.tag in ("worldbody", "body")]
+    rough = [g for _, geoms in owners for g in geoms if "friction" not in g.attributes]
+    if rough and "friction" not in said:
+        yield f"friction 1 of {_count(rough)} none, MuJoCo's own; of two geoms the larger holds"
+    heavy = [
+        g for owner, geoms in owners for g in geoms
+        if owner.tag == "body" and not any(e.tag == "inertial" for e in owner.children)
+        and not {"mass", "density"} & set(g.attributes)
+    ]  # fmt: skip
+    if heavy and not {"mass", "density"} & said:
+        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's own"
+
+
+def _count(geoms: Sequence[Element]) -> str:
+    return "1 geom that states" if len(geoms) == 1 else f"{len(geoms)} geoms that state"
+
+
 class _Reading:
     """One attempt at a model, which either succeeds or says what stands in its way."""
 
@@ -136,6 +157,7 @@ class _Reading:
                 "centre: a step of a body that turns ends otherwise by |w|^2 dt^2/2 of the way between them"
             )
         pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
+        self.notes += filled_in(self.root)
         self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)

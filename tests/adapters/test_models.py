@@ -311,3 +311,27 @@ def test_it_is_read_in_another_process_and_comes_back_whole():
     assert isinstance(found, Model)
     with pytest.raises(SceneError, match="<include>"):
         read("mujoco", ".xml", '<mujoco><include file="x"/></mujoco>', True)
+
+
+BOX_AND_FLOOR = """<mujoco>{default}<worldbody>
+<geom type="plane" size="5 5 .1"{floor}/>
+<body pos="0 0 .5"><freejoint/>{inertial}<geom type="box" size=".5 .5 .5"{box}/></body>
+</worldbody></mujoco>"""
+INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, ["friction 1 of 2 geoms that state none", "density 1000 kg/m^3 of 1 geom that states neither"]),
+        ({"floor": ' friction=".5"', "box": ' friction=".5"'}, ["density 1000 kg/m^3"]),
+        ({"box": ' friction=".5" mass="1"'}, ["friction 1 of 1 geom that states none"]),
+        ({"default": '<default><geom friction=".3" density="10"/></default>'}, []),
+        ({"inertial": INERTIAL, "box": ' friction=".5"', "floor": ' friction=".5"'}, []),
+    ],
+)
+def test_friction_and_density_that_a_model_leaves_to_mujoco_are_said(given, said):
+    text = BOX_AND_FLOOR.format(**{"default": "", "floor": "", "inertial": "", "box": ""} | given)
+    notes = [note for note in reading.read(text, False).notes if note.startswith(("friction", "density"))]
+    assert len(notes) == len(said)
+    assert all(note.startswith(begin) for note, begin in zip(notes, said, strict=True))

@@ -12,11 +12,13 @@ from adapters.scene import Body, Box, HalfSpace, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
+from validation.metrics import UNAVAILABLE
 from validation.questions.invariance import (
     MOVES,
     RELATIONS,
     Allowances,
     Change,
+    Refusal,
     _nudged,
     compare,
     floor,
@@ -417,3 +419,20 @@ def test_a_cell_without_an_answer_has_none_in_any_pose_and_one_that_is_lost_in_a
         monkeypatch, lambda relation, *more: "it hung" if relation == "mirrored" else {"spin": (3.0, "")}, ["mirrored"]
     )
     assert change == Change("mirrored", refused="it hung", lost=True)
+
+
+def test_a_force_that_is_not_told_in_a_pose_is_no_break_and_a_value_that_is_lost_for_another_reason_is():
+    floors = dict.fromkeys(BASE, 0.0)
+    told = {"speed": (None, UNAVAILABLE), "count": BASE["count"]}
+    assert judged("mirrored", BASE, told, Allowances(floors)).holds
+    lost = judged("mirrored", BASE, told | {"speed": (None, "never settles")}, Allowances(floors))
+    assert not lost.holds and lost.metric == "speed"
+    # What is told is compared all the same.
+    changed = judged("mirrored", BASE, told | {"count": (BASE["count"][0] + 1.0, "")}, Allowances(floors))
+    assert not changed.holds and changed.metric == "count"
+
+
+def test_a_pose_that_an_engine_refuses_is_no_break_and_one_that_it_fails_at_is():
+    refused = judged("bystander", BASE, Refusal("bodies: more than it takes"), Allowances({}))
+    assert (refused.refused, refused.lost, refused.holds) == ("bodies: more than it takes", False, True)
+    assert judged("bystander", BASE, "it hung", Allowances({})).lost
