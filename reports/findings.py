@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from validation.judging.rows import is_alarming
 from validation.posed import is_file
 
 Plain = Mapping[str, Any]
@@ -141,4 +142,4 @@ def severity(row: Plain) -> float:
 
 def alarms(rows: Sequence[Plain]) -> list[Family]:
     """Families of what makes the command exit with 1."""
-    return [family for family in families(rows) if family.mark in ALARMING]
+    return families([row for row in rows if is_alarming(row)])

@@ -21,7 +21,7 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, how_measured, pasteable, told_cure
-from reports.findings import ALARMING, Family, families, grouped, has_answer, severity
+from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
@@ -39,7 +39,7 @@ from reports.wording import (
 )
 from validation.bench import reading
 from validation.cells import Observation, Slot, checks_of
-from validation.judging.rows import rows_of
+from validation.judging.rows import is_alarming, rows_of
 from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
@@ -183,7 +183,7 @@ def findings(
     # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
-        rows = [row for row in rows if mark_of(row) in ALARMING]
+        rows = [row for row in rows if is_alarming(row)]
     if every:
         chosen = [row for _, group in grouped(rows) for row in group]
         if as_json:

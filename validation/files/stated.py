@@ -19,6 +19,9 @@ from validation.files import invariants
 from validation.files.expressions import value_of
 from validation.files.quantities import force_window, quantity, shown_quantities, unit
 
+#: Source of the numbers that the author of a scene states.
+STATED = "the scene file's [[checks]]"
+
 
 @dataclass(frozen=True)
 class StatedCheck:
@@ -123,6 +126,4 @@ def _checks(read: Stated, dt: float) -> list[Check]:
 
 
 def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
-    return Check(
-        metric, unit(check.quantity), check.value, check.bound(dt), check.because, "the scene file's [[checks]]"
-    )
+    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED)
