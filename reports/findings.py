@@ -123,14 +123,15 @@ def families(rows: Iterable[Plain]) -> list[Family]:
 def refusals(rows: Sequence[Plain]) -> Iterator[str]:
     """One line per engine and scene that it cannot run, with its reason: no fault of either.
 
-    Of the catalogue's scenes the matrix says enough, unless nothing else is there to be said.
+    An engine that is not installed has one line for all scenes. Of the catalogue's scenes the matrix says enough, unless nothing else is there to be said.
     """
     found: dict[tuple[Any, ...], None] = {}
     nothing = all(row["outcome"] in REFUSED for row in rows)
     for row in rows:
         if row["outcome"] in REFUSED and (nothing or (is_file(row["scene"]) and row["outcome"] == "unsupported")):
-            found[REFUSED[row["outcome"]], row["engine"], row["scene"], row["reason"]] = None
-    return (f"{label}: {engine} {scene}: {reason}" for label, engine, scene, reason in found)
+            scene = "" if row["outcome"] == "not_installed" else f" {row['scene']}"
+            found[REFUSED[row["outcome"]], row["engine"], scene, row["reason"]] = None
+    return (f"{label}: {engine}{scene}: {reason}" for label, engine, scene, reason in found)
 
 
 def severity(row: Plain) -> float:

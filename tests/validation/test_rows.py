@@ -251,13 +251,12 @@ def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law
     assert listed.standing == "explained" and predictions_of(listed) == [] and law == []
 
 
-@pytest.mark.parametrize(("promised", "standing"), [("soft", "new"), ("hard", None)])
-def test_of_your_own_model_nothing_is_listed_and_a_promise_holds(monkeypatch, promised, standing):
+@pytest.mark.parametrize(("outcome", "alarming"), [(Outcome.OK, False), (Outcome.INVALID, False), (Outcome.CRASHED, True)])
+def test_of_your_own_model_nothing_is_listed_and_only_a_cell_that_is_lost_is_an_alarm(monkeypatch, outcome, alarming):
     monkeypatch.setattr(rows, "is_model", lambda scene: scene == "incline")
-    monkeypatch.setattr(rows, "solutions_of", lambda engine: {promised} if engine == "nameless" else set())
-    row = judged(slot=OWN)
-    assert (row.physics, row.standing, row.alarming) == ("fail", standing, standing is not None)
-    assert row.reason.endswith("not listed: your own model")
+    row = judged(slot=OWN, outcome=outcome, reason="so")
+    assert (row.standing, row.alarming, row.failing) == (None, alarming, True)
+    assert outcome is not Outcome.OK or row.reason.endswith("not listed: your own model")
 
 
 def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
