@@ -330,7 +330,7 @@ def read_rebound(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 def slide_load(friction: float) -> float:
     """Gravity of the slide [m/s^2]: less above a friction of 1, so that it brakes by one weight at most.
 
-    Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured instead.
+    Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured.
     """
     return GRAVITY / max(1.0, friction)
 

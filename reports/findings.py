@@ -123,7 +123,8 @@ def families(rows: Iterable[Plain]) -> list[Family]:
 def refusals(rows: Sequence[Plain]) -> Iterator[str]:
     """One line per engine and scene that it cannot run, with its reason: no fault of either.
 
-    An engine that is not installed has one line for all scenes. Of the catalogue's scenes the matrix says enough, unless nothing else is there to be said.
+    An engine that is not installed has one line for all scenes. Of the catalogue's scenes the matrix says enough,
+    unless nothing else is there to be said.
     """
     found: dict[tuple[Any, ...], None] = {}
     nothing = all(row["outcome"] in REFUSED for row in rows)

@@ -256,8 +256,8 @@ def legend(short: bool = False) -> str:
         )
     return (
         "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
-        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | FAIL: off, and nothing is listed of this "
-        "engine or file | INVALID: the measurement is broken, nothing is said of the engine | "
+        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | FAIL: off, and nothing is listed of "
+        "this engine or file | INVALID: the measurement is broken, nothing is said of the engine | "
         "-: cannot be asked of this engine"
     )
 

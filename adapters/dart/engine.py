@@ -128,6 +128,12 @@ class DartEngine(Engine):
             return told
         if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED
-            return {**told, "restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s")}
+            return {
+                **told,
+                "restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s"),
+            }
         value, left = restitution(needs.restitution, REBOUND_SPEED), solved(profile, needs.friction > 0.0)
-        return {**told, "restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change")}
+        return {
+            **told,
+            "restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change"),
+        }

@@ -84,8 +84,8 @@ class MujocoEngine(Engine):
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; forces of its "
-                "contacts that contradict the momentum of what it pushes are not told",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; forces of "
+                "its contacts that contradict the momentum of what it pushes are not told",
                 f"{DOC}, modeling: mocap bodies",
             ),
             Quirk(

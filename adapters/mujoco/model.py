@@ -68,6 +68,8 @@ def read_tree(
     """
     lines = {e.attributes["name"]: e for e in root.walk() if e.tag in tags and "name" in e.attributes}
     while True:
+        if drop:
+            _without_what_hangs(root, dropped)
         try:
             return _Reading(root, drop, dropped, lines, notes).model()
         except Refused as refused:
@@ -79,6 +81,36 @@ def read_tree(
             for keyframe in [e for e in root.children if e.tag == "keyframe"]:
                 root.without(keyframe)
                 dropped.append(f"{keyframe}: its states are those of all bodies")
+
+
+def _without_what_hangs(root: Element, dropped: list[str]) -> None:
+    """Leave out what hangs on something that was left out: shapes without their mesh, bodies without any mass."""
+    meshes = {e.attributes.get("name") for e in root.walk() if e.tag == "mesh"}
+    for shape in [e for e in root.walk() if _is_shapeless(e, meshes)]:
+        root.without(shape)
+        dropped.append(f"{shape}: its shape was left out")
+    for body in [e for e in root.walk() if e.tag == "body" and _is_hollow(e)]:
+        root.without(body)
+        dropped.append(f"{body}: nothing is left of it that has a mass")
+
+
+def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
+    if element.tag == "collision":
+        return not any(child.children for child in element.children if child.tag == "geometry")
+    mesh = element.attributes.get("mesh")
+    return element.tag == "geom" and ("hfield" in element.attributes or (mesh is not None and mesh not in meshes))
+
+
+def _is_hollow(body: Element) -> bool:
+    """Whether a body can move, and neither states a mass nor has a geom or a body that brings one."""
+    moves = any(child.tag in ("freejoint", "joint") for child in body.children)
+    heavy = any(child.tag in ("inertial", "body", "replicate", "frame") for child in body.children)
+    given = [
+        {child.attributes.get(name, "1") for name in ("mass", "density")}
+        for child in body.children
+        if child.tag == "geom"
+    ]
+    return moves and not heavy and all({"0", "0.0", "0."} & told for told in given)
 
 
 def _shown(root: Element, refused: Refused) -> str:

@@ -118,8 +118,8 @@ class MujocoSimulation(Simulation):
     def contacts(self) -> Contacts:
         """Contacts and gaps at the start of the last step, impulses of that step.
 
-        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN). Nor are those on a
-        body whose momentum contradicts them (`_contradicted`).
+        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN). Nor are those on
+        a body whose momentum contradicts them (`_contradicted`).
         """
         contact, count = self._data.contact, self._data.ncon
         if not count:

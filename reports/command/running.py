@@ -118,7 +118,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    show(plain, console, files=written.values())
+    show(plain, console, files=written.values(), out=out)
 
 
 @main.command("compile")

@@ -27,6 +27,7 @@ from reports.summary import show as show_summary
 from reports.terminal import terminal
 from reports.wording import (
     LABELS,
+    at,
     mark_of,
     measured,
     missing_text,
@@ -126,7 +127,7 @@ def show(run: str, every: bool, as_json: bool, out: Path) -> None:
         click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
-    show_summary(rows, console, costs, every=every)
+    show_summary(rows, console, costs, every=every, out=out)
     kept.say_missing()
     report = out / "report.html"
     if report.is_file():
@@ -195,7 +196,7 @@ def findings(
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails")
+    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails", out)
 
 
 def _grid(*headings: str) -> Table:
@@ -205,7 +206,7 @@ def _grid(*headings: str) -> Table:
     return table
 
 
-def _print_families(found: Sequence[Family], console: Console, nothing: str) -> None:
+def _print_families(found: Sequence[Family], console: Console, nothing: str, out: Path | None = None) -> None:
     if not found:
         console.print(nothing)
         return
@@ -221,7 +222,8 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str) -> 
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
-    console.print(Text("crosscheck explain ID says everything about a row; --all lists every row."), style="dim")
+    said = f"crosscheck explain ID{at(out)} says everything about a row; --all lists every row."
+    console.print(Text(said), style="dim")
 
 
 def _worst(row: Plain) -> str:

@@ -335,3 +335,37 @@ def test_friction_and_density_that_a_model_leaves_to_mujoco_are_said(given, said
     notes = [note for note in reading.read(text, False).notes if note.startswith(("friction", "density"))]
     assert len(notes) == len(said)
     assert all(note.startswith(begin) for note, begin in zip(notes, said, strict=True))
+
+
+PLANE = '<geom type="plane" size="5 5 .1" friction="1"/>'
+OTHERS = [
+    '<freejoint/><geom type="mesh" mesh="gone" friction="1"/>',
+    '<freejoint/><geom type="hfield" hfield="gone"/>',
+    '<freejoint/><geom type="box" size=".1 .1 .1" mass="0"/>',
+    '<freejoint/><geom type="ellipsoid" size=".1 .2 .3"/>',
+]
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
+    """The mesh lies in a file that is not read: its geom goes with it, and the body that had nothing else."""
+    text = (
+        f'<mujoco><asset><mesh name="gone" file="a.stl"/></asset><worldbody>{PLANE}<body name="ball" pos="0 0 1">'
+        f'<freejoint/><geom type="sphere" size=".1" density="1"/></body><body name="part" pos="1 0 1">{other}</body>'
+        "</worldbody></mujoco>"
+    )
+    found = reading.read(text, True)
+    assert [body.name for body in found.scene.bodies if body.motion == "free"] == ["ball"]
+    assert any("'part'" in line for line in found.dropped)
+
+
+def test_a_refusal_names_drop_where_it_helps_and_nowhere_else():
+    text = f'<mujoco><worldbody>{PLANE}<body><freejoint/><geom size=".1" density="1"/></body></worldbody>{{}}</mujoco>'
+    with pytest.raises(SceneError, match=r"; --drop leaves it out$"):
+        read("mujoco", ".xml", text.format("<tendon/>"), False)
+    with pytest.raises(SceneError, match=r"; --drop leaves it out \(2 in all\)$"):
+        read("mujoco", ".xml", text.format('<tendon/><equality><weld body1="a"/></equality>'), False)
+    for drop in (False, True):  # nothing is left that moves
+        with pytest.raises(SceneError) as caught:
+            read("mujoco", ".xml", f"<mujoco><worldbody>{PLANE}</worldbody></mujoco>", drop)
+        assert "--drop" not in str(caught.value)

@@ -606,7 +606,9 @@ def two_cubes(depth, dimension=3, gap_of_place=0.071, duration=0.1):
     """Two boxes of 71 mm at rest without loads, one ``depth`` deep in the other."""
     turn = (0.0,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
     inertia = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)
-    places = [(0.0, 0.0), (0.0, gap_of_place - depth)] if dimension == 2 else [(0.0,) * 3, (0.0, gap_of_place - depth, 0.0)]
+    places = (
+        [(0.0, 0.0), (0.0, gap_of_place - depth)] if dimension == 2 else [(0.0,) * 3, (0.0, gap_of_place - depth, 0.0)]
+    )
     boxes = (Body(f"b{k}", Box((0.0355,) * dimension), 1.0, inertia, (*x, *turn)) for k, x in enumerate(places))
     return Scene("cubes", 1, dimension, tuple(boxes), (), (0.0,) * dimension, duration)
 

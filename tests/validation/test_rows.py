@@ -251,7 +251,9 @@ def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law
     assert listed.standing == "explained" and predictions_of(listed) == [] and law == []
 
 
-@pytest.mark.parametrize(("outcome", "alarming"), [(Outcome.OK, False), (Outcome.INVALID, False), (Outcome.CRASHED, True)])
+@pytest.mark.parametrize(
+    ("outcome", "alarming"), [(Outcome.OK, False), (Outcome.INVALID, False), (Outcome.CRASHED, True)]
+)
 def test_of_your_own_model_nothing_is_listed_and_only_a_cell_that_is_lost_is_an_alarm(monkeypatch, outcome, alarming):
     monkeypatch.setattr(rows, "is_model", lambda scene: scene == "incline")
     row = judged(slot=OWN, outcome=outcome, reason="so")

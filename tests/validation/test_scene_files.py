@@ -352,7 +352,8 @@ def pairs_notes(tmp_path, pairs):
         ("[[pairs]]\nfriction = 0.0\nrestitution = 0.0\n", []),
         ('[[pairs]]\na = "floor"\nb = "ball"\nfriction = 0.1\nrestitution = 0.2\n',
          ["pairs: restitution 0 and friction 0 of pairs that no entry names, none was given"]),
-        ('[[pairs]]\na = "ball"\nfriction = 0.1\nrestitution = 0.2\n[[pairs]]\na = "top"\nb = "floor"\nfriction = 0.3\n',
+        ('[[pairs]]\na = "ball"\nfriction = 0.1\nrestitution = 0.2\n'
+         '[[pairs]]\na = "top"\nb = "floor"\nfriction = 0.3\n',
          ["pairs: restitution 0 of top-floor, none was given"]),
     ],
 )  # fmt: skip

@@ -55,7 +55,6 @@ class Refusal(str):
     """Why an engine cannot be asked a scene: it says so itself, and has failed at nothing."""
 
 
-
 @dataclass(frozen=True)
 class Posed:
     """A scene posed otherwise, and the way back; ``shift`` is the largest coordinate that the map added [m]."""
@@ -90,8 +89,8 @@ class Change:
     refused
         Why the relation cannot be asked here, or what the engine said instead of an answer.
     lost
-        Whether the engine answers the scene itself and fails on the scene posed otherwise: that is a change, too. That it
-        refuses it, or does not tell a force there, is none.
+        Whether the engine answers the scene itself and fails on the scene posed otherwise: that is a change, too. That
+        it refuses it, or does not tell a force there, is none.
     """
 
     relation: str

@@ -175,7 +175,10 @@ def test_two_ends_without_a_value_are_not_the_same():
     class Silent(Engine):
         def __call__(self, index, cells):
             told = super().__call__(index, cells)
-            rows = [replace(row, value=None, error=None, physics="fail", outcome="diverged", reason="no number") for row in told.rows]
+            rows = [
+                replace(row, value=None, error=None, physics="fail", outcome="diverged", reason="no number")
+                for row in told.rows
+            ]
             return replace(told, rows=rows)
 
     found = bisect(4, [SLOT], "rebound_ratio", Silent([0.5, 0.5, 0.4, 0.4]))
