@@ -28,6 +28,7 @@ from adapters.probes import (
     STEPS,
     Case,
     Samples,
+    slide_load,
     slide_speed,
 )
 from adapters.stepping import posed_for, run
@@ -141,7 +142,11 @@ def _measured(
     silent: dict[str, tuple[str, bool]] = {}
     for name in names:
         # Bodies that meet nothing do not depend on what a pair does: measured once for all pairs.
-        own = case if PROBES[name].touches else replace(case, restitution=0.0, friction=0.0)
+        probe, own = PROBES[name], case
+        if not probe.rubs:
+            own = replace(own, friction=0.0)
+        if not probe.touches:
+            own = replace(own, restitution=0.0)
         found = _probe(engine, profile, values, own, name)
         if isinstance(found, dict):
             for quantity, numbers in found.items():
@@ -227,7 +232,7 @@ def _starved(quantity: str, told: Declared, case: Case, iterations: int, is_decl
         return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations were asked for: not told")
     if quantity not in ("friction", "friction_impulse"):
         return told
-    stop = slide_speed(case.friction) / (GRAVITY * SLIDE_TIME)
+    stop = slide_speed(case.friction) / (slide_load(case.friction) * SLIDE_TIME)
     band = case.friction / iterations if iterations > 1 else stop
     band += 2.0 * case.dt / SLIDE_TIME * case.friction
     because = f"{told.because}; {iterations} iterations were asked for, and a load may be off by 1/{iterations}"

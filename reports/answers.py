@@ -7,16 +7,16 @@ tuned cures it". Everything is read off the judged rows at the profiles' own ite
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
 from reports.cures import decided_by, told_cures
-from reports.findings import REFUSED, severity
+from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
-from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
+from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
 from validation.catalogue import CATALOGUE
 from validation.metrics import SILENT, WORDS
 from validation.posed import is_file, resolve
@@ -98,7 +98,12 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         good = [key for key, group in own.items() if not _failing(group)]
         price = {key: _price(costs or {}, scene, key) for key in good}
         good.sort(key=lambda key: price[key])
-        names = [_named(key, own[key], dimensions[scene], price[key]) for key in good]
+        untold = Counter(
+            (row["engine"], row["profile"])
+            for row in rows
+            if row["scene"] == scene and row["outcome"] == "unsupported" and row["iterations"] is None
+        )
+        names = [_named(key, own[key], dimensions[scene], price[key], untold[key]) for key in good]
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
         near = min(shares, key=lambda key: shares[key], default=None)
         nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
@@ -113,10 +118,12 @@ def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
     return known[0] if known else math.inf
 
 
-def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float) -> str:
-    """``engine/profile (2-D only, 1.2 ms/s)``."""
+def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float, untold: int) -> str:
+    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many rows it tells no number for."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
+    if untold and is_file(rows[0]["scene"]) and own >= wanted:
+        notes.append(f"{plural(untold, 'row')} not told")
     if math.isfinite(price):
         notes.append(f"{1e3 * price:.2g} ms/s")
     return "/".join(key) + (f" ({', '.join(notes)})" if notes else "")
@@ -157,6 +164,8 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
     failed = _failing(own[profile])
     engine = failed[0]["engine"]
+    if all(mark_of(row) == "invalid" for row in failed):
+        return "nothing is said of the engine, so that there is nothing to cure"
     others = {name: group for name, group in own.items() if name != profile and is_ranked(engine, name)}
     good = [name for name, group in others.items() if not _failing(group)]
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
@@ -197,7 +206,7 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
-    lost = [row for row in failing if row["value"] is None]
+    lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"{len(lost)} of {len(rows)} rows have no answer ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
     kinds: dict[str, list[Plain]] = defaultdict(list)

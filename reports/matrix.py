@@ -251,11 +251,14 @@ def legend(short: bool = False) -> str:
     if short:
         return (
             "pass 9: all 9 rows within tolerance. 3/9: 3 of 9 rows FAIL; expl.: as a law of\n"
-            "the engine predicts; known: listed with a reason; NEW, drifted: neither."
+            "the engine predicts; known: listed with a reason; NEW, drifted: neither; FAIL:\n"
+            "of an engine or a file without a list. INVALID: the measurement is broken."
         )
     return (
         "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
-        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | -: cannot be asked of this engine"
+        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | FAIL: off, and nothing is listed of "
+        "this engine or file | INVALID: the measurement is broken, nothing is said of the engine | "
+        "-: cannot be asked of this engine"
     )
 
 

@@ -6,6 +6,7 @@ import hashlib
 import json
 import shlex
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from validation.cells import format_dt, parse_dt
@@ -63,6 +64,11 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     if slot["iterations"] is not None:
         words += ["--iterations", str(slot["iterations"])]
     return shlex.join(words)
+
+
+def at(out: Path | None) -> str:
+    """`` --out DIR`` of a command that is to find the same results; empty for the usual folder."""
+    return "" if out is None or out == Path("crosscheck-out") else f" --out {shlex.quote(str(out))}"
 
 
 def row_id(row: Mapping[str, Any]) -> str:

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from adapters.engine import Array
+from adapters.near import near_pairs
 from adapters.scene import Scene
 from adapters.shapes import reach as reach
 from adapters.trajectory import Trajectory
@@ -276,7 +277,7 @@ def interface_load(
 def overlaps(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
     """Depth of the overlap of every pair that can meet and does, by body indices; each (s,) [m]."""
     found = {}
-    for i, j, _ in scene.contact_pairs():
+    for i, j in near_pairs(scene, trajectory.pose):
         a, b = scene.bodies[i].shape, scene.bodies[j].shape
         depth = overlap(a, trajectory.pose[:, i], b, trajectory.pose[:, j])
         if depth.any():

@@ -22,12 +22,12 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.meeting import meeting_pairs
 from adapters.needs import Needs
 from adapters.probes import (
-    GRAVITY,
     REBOUND_LEAD,
     REBOUND_RADIUS,
     REBOUND_SPEED,
     REBOUND_TIME,
     SLIDE_TIME,
+    slide_load,
     slide_speed,
 )
 from adapters.receipts import FRICTION_SHARE
@@ -191,16 +191,17 @@ def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str
     friction, share = needs.friction, dt / SLIDE_TIME
     because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
     if profile != "default":
-        held = WARM_STARTING * _hopping(law, needs.restitution, dt)
+        held = WARM_STARTING * _hopping(law, friction, needs.restitution, dt)
         if held:
             because = "a box that hops within the slop loads its points in turns: one without a load holds its friction"
             share += 0.5 * held
         more = Declared(friction * (1.0 + share), friction * (share + FRICTION_SHARE), because)
         return {"friction": more, "friction_impulse": more}
-    slowed = drag_share(law, slide_speed(friction), friction * GRAVITY, dt, SLIDE_TIME)
+    slowed = drag_share(law, slide_speed(friction), friction * slide_load(friction), dt, SLIDE_TIME)
     drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
     return {
-        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction, drag),
+        # What is measured is all that slows the box over its load: a step without load counts for the drag as well.
+        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction * (1.0 + slowed), drag),
         "friction_impulse": Declared(friction, 2.0 * share * friction, because),
     }
 
@@ -209,7 +210,7 @@ def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str
 UNLOADS = 0.25
 
 
-def _hopping(law: ContactLaw, e: float, dt: float) -> float:
+def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
     """Share of the sliding probe's steps in which the box may hop on its floor instead of resting on it.
 
     A box sinks by the slop in a step, ``q g dt^2``, and with restitution leaves by it in the next, for both ends of the
@@ -218,8 +219,9 @@ def _hopping(law: ContactLaw, e: float, dt: float) -> float:
     that is asked for here. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Solved without
     the last step's impulses, without slop or with a higher threshold the friction is exact.
     """
-    hop = 0.5 * GRAVITY * dt
-    if e == 0.0 or law.slop < UNLOADS * GRAVITY * dt**2 or hop <= law.threshold:
+    load = slide_load(friction)
+    hop = 0.5 * load * dt
+    if e == 0.0 or law.slop < UNLOADS * load * dt**2 or hop <= law.threshold:
         return 0.0
     hops = math.inf if e >= 1.0 else math.log(hop / law.threshold) / -math.log(e)
     return min(1.0, 2.0 * hops * dt / SLIDE_TIME)

@@ -16,6 +16,7 @@ from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.meeting import told_pairs
 from adapters.scene import Scene
 
 
@@ -144,7 +145,7 @@ class ChipmunkSimulation(Simulation):
                     "restitution": self.shapes[i].elasticity * self.shapes[j].elasticity,
                     "friction": self.shapes[i].friction * self.shapes[j].friction,
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             },
         }
 

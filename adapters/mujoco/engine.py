@@ -28,7 +28,7 @@ from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import GRAVITY, LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
 from adapters.stepping import step_count
@@ -84,7 +84,8 @@ class MujocoEngine(Engine):
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; forces of "
+                "its contacts that contradict the momentum of what it pushes are not told",
                 f"{DOC}, modeling: mocap bodies",
             ),
             Quirk(
@@ -232,7 +233,7 @@ def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str,
     ratios = []
     for k in (0.0, 1.0, -1.0) if off else (0.0,):
         (forwards, upwards, _) = box.motion(steps, speed + k * off)[-1][1]
-        ratios.append((speed + k * off - forwards) / (upwards + GRAVITY * steps * dt))
+        ratios.append((speed + k * off - forwards) / (upwards - scene.gravity[-1] * steps * dt))
     if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
         return {}  # as asked
     band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)

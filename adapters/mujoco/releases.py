@@ -108,6 +108,7 @@ class Mjcf:
         self._root = ElementTree.Element("mujoco")
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
         self._contact = ElementTree.Element("contact")
+        self._actuator = ElementTree.Element("actuator")
         self.stat = SimpleNamespace(meaninertia=None)
         self._meshes: list[ElementTree.Element] = []
         self._keys: list[ElementTree.Element] = []
@@ -118,6 +119,18 @@ class Mjcf:
         if not any(given.get("solreffriction", ())):
             given.pop("solreffriction", None)  # MuJoCo's own way of saying: as solref
         ElementTree.SubElement(self._contact, "pair", _text(given))
+
+    def add_load(self, name: str, wrench: tuple[float, ...]) -> None:
+        """Push a free body with a constant force and torque, (6,) world axes [N, N m].
+
+        An actuator without gain whose bias is 1: its gear is what acts. ``jointinparent`` means world axes.
+        """
+        joint = self.worldbody.element.find(f"body[@name='{name}']/freejoint")
+        assert joint is not None
+        joint.set("name", f"{name} joint")
+        law = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine", "biasprm": "1 0 0"}
+        given = {"name": f"{name} load", "jointinparent": f"{name} joint", "gear": _written(wrench), **law}
+        ElementTree.SubElement(self._actuator, "general", given)
 
     def add_key(self, **attributes: Any) -> None:
         """Add a state to start from."""
@@ -159,6 +172,8 @@ class Mjcf:
         self._root.append(self.worldbody.element)
         if len(self._contact):
             self._root.append(self._contact)
+        if len(self._actuator):
+            self._root.append(self._actuator)
         if self._keys:
             ElementTree.SubElement(self._root, "keyframe").extend(self._keys)
         ElementTree.indent(self._root)

@@ -61,8 +61,7 @@ class Spec:
 
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
         self.spec = spec or empty_spec(mujoco)
-        pairs = list(scene.contact_pairs())
-        materials = {(material.restitution, material.friction) for _, _, material in pairs}
+        materials = scene.materials()
         #: Softness of pairs that have one of their own: solref, solimp, solreffriction, margin.
         self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
         one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
@@ -75,7 +74,7 @@ class Spec:
         for index, body in enumerate(scene.bodies):
             self._body(index, body)
         if self.shared is None:
-            for a, b, material in pairs:
+            for a, b, material in scene.contact_pairs():
                 self._pair(a, b, material.restitution, material.friction)
 
     def _options(self) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from adapters.drives import as_moving
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
-from adapters.probes import GRAVITY, SLIDE_TIME, slide_speed
+from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
 from adapters.reference.profiles import PROFILES, SOURCE
 from adapters.reference.script import python
@@ -159,8 +159,9 @@ class ReferenceEngine(Engine):
         fixed = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}["residual"] is None
         if not fixed or needs.dimension == 2 or not needs.restitution > 0.0 < needs.friction:
             return {}
-        slowest = slide_speed(needs.friction) - needs.friction * GRAVITY * SLIDE_TIME
-        share = 0.5 * ((1.0 + needs.restitution) * GRAVITY * dt / slowest) ** 2
+        load = slide_load(needs.friction)
+        slowest = slide_speed(needs.friction) - needs.friction * load * SLIDE_TIME
+        share = 0.5 * ((1.0 + needs.restitution) * load * dt / slowest) ** 2
         because = "a box that fixed sweeps let rock slips aside at its corners, by (1 + e) g dt: 1 - cos of friction"
         band = (0.5 * share + FRICTION_SHARE) * needs.friction
         told = Declared((1.0 - 0.5 * share) * needs.friction, band, because)

@@ -21,12 +21,13 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.cures import Change, changes, how_measured, pasteable, told_cure
-from reports.findings import ALARMING, Family, families, grouped, severity
+from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
 from reports.wording import (
     LABELS,
+    at,
     mark_of,
     measured,
     missing_text,
@@ -39,7 +40,7 @@ from reports.wording import (
 )
 from validation.bench import reading
 from validation.cells import Observation, Slot, checks_of
-from validation.judging.rows import rows_of
+from validation.judging.rows import is_alarming, rows_of
 from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
@@ -126,7 +127,7 @@ def show(run: str, every: bool, as_json: bool, out: Path) -> None:
         click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
-    show_summary(rows, console, costs, every=every)
+    show_summary(rows, console, costs, every=every, out=out)
     kept.say_missing()
     report = out / "report.html"
     if report.is_file():
@@ -183,7 +184,7 @@ def findings(
     # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
-        rows = [row for row in rows if mark_of(row) in ALARMING]
+        rows = [row for row in rows if is_alarming(row)]
     if every:
         chosen = [row for _, group in grouped(rows) for row in group]
         if as_json:
@@ -195,7 +196,7 @@ def findings(
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails")
+    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails", out)
 
 
 def _grid(*headings: str) -> Table:
@@ -205,7 +206,7 @@ def _grid(*headings: str) -> Table:
     return table
 
 
-def _print_families(found: Sequence[Family], console: Console, nothing: str) -> None:
+def _print_families(found: Sequence[Family], console: Console, nothing: str, out: Path | None = None) -> None:
     if not found:
         console.print(nothing)
         return
@@ -221,11 +222,12 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str) -> 
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
-    console.print(Text("crosscheck explain ID says everything about a row; --all lists every row."), style="dim")
+    said = f"crosscheck explain ID{at(out)} says everything about a row; --all lists every row."
+    console.print(Text(said), style="dim")
 
 
 def _worst(row: Plain) -> str:
-    if row["value"] is None:
+    if not has_answer(row):
         return f"{row['dimension']}-D {row['metric']}: {row['reason']}"
     asked = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
     where = " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), asked) if text)
@@ -396,6 +398,13 @@ def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
     return ""
 
 
+def _measured_text(row: Plain) -> str:
+    if row["value"] is None:
+        return f"no value: {row['reason']}"
+    text = f"{row['metric']} = {measured(row, 8)}"
+    return text if has_answer(row) else f"{text}, which does not count: the measurement is broken"
+
+
 def _print_explanation(
     row: Plain, beside: str, better: str, paste: str, differing: Sequence[Change], console: Console
 ) -> None:
@@ -409,10 +418,7 @@ def _print_explanation(
         ("row", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
         ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
         ("asked", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
-        (
-            "measured",
-            f"{row['metric']} = {measured(row, 8)}" if row["value"] is not None else f"no value: {row['reason']}",
-        ),
+        ("measured", _measured_text(row)),
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),

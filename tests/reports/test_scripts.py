@@ -18,6 +18,7 @@ from adapters.trajectory import Sampling
 from reports.command import main
 from reports.scripts import written
 from validation.cells import Slot, prepare, settings_of
+from validation.files.scene_files import load_scene
 from validation.posed import pinned
 
 DT = 1.0 / 240.0
@@ -354,12 +355,30 @@ def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimensio
     assert np.array_equal(pose, ended(slot)[0][moving])
 
 
-def test_mjcf_says_what_it_has_no_word_for(tmp_path):
-    pytest.importorskip("mujoco")
+def test_mjcf_pushes_a_loaded_body_as_its_cell_does(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "loaded.toml"
     path.write_text(LOADED.format(**SPATIAL))
     done = CliRunner().invoke(main, ["export", str(path), "--engine", "mujoco", "--to", "mjcf"])
-    assert done.exit_code == 2 and "box.force: MJCF has no word" in done.output
+    assert done.exit_code == 0, done.output
+    scene = load_scene(path)
+    assert any(body.is_loaded for body in scene.bodies)
+    model = mujoco.MjModel.from_xml_string(done.output)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mujoco.mj_forward(model, data)
+    pushed = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, pushed, model.key("start").id)
+    model.actuator_biasprm[:] = 0.0
+    for i, body in enumerate(scene.bodies):
+        if body.is_loaded:
+            pushed.xfrc_applied[model.body(f"body{i}").id] = (*body.force, *body.torque)
+    mujoco.mj_forward(model, pushed)
+    assert data.qfrc_actuator.any() and np.allclose(data.qacc, pushed.qacc, rtol=1e-12, atol=1e-12)
+
+
+def test_mjcf_says_what_it_has_no_word_for():
+    pytest.importorskip("mujoco")
     done = CliRunner().invoke(main, ["export", "slide", "--engine", "mujoco", "--profile", "matched", "--to", "mjcf"])
     assert done.exit_code == 2 and "rounds: MJCF has no word for a loop around the solver" in done.output
 

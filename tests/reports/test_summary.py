@@ -12,7 +12,7 @@ from rich.console import Console
 
 from reports.answers import answers, choices
 from reports.command import main, showing
-from reports.findings import grouped
+from reports.findings import finding_line, grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity, row_id
@@ -237,6 +237,19 @@ def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
     assert "chipmunk is planar" not in text and "Nothing was judged" not in text
 
 
+def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
+    why = "receipt size: measured 0.98, declared 1 +- 0.0035"
+    lost = {"outcome": "invalid", "reason": why, "physics": None}
+    whole = row("impact", 2, "bullet", "tuned", value=1.0, truth=1.0) | lost
+    broken = [whole | {"metric": metric} for metric in ("a", "b[1]", "b[2]")]
+    rows = [*broken, row("impact", 2, "bullet", "one")]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 rows)" in text
+    assert f"bullet/tuned impact: 3 of 3 rows have no answer (INVALID: {why}); nothing is said of the engine" in text
+    assert "truth 1" not in text and "one cures it" not in text
+    assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
+
+
 # ---- a real run ----
 
 
@@ -431,3 +444,12 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
 def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):
     (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
     assert answer.wrong == f"{words} (e=1 v=1)"
+
+
+def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp_path):
+    rows = [row("impact", 2, "bullet", "tuned", "new", 0.1)]
+    for out, said in ((Path("crosscheck-out"), ""), (None, ""), (tmp_path / "a b", f" --out '{tmp_path}/a b'")):
+        lines = shown(rows, 200, out=out)
+        for command in ("crosscheck findings", "crosscheck explain ID", "crosscheck report --open"):
+            assert any(line.startswith(f"  {command}{said} ") for line in lines)
+        assert said or not any("--out" in line for line in lines)

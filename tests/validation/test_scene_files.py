@@ -330,3 +330,32 @@ def test_a_spatial_scene_has_no_plane_to_leave(tmp_path):
     )
     with pytest.raises(SceneError, match="growth: a spatial scene has no plane"):
         load_stated(path)
+
+
+# ---- numbers of pairs that nobody gives ----
+
+
+def pairs_notes(tmp_path, pairs):
+    """Notes about pairs of a scene of a floor and two balls, with these entries in the place of its own."""
+    other = GOOD[GOOD.index('[[bodies]]\nname = "ball"') : GOOD.index("[[pairs]]")].replace('"ball"', '"top"')
+    path = tmp_path / "scene.toml"
+    path.write_text(GOOD[: GOOD.index("[[pairs]]")] + other.replace("[0.0, 1.0, 0.0]", "[5.0, 3.0, 0.0]") + pairs)
+    return [note for note in load_stated(path).notes if note.startswith("pairs:")]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "said"),
+    [
+        ("", ["pairs: restitution 0 and friction 0 of all pairs, none was given"]),
+        ("[[pairs]]\nrestitution = 0.1\n", ["pairs: friction 0 of all pairs, none was given"]),
+        ("[[pairs]]\nfriction = 0.1\n", ["pairs: restitution 0 of all pairs, none was given"]),
+        ("[[pairs]]\nfriction = 0.0\nrestitution = 0.0\n", []),
+        ('[[pairs]]\na = "floor"\nb = "ball"\nfriction = 0.1\nrestitution = 0.2\n',
+         ["pairs: restitution 0 and friction 0 of pairs that no entry names, none was given"]),
+        ('[[pairs]]\na = "ball"\nfriction = 0.1\nrestitution = 0.2\n'
+         '[[pairs]]\na = "top"\nb = "floor"\nfriction = 0.3\n',
+         ["pairs: restitution 0 of top-floor, none was given"]),
+    ],
+)  # fmt: skip
+def test_friction_and_restitution_that_a_file_leaves_out_are_said(tmp_path, pairs, said):
+    assert pairs_notes(tmp_path, pairs) == said

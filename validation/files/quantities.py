@@ -42,7 +42,7 @@ def force_window(scene: Scene) -> float:
 
 def quantity(scene: Scene, trajectory: Trajectory, name: str, at: float | None = None) -> Measured:
     """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None; forces are means over `force_window`."""
-    partner, body, what = parts_of(name, [member.name for member in scene.bodies])
+    partner, body, what = parts_of(name, scene.places.keys())
     if what.startswith("f"):
         return _force(scene, trajectory, scene.index(body), partner, "fxfyfz".index(what) // 2)
     values = _history(trajectory, scene.index(body), what)
@@ -85,13 +85,13 @@ def _force(scene: Scene, trajectory: Trajectory, body: int, partner: str | None,
     contacts = trajectory.contacts
     if contacts is None or len(contacts.step) == 0:
         return None, "contacts were not recorded"
-    others = range(len(scene.bodies)) if partner is None else [scene.index(partner)]
     late = trajectory.t[contacts.step] > trajectory.t[-1] - force_window(scene) + 0.5 * trajectory.dt
-    total = np.zeros(int(late.sum()))
-    for other in others:
-        if other != body:
-            sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
-            total += sign * contacts.impulse_between(other, body)[late, axis]
+    if partner is None:
+        total = contacts.impulse_on(body)[late, axis]
+    else:
+        other = scene.index(partner)
+        sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
+        total = sign * contacts.impulse_between(other, body)[late, axis]
     if np.isnan(total).any():
         return None, UNAVAILABLE
     return float(total.sum() / (len(total) * trajectory.dt)), ""

@@ -1,8 +1,8 @@
 """Format of a scene file: its fields, and how what a user states becomes a scene.
 
-Types are checked here by pydantic, physics by `adapters.scene.Scene`. Three things are filled in or put right, and each
-is said in a note that goes with the scene: the mass and the moments of inertia of a free body that gives none, and
-the length of a half-space's normal.
+Types are checked here by pydantic, physics by `adapters.scene.Scene`. Four things are filled in or put right, and each
+is said in a note that goes with the scene: the mass and the moments of inertia of a free body that gives none, the
+restitution and friction of pairs that nobody gives, and the length of a half-space's normal.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator
 
+from adapters.materials import Materials
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
 from adapters.shapes import MOST_VERTICES, check_length
@@ -236,12 +237,29 @@ def stated(model: SceneModel) -> Stated:
     for quantity, at in dict.fromkeys(quantities):
         if quantities.count((quantity, at)) > 1:
             wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
+    notes += _materials(model, scene)
     names = dict(told(model, scene, wrong))
     made = [_stated(label, check, scene, names, wrong) for label, check in right]
     growth = _growth(model, scene, names, wrong)
     if wrong:
         raise SceneErrors(list(dict.fromkeys(wrong)))
     return Stated(scene, tuple(notes), tuple(check for check in made if check is not None), growth)
+
+
+def _materials(model: SceneModel, scene: Scene) -> Iterator[str]:
+    """What is filled in of pairs: numbers that an entry leaves out, and pairs that no entry is about."""
+    for pair in model.pairs:
+        left = [name for name in ("restitution", "friction") if name not in pair.model_fields_set]
+        which = "all pairs" if (pair.a, pair.b) == (Pair.a, Pair.b) else f"{pair.a}-{pair.b}"
+        for name in left:
+            yield f"pairs: {name} {getattr(Pair, name):g} of {which}, none was given"
+    if any((pair.a, pair.b) == (Pair.a, Pair.b) for pair in scene.pairs):
+        return
+    untold = Pair(restitution=-1.0, friction=-1.0)  # no scene has such numbers
+    free = {body.name: body.motion == "free" for body in scene.bodies}
+    if (-1.0, -1.0) in Materials((*scene.pairs, untold)).materials(free):
+        which = "pairs that no entry names" if scene.pairs else "all pairs"
+        yield f"pairs: restitution {Pair.restitution:g} and friction {Pair.friction:g} of {which}, none was given"
 
 
 def _growth(model: SceneModel, scene: Scene, names: dict[str, float], wrong: list[str]) -> float:

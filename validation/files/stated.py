@@ -13,10 +13,14 @@ from typing import Any
 
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
+from validation import metrics
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.files import invariants
 from validation.files.expressions import value_of
 from validation.files.quantities import force_window, quantity, shown_quantities, unit
+
+#: Source of the numbers that the author of a scene states.
+STATED = "the scene file's [[checks]]"
 
 
 @dataclass(frozen=True)
@@ -95,12 +99,14 @@ def _metric(name: str, at: float | None = None) -> str:
 
 
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
+    overlaps: invariants.Overlaps = {}
     try:
-        beyond, depth = invariants.deepest(read.scene, trajectory)
+        overlaps = metrics.overlaps(read.scene, trajectory)
+        beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
         beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
     measured: dict[str, Measured] = {
-        "energy_growth": invariants.energy_growth(read.scene, trajectory),
+        "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
         "deepest_overlap": depth,
     }
@@ -120,6 +126,4 @@ def _checks(read: Stated, dt: float) -> list[Check]:
 
 
 def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
-    return Check(
-        metric, unit(check.quantity), check.value, check.bound(dt), check.because, "the scene file's [[checks]]"
-    )
+    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED)
