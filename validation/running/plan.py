@@ -123,7 +123,8 @@ def _engine_slots(
 
 def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> tuple[tuple[str, Any], ...]:
     """Settings of a user's own, as the engine takes them; as they are where it is not here."""
-    sets = tuple((str(name), value) for name, value in request.sets)
+    # A request that another process hands over has lists for tuples.
+    sets = tuple((str(name), tuple(value) if isinstance(value, list) else value) for name, value in request.sets)
     if request.iterations and any(name == "iterations" for name, _ in sets):
         raise EngineError("set: iterations are asked for by --iterations as well")
     return sets if engine is None or not sets else own(engine, sets, settings_of(engine, slot, scene))
