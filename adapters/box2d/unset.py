@@ -68,7 +68,7 @@ UNSET = (
           partial(unset.sleep, Bare), 2.0 * Bare.dt),
     Unset("gap at rest [m]", "0.015: two skins of 1 cm, less the slop of 5 mm", _COMPILED,
           2.0 * POLYGON_RADIUS - LINEAR_SLOP, partial(unset.rest, Bare), 2e-3),
-    Unset("left of 0.2 m of overlap [m]", "0.005, less the skin of 1 cm: slop of a ball", _COMPILED,
+    Unset("left of 0.2 m of overlap [m]", "-0.005: the slop of 5 mm lies within the skin of 1 cm", _COMPILED,
           LINEAR_SLOP - POLYGON_RADIUS, partial(unset.left, Bare), 2e-3),
     Unset("gravity, upwards [m/s^2]", "-10 in the bindings", "pybox2d, b2World", -10.0, partial(unset.gravity, Bare)),
     Unset("step [s]", "none: each call has its own", "b2World.h, Step"),

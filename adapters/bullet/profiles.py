@@ -200,6 +200,8 @@ def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
             raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
     if settings.get("enableSAT", 0) not in (0, 1):
         raise EngineError(f"enableSAT: {settings['enableSAT']!r} must be 0 or 1")
+    if len({"contactDamping", "contactStiffness"} & set(settings)) == 1:
+        raise EngineError("contactStiffness: bullet takes it together with contactDamping only")
     iterations = settings.get("iterations", 50)
     if iterations != int(iterations) or iterations < 1:
         raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")
