@@ -96,7 +96,7 @@ def test_the_command_that_runs_a_row_again_asks_for_the_same_cell(ran):
 
 
 def test_the_same_command_resumes_and_another_value_is_another_run(ran, tmp_path):
-    out, rows = ran
+    _, rows = ran
     call("run", "bounce", "--param", "e=0.5", "--dim", 2, "--set", "damping=0.25", "--out", tmp_path, status=0)
     store = Store(tmp_path)
     kept = store.observations(store.run("latest"))
