@@ -1,16 +1,19 @@
 """`--set` on the command line: what is planned, run, stored, shown, explained, exported and asked of releases."""
 
+import io
 import json
 import math
 import shlex
 
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from reports.command import main
 from reports.command.releasing import _commands
 from reports.command.running import run
 from reports.command.selection import request_from
+from reports.matrix import matrix_of, tables_of
 from reports.wording import reproduce
 from validation.cells import slot_from_dict
 from validation.records.store import Store
@@ -60,6 +63,24 @@ def test_it_is_shown_under_its_name_at_any_width(ran, width, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     text = call("show", "--out", ran[0], status=0).output
     assert PROFILE in text and all(len(line.rstrip()) <= width for line in text.splitlines() if "/" not in line)
+
+
+def test_a_name_that_leaves_no_room_for_a_scene_has_a_line_for_each_setting():
+    """A count that is cut would be another count."""
+    name = "default+cone=elliptic+solimp=0.99,0.99,0.001,0.5,2+solref=0.004,1"
+    rows = [
+        {"scene": "pinch", "dimension": 3, "engine": "mujoco", "profile": name, "iterations": None, "outcome": "ok",
+         "standing": None, "physics": physics}
+        for physics in ("pass",) * 7 + ("fail",) * 5
+    ]  # fmt: skip
+    for width, lines in ((80, 3), (120, 1)):
+        console = Console(width=width, record=True, file=io.StringIO())
+        for table in tables_of(matrix_of(rows), {}, width):
+            console.print(table)
+        text = console.export_text()
+        assert "FAIL 5/12" in text and all(len(line.rstrip()) <= width for line in text.splitlines())
+        assert sum("=" in line for line in text.splitlines()) == lines
+        assert "".join(text.split("mujoco")[1].split()).startswith(name.partition("+")[0])
 
 
 def test_findings_and_explain_find_it_by_name_and_by_set(ran):
