@@ -95,6 +95,8 @@ def test_engines_that_know_all_settings_are_asked_where_none_is_named():
     request = Request(["bounce"], names, sets=(("collision_slop", 0.01),))
     assert knowing(request) == ["chipmunk"]
     assert set(knowing(replace(request, sets=(("iterations", 3),)))) >= {"chipmunk", "reference"}
+    with pytest.raises(EngineError, match="set: collision_slop=deep: must be a number of at least 0"):
+        knowing(replace(request, sets=(("collision_slop", "deep"),)))
     with pytest.raises(
         EngineError, match="no engine that is here has a setting 'collision_slot'; near it: collision_slop"
     ):

@@ -131,23 +131,30 @@ def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> t
 
 
 def knowing(request: Request) -> list[str]:
-    """Engines of a request that have all settings which it sets, and are here.
+    """Engines of a request that have all settings which it sets, take their values, and are here.
 
     Raises
     ------
     EngineError
-        If there is none: who has which, or what is near it.
+        If there is none: who has which, what is near it, or why the value cannot be taken.
     """
     canonical = resolve(pinned(request.scenes[0]))
     wanted = needs(canonical.scene(canonical.dimensions[-1]))
-    known: dict[str, set[str]] = {}
-    for name in request.engines:
-        engine = find(name).engine
-        profile = engine.settings(_one_profile(name), wanted, QUICK_DT) if engine else []
-        known[name] = set(kinds_of(engine, profile)) if engine else set()
+    here = {name: engine for name in request.engines if (engine := find(name).engine) is not None}
+    profiles = {name: engine.settings(_one_profile(name), wanted, QUICK_DT) for name, engine in here.items()}
+    known = {name: set(kinds_of(engine, profiles[name])) for name, engine in here.items()}
     asked = [name for name, _ in request.sets]
-    found = [engine for engine, names in known.items() if names.issuperset(asked)]
+    found, refused = [], []
+    for name in (name for name, names in known.items() if names.issuperset(asked)):
+        try:
+            own(here[name], request.sets, profiles[name])
+        except EngineError as error:
+            refused.append(error)
+        else:
+            found.append(name)
     if not found:
+        if refused:
+            raise refused[0]
         who = {name: [engine for engine, names in known.items() if name in names] for name in asked}
         lost = next((name for name in asked if not who[name]), None)
         if lost is not None:
