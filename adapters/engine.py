@@ -272,6 +272,8 @@ class Engine(ABC):
     profiles: Mapping[str, ProfileRule]
     #: What the adapter knows of other releases; None: nothing, its package is the only distribution.
     releases: Releases | None = None
+    #: Settings that a user may set beside a profile's own, by name, with what each must be (`adapters.settings`).
+    kinds: Mapping[str, Callable[[Any], str]] = MappingProxyType({})
     #: Conformance checks that it is known to fail.
     expected: tuple[Expected, ...] = ()
     #: What a run can be written as for the engine alone, by the name of the format (``crosscheck export --to``). The
@@ -304,6 +306,19 @@ class Engine(ABC):
     def refusal(self, scene: Scene, profile: str, dt: float) -> str | None:
         """Why this engine cannot run ``scene`` in steps of ``dt`` [s], or None: such a cell is UNSUPPORTED."""
         return self.refuses(scene, profile) or self.too_coarse(scene, dt)
+
+    def settable(self) -> Mapping[str, Callable[[Any], str]]:
+        """`kinds` of the release that is installed."""
+        return self.kinds
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:  # noqa: B027  (`build` checks them in any case)
+        """Refuse settings that `build` would refuse, whatever the scene is, before anything runs.
+
+        Raises
+        ------
+        EngineError
+            Naming the setting.
+        """
 
     @abstractmethod
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
-from adapters.bullet.profiles import BODY, PROFILES, WORLD, law_of
+from adapters.bullet.profiles import BODY, KINDS, PROFILES, WORLD, checked, law_of
 from adapters.bullet.releases import RELEASES
 from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE, WARM_STARTING
@@ -110,6 +110,7 @@ class BulletEngine(Engine):
         quirks=_QUIRKS,
     )
     profiles = PROFILES
+    kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
 
@@ -132,6 +133,10 @@ class BulletEngine(Engine):
             if factors(scene, coefficient) is None:
                 return f"{coefficient}: bullet multiplies values of bodies, no product gives this table of pairs"
         return None
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> BulletSimulation:
         """Make a world in a new DIRECT client.

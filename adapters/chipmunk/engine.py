@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from adapters.chipmunk.profiles import PROFILES, checked
+from adapters.chipmunk.profiles import KINDS, PROFILES, checked
 from adapters.chipmunk.releases import RELEASES, installed_version
 from adapters.chipmunk.script import python
 from adapters.chipmunk.simulation import ChipmunkSimulation
@@ -79,6 +79,7 @@ class ChipmunkEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
 
@@ -99,6 +100,10 @@ class ChipmunkEngine(Engine):
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
         """Steps in which a body could pass the ground's polygon."""
         return leaves_ground(scene, dt)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.chipmunk.profiles import UNSET
 from adapters.chipmunk.releases import point_impulses
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
@@ -34,6 +35,9 @@ class ChipmunkSimulation(Simulation):
         self.space.collision_slop = settings["collision_slop"]
         self.space.collision_bias = settings["collision_bias"]
         self.space.collision_persistence = settings["collision_persistence"]
+        for name in UNSET:
+            if name in settings:
+                setattr(self.space, name, settings[name])
         self.bodies = [made_body(body) for body in scene.bodies]
         self.shapes = [made_shape(scene, a, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
         for asked, shape in zip(scene.bodies, self.shapes, strict=True):

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.dart.profiles import CONES, MOST_BOXES, PROFILES, checked, solved
+from adapters.dart.profiles import CONES, KINDS, MOST_BOXES, PROFILES, checked, solved
 from adapters.dart.releases import RELEASES, refusal
 from adapters.dart.script import python
 from adapters.dart.shipped import MIXING, PUSH_OUT, SMOOTH, THRESHOLD, restitution
@@ -86,6 +86,7 @@ class DartEngine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -107,6 +108,10 @@ class DartEngine(Engine):
         if frictions(scene) is None:
             return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
         return refusal(profile)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -19,6 +19,7 @@ from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.combination import MINVAL
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
+from adapters.mujoco.options import own_kinds
 from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
@@ -31,6 +32,7 @@ from adapters.needs import Needs
 from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
+from adapters.settings import Check
 from adapters.stepping import step_count
 
 #: Phases of a step over which a rebound is declared.
@@ -124,6 +126,14 @@ class MujocoEngine(Engine):
                 if a + b < c * (1.0 - 1e-9):
                     return f"{body.name}.inertia: {a:g} + {b:g} < {c:g}, no mass distribution has these moments"
         return None
+
+    def settable(self) -> Mapping[str, Check]:
+        """See `Engine.settable`."""
+        return own_kinds()
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        check_settings(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -149,21 +149,23 @@ class Mjcf:
         ElementTree.SubElement(self._root, "compiler", {"angle": "radian"})
         said = dict(vars(self.option))
         mj = self._mujoco
-        flags = int(said.pop("disableflags", 0))
+        flags, enabled = int(said.pop("disableflags", 0)), int(said.pop("enableflags", 0))
         said["integrator"] = mj.mjtIntegrator(said["integrator"]).name.removeprefix("mjINT_")
-        said["integrator"] = {"EULER": "Euler"}.get(said["integrator"], said["integrator"])
-        if said["integrator"].startswith("IMPLICIT"):
-            said["integrator"] = said["integrator"].lower()
+        said["integrator"] = {"EULER": "Euler", "RK4": "RK4"}.get(said["integrator"], said["integrator"].lower())
         said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
+        if "jacobian" in said:
+            said["jacobian"] = mj.mjtJacobian(said["jacobian"]).name.removeprefix("mjJAC_").lower()
         if "solver" in said:
             solver = mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_")
             said["solver"] = {"NEWTON": "Newton"}.get(solver, solver)
         option = ElementTree.SubElement(self._root, "option", _text(said))
         members = mj.mjtDisableBit.__members__.values()  # one of them is their number
-        bits = [bit for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
-        if bits:
-            names = [bit.name.removeprefix("mjDSBL_").lower() for bit in bits]
-            ElementTree.SubElement(option, "flag", dict.fromkeys(names, "disable"))
+        off = [bit.name for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
+        on = [bit.name for bit in mj.mjtEnableBit.__members__.values() if int(bit) & enabled]
+        if off or on:
+            said = {name.removeprefix("mjDSBL_").lower(): "disable" for name in off}
+            said |= {name.removeprefix("mjENBL_").lower(): "enable" for name in on}
+            ElementTree.SubElement(option, "flag", said)
         if self.stat.meaninertia is not None:
             ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
         if self._meshes:

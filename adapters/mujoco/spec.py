@@ -11,7 +11,9 @@ import numpy as np
 from adapters.drives import velocity_over
 from adapters.engine import Array, EngineError
 from adapters.mujoco.moving import is_moved_face
+from adapters.mujoco.options import set_own
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
+from adapters.mujoco.profiles import own_settings
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
@@ -90,6 +92,7 @@ class Spec:
             option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{name.upper()}"))
         if "solver" in settings:
             option.solver = getattr(mj.mjtSolver, f"mjSOL_{settings['solver'].upper()}")
+        set_own(mj, option, own_settings(settings))
 
     def _body(self, index: int, body: Body) -> None:
         world = self.spec.worldbody

@@ -25,7 +25,7 @@ from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Q
 from adapters.needs import Needs
 from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
-from adapters.reference.profiles import PROFILES, SOURCE
+from adapters.reference.profiles import KINDS, PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
@@ -65,6 +65,7 @@ class ReferenceEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -97,6 +98,13 @@ class ReferenceEngine(Engine):
             return None
         return overlap_at_the_start(scene) or too_far_at_the_start(scene)
 
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        try:
+            _checked(settings, 1.0)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise EngineError(str(error).splitlines()[0]) from None
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.
 
@@ -105,16 +113,8 @@ class ReferenceEngine(Engine):
         EngineError
             For a model or a setting that the solver refuses, or a setting it does not have.
         """
-        from reference_solver import Settings
-
-        known = [field.name for field in fields(Settings) if field.name != "dt"]
-        for name, value in settings.items():
-            if name not in known:
-                raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
-            if isinstance(value, int) and value > LARGEST:
-                raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
         try:
-            return ReferenceSimulation(scene, solver_model(scene), Settings(dt=dt, **settings))
+            return ReferenceSimulation(scene, solver_model(scene), _checked(settings, dt))
         except (ValueError, TypeError) as error:
             raise EngineError(str(error).splitlines()[0]) from error
         except OverflowError as error:
@@ -177,6 +177,27 @@ class ReferenceEngine(Engine):
         """Python: the solver's settings."""
         changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
         return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
+
+
+def _checked(settings: Mapping[str, Any], dt: float) -> Any:
+    """Settings of the solver for steps of ``dt`` [s].
+
+    Raises
+    ------
+    EngineError
+        For a setting that it does not have, or a whole number that a kernel cannot hold.
+    ValueError, TypeError, OverflowError
+        For a value that it refuses.
+    """
+    from reference_solver import Settings
+
+    known = [field.name for field in fields(Settings) if field.name != "dt"]
+    for name, value in settings.items():
+        if name not in known:
+            raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
+        if isinstance(value, int) and value > LARGEST:
+            raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
+    return Settings(dt=dt, **settings)
 
 
 def _package_version() -> str:

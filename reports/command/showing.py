@@ -14,12 +14,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from adapters.own_settings import given, suffix_of
 from adapters.scene import SceneError
 from reports import speed
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
+from reports.command.selection import SET
 from reports.cures import Change, changes, how_measured, pasteable, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
@@ -250,14 +252,16 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
 @main.command()
 @click.argument("row", shell_complete=row_ids)
 @click.option("--run", default="latest", show_default=True, help="Which run.")
+@SET
 @AS_JSON
 @OUT
-def explain(row: str, run: str, as_json: bool, out: Path) -> None:
+def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) -> None:
     """Say everything about one ROW: what was asked and measured, the truth, the tolerance and why, what cures it.
 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
-    row there; SCENE may be the path of a scene file.
+    row there; SCENE may be the path of a scene file. With --set the row is that of PROFILE with these settings.
     """
+    row = _with_own(row, set)
     kept = observed(out, run)
     observations = _where(kept.observations, row)
     rows = judged(kept.run, observations)
@@ -285,6 +289,21 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
         )
         return
     _print_explanation(found, _beside_the_plane(rows, found), better, paste, differing, terminal())
+
+
+def _with_own(row: str, sets: Sequence[str]) -> str:
+    """The row's name, with the profile that has these settings.
+
+    Raises
+    ------
+    SceneError
+        If ``row`` is an id, which has settings or has none.
+    """
+    engine, slash, rest = row.partition("/")
+    profile, more, where = rest.partition("/")
+    if sets and not (slash and more):
+        raise SceneError(f"set: names a profile; say ENGINE/PROFILE/SCENE in the place of {row!r}")
+    return f"{engine}{slash}{profile}{suffix_of(given(sets))}{more}{where}"
 
 
 def _where(observations: Sequence[Observation], name: str) -> list[Observation]:

@@ -36,6 +36,8 @@ ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
 #: Why a row of a model has no standing.
 OWN_MODEL = "not listed: your own model"
+#: Why a row of a profile with settings of a user's own has none.
+OWN_SETTINGS = "not listed: with settings of your own"
 #: What laws say about rows, asked ahead of the others.
 Ready = Mapping[Asked, list[Prediction]]
 #: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
@@ -191,7 +193,7 @@ def _verdict(
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
-    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene):
+    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene) and not slot.is_own:
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
@@ -200,6 +202,8 @@ def _verdict(
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     if check.source == STATED:  # its author knows the number: no list excuses an engine
         return Known(None, True)
+    if slot.is_own:
+        return Known(None, False, "; ".join([OWN_SETTINGS, *_not_as_asked(observation)]))
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
         return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
     if is_model(slot.scene):  # nothing can be listed of it
@@ -208,6 +212,12 @@ def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     if why_not:
         return Known(None, False, why_not)
     return known_of(slot, check.metric, observation.engine_version, findings)
+
+
+def _not_as_asked(observation: Observation) -> list[str]:
+    """What probes measured of settings of a user's own that is not what the scene asks for."""
+    off = [slip for slip in observation.receipts if not slip["holds"] and slip["measured"] is not None]
+    return [f"{s['quantity']} asked {s['asked']:.4g}, measured {s['measured']:.4g}" for s in off]
 
 
 def _findings(engine: str) -> tuple[Findings | None, str]:
@@ -246,10 +256,10 @@ def _certificate(observation: Observation, check: Check) -> str:
 def _is_asked(observation: Observation, check: Check) -> bool:
     """Whether laws are asked about a row: a FAIL of a cell of the catalogue.
 
-    A file that has the name of a scene is another scene. At iterations asked for those laws alone answer that follow
-    an engine's sweeps.
+    A file that has the name of a scene is another scene, and laws know the settings of profiles only. At iterations
+    asked for those laws alone answer that follow an engine's sweeps.
     """
-    if observation.outcome is not Outcome.OK or is_file(observation.slot.scene):
+    if observation.outcome is not Outcome.OK or is_file(observation.slot.scene) or observation.slot.switched:
         return False
     return judge_physics(observation.metrics.get(check.metric, (None, ""))[0], check) is Physics.FAIL
 
@@ -271,6 +281,8 @@ def predictions_of(row: Row) -> list[Prediction]:
     if row.physics != Physics.FAIL.value or len(row.cells) > 1 or is_file(row.scene):
         return []
     slot = slot_from_dict(row.slot)
+    if slot.switched:
+        return []
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     try:
         return predictions(slot, row.engine_version, row.metric, scene)

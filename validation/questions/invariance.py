@@ -369,7 +369,7 @@ def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) 
         return posed
     try:
         engine = load(slot.engine)
-        refusal = checked_refusal(engine.refusal(posed_for(engine, posed.scene), slot.profile, slot.dt))
+        refusal = checked_refusal(engine.refusal(posed_for(engine, posed.scene), slot.base, slot.dt))
         if refusal:
             return Refusal(refusal)
         # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
