@@ -89,8 +89,7 @@ def reasons(tally: Array) -> tuple[str, ...]:
     """Return what keeps a run from serving as truth, one sentence each; empty if nothing does."""
     missed = [gate for gate in GATES if not tally[gate.entry] <= gate.limit]
     found = [f"{gate.meaning}: {gate.name} {tally[gate.entry]:.3g}, at most {gate.limit:.3g}" for gate in missed]
-    located = tally[entries.EVENTS_LOCATED] > 0.0 or tally[entries.STEPS_HELD] > 0.0
-    if located and not tally[entries.PENETRATION] <= LOCATED_OVERLAP:
+    if tally[entries.SUB_STEPS] > 0.0 and not tally[entries.PENETRATION] <= LOCATED_OVERLAP:
         overlap = f"penetration {tally[entries.PENETRATION]:.3g}, at most {LOCATED_OVERLAP:.3g}"
         found.append(f"bodies overlap where events are located: {overlap}")
     if tally[entries.NOT_FINITE] > 0.0:

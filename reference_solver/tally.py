@@ -51,7 +51,7 @@ UNIQUE = 25
 
 #: Worst overlap at the start of the run, as a share of the smaller half width.
 START_OVERLAP = 26
-#: Contact solves opened, contacts or none; tells the first.
+#: Contact solves opened, contacts or none, and at least 1 after the first part of a step; tells the solve of the start.
 OPENED = 27
 #: Coarsest last place of a body's coordinates, as a share of its smallest half width.
 RESOLUTION = 28
@@ -59,8 +59,10 @@ RESOLUTION = 28
 EXHAUSTED = 29
 #: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
 CONTRADICTED_A, CONTRADICTED_B = 30, 31
+#: Parts of steps that are cut at events (E19).
+SUB_STEPS = 32
 
-SIZE = 32
+SIZE = 33
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (
@@ -78,6 +80,7 @@ SUMS = (
     STEPS_HELD,
     UNIQUE,
     EXHAUSTED,
+    SUB_STEPS,
 )
 
 

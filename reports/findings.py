@@ -20,8 +20,7 @@ Plain = Mapping[str, Any]
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
 #: Outcomes of cells that were not run, and what they are called.
 REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
-#: Marks of cells that gave no answer at all, or none that counts: their rows have one reason, and no metric is worse
-#: than another.
+#: Marks of cells that gave no answer that counts: their rows have one reason, and no metric is worse than another.
 WHOLE = ("crashed", "timed_out", "missing", "invalid")
 #: Marks in the order in which findings are shown.
 ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
@@ -50,6 +49,12 @@ def said(row: Plain, digits: int = 4) -> str:
         return str(row["reason"])
     truth, tolerance = quantity(row["truth"], row["unit"], digits), number(row["tolerance"], 3)
     return f"{row['metric']} {measured(row, digits)}, truth {truth}, tolerance {tolerance}"
+
+
+def first_reason(row: Plain) -> str:
+    """The first of the reasons of a row that is INVALID, and how many more there are."""
+    first, *others = str(row["reason"]).split("; ")
+    return f"{first} (and {len(others)} more)" if others else first
 
 
 def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
@@ -94,7 +99,8 @@ class Family:
         """One line: standing, who, what and how wrong its worst row is."""
         count = f"{len(self.rows)} rows"
         more = "" if len(self.rows) == 1 else f" ({count})" if self.mark in WHOLE else f", the worst of {count}"
-        return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {said(self.worst)}{more}"
+        what = first_reason(self.worst) if self.mark == "invalid" else said(self.worst)
+        return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {what}{more}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data (JSON-ready): the family, its worst row, and the ids of all its rows."""

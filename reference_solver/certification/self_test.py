@@ -57,6 +57,15 @@ def _hill(friction: float, speed: float = 1.0) -> Scene:
     return Scene(Model(2, [Body(Disc(1.0), motion="fixed"), ball], (0.0, -G), 0.0, friction), 40, REFERENCE)
 
 
+def _edge(shape: Disc | Sphere, half: tuple[float, ...], inertia: Any, speed: float = 1.0) -> Scene:
+    """A ball that rolls off the end of a fixed box, .1 m ahead, and about its edge until it leaves it."""
+    d, r, aside = len(half), shape.radius, (0.0,) * (len(half) - 2)
+    pose = (0.4, *aside, half[-1] + r, *(UPRIGHT if aside else (0.0,)))
+    twist = (speed, 0.0, -speed / r) if d == 2 else (speed, 0.0, 0.0, 0.0, speed / r, 0.0)
+    box = Body(Box(half), pose=(0.0, 0.0, 0.0, *UPRIGHT)[: len(pose)], motion="fixed")
+    return Scene(Model(d, [box, Body(shape, 1.0, inertia, pose, twist)], (*aside, 0.0, -G), 0.0, 0.8), 50, REFERENCE)
+
+
 def _disc(x: float, y: float, *twist: float, **fields: Any) -> Body:
     own: dict[str, Any] = {"mass": 1.0, "inertia": 0.125, "pose": (x, y, 0.0), "twist": twist or None}
     return Body(Disc(0.5), **(own | fields))
@@ -89,6 +98,8 @@ SCENES = {
     "disc that slides off a disc": _hill(0.2),
     "disc that slides off a disc without friction": _hill(0.0),
     "disc that rolls off a disc": _hill(1.0, 0.2),
+    "disc that rolls off a box": _edge(Disc(0.25), (0.5, 0.5), 0.03125),
+    "sphere that rolls off a box": _edge(Sphere(0.25), (0.5, 0.5, 0.5), (0.025,) * 3),
     "cube in flight": _spatial(
         [Body(Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0, 0, 5.0, *UPRIGHT), (1.0, 0, 2.0, 1.0, 2.0, 3.0))], steps=40
     ),
@@ -549,10 +560,27 @@ def _left_out(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
     return scene.model, _joined(first, then), simulation
 
 
+def _beyond_the_end(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+    """Let a ball roll on a face that ends too late by the size; half of that beyond the true end that is found."""
+    (box, ball), steps = scene.model.bodies, 10
+    half, speed = box.shape.half_extents, ball.twist[0]  # type: ignore[union-attr, index]
+    ball = replace(ball, pose=(half[0] * (1.0 + 0.5 * size) - speed * steps * DT, *ball.pose[1:]))
+    longer = replace(box, shape=Box((half[0] * (1.0 + size), *half[1:])))
+    first = Simulation(replace(scene.model, bodies=[longer, ball]), REFERENCE).record(steps, pieces=True)
+    later = replace(ball, pose=tuple(first.pose[-1, 1]), twist=tuple(first.twist[-1, 1]))
+    simulation = Simulation(replace(scene.model, bodies=[box, later]), REFERENCE)
+    then = simulation.record(scene.steps - steps, pieces=True)
+    return replace(scene.model, bodies=[box, ball]), _joined(first, then), simulation
+
+
 def _joined(first: Record, then: Record) -> Record:
-    """Two records of one simulation as one."""
+    """Two records of one simulation as one, or of another that begins where the first ends."""
     one, two = first.pieces, then.pieces
     assert one is not None and two is not None
+    steps = len(first.t) - 1
+    if then.t[0] == 0.0:
+        then = replace(then, t=then.t + first.t[-1])
+        two = replace(two, step=two.step + steps, begin=two.begin + first.t[-1])
     fields = {n: np.concatenate([getattr(one, n), getattr(two, n)]) for n in vars(one) if not n.startswith("first_")}
     starts = {
         n: np.append(getattr(one, n)[:-1], getattr(one, n)[-1] + getattr(two, n))
@@ -625,6 +653,8 @@ CORRUPTIONS = (
     Corruption("detection", "radius in space", "sphere that bounces", given(scaled(1, "radius")), TOUCHING),
     Corruption("detection", "half extents of a stack", "stack", given(scaled(2, "half_extents")), TOUCHING),
     Corruption("detection", "half extents", "box that lands", given(scaled(1, "half_extents")), TOUCHING),
+    Corruption("detection", "a face is held beyond its end", "disc that rolls off a box", _beyond_the_end),
+    Corruption("detection", "a face is held beyond its end, in space", "sphere that rolls off a box", _beyond_the_end),
     Corruption("detection", "tilt of the floor [rad]", "disc that bounces", given(with_body(0, _tilted))),
     Corruption(
         "detection", "normal [rad]", "sphere that slides", handed(field("normal", lambda n, s: n + s * n[[2, 0, 1]]))

@@ -71,7 +71,7 @@ from reference_solver.stepping.operations import (
 )
 from reference_solver.stepping.phase import NO_PHASE, SHORTENED
 from reference_solver.stepping.vectors import copy_vectors
-from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
+from reference_solver.tally import CONTRADICTED_A, EXHAUSTED, OPENED, SUB_STEPS
 
 
 @spliced_kernel
@@ -144,6 +144,8 @@ def make_sub_step(island: Island) -> bool:
         clock[ESCAPED], clock[HELD], clock[ROCKS] = 1.0, held, rocks
         return True
     end = follow_path(island, length, end, phase > 0.0)
+    tally[SUB_STEPS] += 1.0
+    tally[OPENED] = max(tally[OPENED], 1.0)  # a phase opens no solve, and what is solved after it is not the start
     if options.restitution:
         release(island, end)
     haste, shortened = end < SHORT * options.dt, phase == end and clock[OUTCOME] == SHORTENED

@@ -442,7 +442,7 @@ def _print_explanation(
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
         ("skill", skill_text(row)),
-        ("standing", row["reason"] or "-"),
+        ("reason" if row["outcome"] == "invalid" else "standing", row["reason"] or "-"),
         *([("off plane", beside)] if beside else []),
     ]
     if better:

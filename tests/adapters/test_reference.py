@@ -165,6 +165,21 @@ def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) 
 
 
 @both
+def test_a_run_that_ends_elsewhere_than_the_one_that_is_certified_is_not_certified(dimension: int) -> None:
+    """By the last place of one coordinate of a body that is free; where others are the audit knows."""
+    scene = make(floor(dimension), body("ball", dimension, (0.0, 0.5), (1.0, 0.0)), g=9.81)
+    settings = {s.name: s.value for s in ENGINE.settings("reference", needs(scene), DT)}
+    end = drive(scene, "reference").pose[-1]
+    elsewhere, fixed = end.copy(), end.copy()
+    elsewhere[1, 0] = np.nextafter(elsewhere[1, 0], 1.0)
+    fixed[0, 0] = 1.0
+    for pose, holds in ((end, True), (fixed, True), (elsewhere, False)):
+        found = ENGINE.certify(scene, DT, settings, round(scene.duration / DT), pose)
+        assert found is not None and found["holds"] is holds
+        assert ("the run that was certified does not end where" in " ".join(found["reasons"])) is not holds
+
+
+@both
 @profiles
 def test_what_the_solver_holds_is_what_was_asked(dimension: int, profile: str) -> None:
     inertia: Any = 0.11 if dimension == 2 else (0.11, 0.12, 0.13)

@@ -345,3 +345,16 @@ def test_samples_carry_the_certificates_of_their_steps(dimension):
     assert total["sweeps"] == record.certificates["sweeps"].sum() == whole.certificate["sweeps"]
     assert total["natural"] == record.certificates["natural"].max() == whole.certificate["natural"]
     assert total["contact_work"] == pytest.approx(whole.certificate["contact_work"], rel=1e-13)
+
+
+def test_the_first_contact_solve_after_a_phase_is_not_at_the_start():
+    """A block that turns about its corner opens no contact solve; an overlap in a later one was not there at the start.
+
+    It is told as what it is, whether or not an event was located.
+    """
+    height = 0.05 * math.sin(0.6) + 0.4 * math.cos(0.6)
+    simulation = simulate(2, [floor(2), Body(Box((0.05, 0.4)), 1.0, 0.05, (0.0, height, -0.6))], "reference", 1)
+    tally = simulation._world.tally
+    assert tally[entries.SOLVES] == 0.0 and tally[entries.OPENED] >= 1.0 and reasons(tally) == ()
+    tally[entries.PENETRATION] = 0.0012
+    assert [reason.partition(":")[0] for reason in reasons(tally)] == ["bodies overlap where events are located"]

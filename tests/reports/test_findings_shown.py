@@ -94,6 +94,16 @@ def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_chec
     assert found[1].line.endswith(": SIGABRT")
 
 
+def test_a_run_that_is_not_certified_is_told_once_with_the_first_reason_of_its_certificate():
+    """It has values, but none that counts."""
+    why = "certificate: bodies overlap at the start: 0.1, at most 1e-06; energy was gained: 2, at most 1e-09; a third"
+    ended = {"outcome": "invalid", "physics": None, "standing": None}
+    (family,) = families([row("impulse[1]", **ended, reason=why), row("drift", **ended, reason=why)])
+    told = "certificate: bodies overlap at the start: 0.1, at most 1e-06 (and 2 more)"
+    assert family.line == f"INVALID: mujoco/default incline 3-D ratio=0.99: {told} (2 rows)"
+    assert families([row(**ended, reason="receipt mass: 2")])[0].line.endswith("ratio=0.99: receipt mass: 2")
+
+
 def test_a_family_is_told_in_one_line_and_as_plain_data():
     worst, mild = row("impulse[2]", 0.9, iterations=4), row("impulse[1]", 0.2, iterations=4)
     (family,) = families([mild, worst])

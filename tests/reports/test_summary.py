@@ -348,6 +348,15 @@ def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_e
     assert again["id"] == plain["id"] and again["value"] == plain["value"]
 
 
+def test_explain_says_why_a_run_is_not_certified(two_engines, monkeypatch):
+    out, _ = two_engines
+    judged, why = showing.judged, "certificate: a contact pulls"
+    ended = {"outcome": "invalid", "physics": None, "standing": None, "reason": why}
+    monkeypatch.setattr(showing, "judged", lambda *asked: [{**row, **ended} for row in judged(*asked)])
+    lines = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout.splitlines()
+    assert [line.split(None, 1)[1].strip() for line in lines if line.startswith("reason")] == [why]
+
+
 def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeypatch):
     out, _ = two_engines
     row = ("explain", "mujoco/default/bounce/apex", "--out", out)

@@ -77,6 +77,8 @@ CHECKS = {
     # Loss of separation along the solver's normal, as a share of the body.
     "direction": Check(1e-9, "a contact's normal is none of its bodies"),
     "place": Check(1e-9, "a contact's point is on no surface of its bodies"),
+    # As ``apart``, and speeds as those after a solve.
+    "stays": Check(1e-9, "a contact carries beyond where a face, an edge or a corner of its bodies ends"),
     # Velocities of an impact's start, as shares of the speeds there.
     "choice": Check(1e-9, "corners meet along a normal that they do not close along last"),
     # Speeds after a solve: its residual.

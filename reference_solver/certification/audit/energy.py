@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from reference_solver.certification.audit.contact import reduced_mass
 from reference_solver.certification.audit.motion import swings, turned_by_momentum
 from reference_solver.certification.audit.run import Run, cross, twist_of
-from reference_solver.certification.audit.space import rotation_vector
-from reference_solver.certification.audit.turning import turned_contacts
+from reference_solver.certification.audit.turning import rotation_vector, turned_contacts
 from reference_solver.model import Array
 
 #: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.

@@ -9,6 +9,7 @@ import numpy as np
 
 from reference_solver.certification.audit.motion import integrated_turn
 from reference_solver.certification.audit.run import Indices, Run, scaled_along, twist_of
+from reference_solver.certification.audit.turning import cubic, moved_by, unseen, vector_rate, way_between
 from reference_solver.certification.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
 
@@ -16,6 +17,10 @@ from reference_solver.model import Array, HalfSpace
 HALVINGS = 4
 #: Turn in a piece [rad] beyond which it is cut into parts, and that of a part: .1^4/384 is less than an overlap counts.
 FAR, PART, MOST_PARTS = 0.3, 0.1, 512
+#: Share of the smallest half width up to which two polynomials are one path: a tenth of an overlap that counts.
+ONE_PATH = 1e-7
+#: Shares of a piece at which contacts tell which polynomial their bodies follow.
+BETWEEN = (0.3, 0.7)
 
 
 class Path(NamedTuple):
@@ -27,6 +32,7 @@ class Path(NamedTuple):
     way: Array  # (k, 3 | 6) displacement and turn over each
     first: Array  # (k, 3 | 6) twist at the start of each
     last: Array  # (k, 3 | 6) and at its end
+    bend: Array  # (2, k, 3 | 6): t^2 (h - t)^2 (bend_0 + bend_1 t) is added to the cubic polynomial through its ends
 
 
 def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
@@ -39,8 +45,8 @@ def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
 
 def _overlaps(run: Run, start: Array) -> tuple[float, float]:
     """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width."""
-    paths = [_path(run, i, start) for i in range(len(run.free))]
-    low, high = (np.array([x(path) for path in paths]) for x in (_low, _high))
+    paths = _bent(run, [_path(run, i, start) for i in range(len(run.free))])
+    low, high = np.array([_extremes(path) for path in paths]).swapaxes(0, 1)
     arm = np.where(np.isfinite(run.reach), run.reach, np.inf)[:, None]
     worst, first = 0.0, 0.0
     for i in range(len(paths)):
@@ -56,20 +62,13 @@ def _overlaps(run: Run, start: Array) -> tuple[float, float]:
     return worst, first
 
 
-def _low(path: Path) -> Array:
+def _extremes(path: Path) -> Array:
+    """Lowest and highest coordinates (2, d) of a path, which may leave the straight line between two ends."""
     d = 2 if path.pose.shape[1] == 3 else 3
-    return np.asarray((np.minimum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) - _bulge(path, d)).min(axis=0))
-
-
-def _high(path: Path) -> Array:
-    d = 2 if path.pose.shape[1] == 3 else 3
-    return np.asarray((np.maximum(path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]) + _bulge(path, d)).max(axis=0))
-
-
-def _bulge(path: Path, d: int) -> Array:
-    """How far a path may leave the straight line between its ends (k, 1) [m]."""
-    change = np.linalg.norm(path.last[:, :d] - path.first[:, :d], axis=1)
-    return np.asarray((0.5 * path.length * change)[:, None])
+    bulge = 0.5 * path.length * np.linalg.norm(path.last[:, :d] - path.first[:, :d], axis=1)
+    ends = path.pose[:, :d], path.pose[:, :d] + path.way[:, :d]
+    low, high = np.minimum(*ends) - bulge[:, None], np.maximum(*ends) + bulge[:, None]
+    return np.array((low.min(axis=0), high.max(axis=0)))
 
 
 def _path(run: Run, i: int, start: Array) -> Path:
@@ -85,11 +84,62 @@ def _path(run: Run, i: int, start: Array) -> Path:
         begin: Array = np.arange(count, dtype=np.float64) * length
         twists = np.tile(twist, (count, 1))
         poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
-        return Path(begin, length, poses, np.zeros((count, v)) + length[:, None] * twists, twists, twists)
+        return Path(begin, length, poses, length[:, None] * twists, twists, twists, np.zeros((2, count, v)))
     begin, length, before, after, first, last = _parts(run, rows)
-    way = after[:, : run.d] - before[:, : run.d]
-    turn = (after - before)[:, 2:] if run.d == 2 else rotation_vector(before[:, 3:], after[:, 3:])
-    return Path(begin, length, before, np.concatenate([way, turn], axis=1), first, last)
+    return Path(begin, length, before, way_between(before, after), first, last, np.zeros((2, len(begin), v)))
+
+
+def _bent(run: Run, paths: list[Path]) -> list[Path]:
+    """Paths with polynomials of degree five where a cubic one is not enough: through the piece before or after as well.
+
+    Where forces jump between the two pieces that polynomial is none. What tells is that contacts which carry something
+    stay closed: of the cubic polynomial and both others the one is taken on which they do best at `BETWEEN`.
+    """
+    pieces, asked, off = run.pieces, np.zeros(len(run.pieces), bool), np.zeros((3, len(run.pieces)))
+    asked[run.owner[run.free[pieces.body] & (unseen(run) > ONE_PATH * run.size)]] = True
+    asked &= ~run.is_frozen
+    if not asked.any():
+        return paths
+    rows = [np.flatnonzero(asked[run.owner] & (pieces.body == i) & run.free[i]) for i in range(len(paths))]
+    at = [np.searchsorted(p.begin, pieces.begin[run.owner[r]], "right") - 1 for p, r in zip(paths, rows, strict=True)]
+    bends = [np.stack([_bend(path, k, beside) for beside in (0, -1, 1)]) for path, k in zip(paths, at, strict=True)]
+    carries = asked[run.contact_owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
+    for which in range(3):
+        for path, k, bend in zip(paths, at, bends, strict=True):
+            path.bend[:, k] = bend[which]
+        for pair in np.unique(np.column_stack([pieces.body_a, pieces.body_b])[carries], axis=0):
+            of = run.contact_owner[carries & (pieces.body_a == pair[0]) & (pieces.body_b == pair[1])]
+            a, b = (run.model.bodies[i].shape for i in pair)
+            for late in (share * pieces.length[of] for share in BETWEEN):
+                pose_a, pose_b = (_pose_when(paths[i], pieces.begin[of], late) for i in pair)
+                off[which, of] = np.maximum(off[which, of], np.abs(distinct(a, pose_a, b, pose_b).gap))
+    best = np.nan_to_num(off, nan=np.inf).argmin(axis=0)
+    for path, k, bend, r in zip(paths, at, bends, rows, strict=True):
+        path.bend[:, k] = bend[best[run.owner[r]], :, np.arange(len(r))].swapaxes(0, 1)
+    return paths
+
+
+def _bend(path: Path, k: Indices, beside: int) -> Array:
+    """``bend`` (2, s, 3 | 6) of `Path` for intervals k to go through the far ends of those before or after (-1, 1).
+
+    Zero where there is none that joins them.
+    """
+    other = np.clip(k + beside, 0, len(path.begin) - 1)
+    one, two = np.minimum(k, other), np.maximum(k, other)
+    joins = (other != k) & (path.length[other] > 0.0) & (path.last[one] == path.first[two]).all(axis=1)
+    joins &= np.abs(path.begin[one] + path.length[one] - path.begin[two]) <= 4.0 * np.spacing(path.begin[two])
+    h = path.length[k][:, None]
+    t = -path.length[other][:, None] if beside < 0 else h + path.length[other][:, None]
+    far = path.pose[other] if beside < 0 else _pose_at(path, other, path.length[other])
+    way, rate = way_between(path.pose[k], far), path.first[other] if beside < 0 else path.last[other]
+    if way.shape[1] == 6:
+        rate = np.concatenate([rate[:, :3], vector_rate(way[:, 3:], rate[:, 3:])], axis=1)
+    moved, passing = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        grown = 1.0 / (t * (h - t))
+        share = (way - moved) * grown**2
+        slope = (rate - passing) * grown**2 - 2.0 * share * (h - 2.0 * t) * grown
+    return np.where(joins[:, None], np.stack([share - slope * t, slope]), 0.0)
 
 
 def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
@@ -129,48 +179,18 @@ def _state(run: Run, rows: Indices, share: Array) -> tuple[Array, Array]:
     return pose, twist
 
 
-def rotation_vector(q: Array, p: Array) -> Array:
-    """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
-    # p times the conjugate of q
-    scalar = (p * q).sum(axis=1)
-    vector = -p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
-    vector *= np.where(scalar < 0.0, -1.0, 1.0)[:, None]
-    sine = np.linalg.norm(vector, axis=1)
-    angle = 2.0 * np.arctan2(sine, np.abs(scalar))
-    return np.asarray(vector * np.where(sine > 1e-12, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
-
-
-def _vector_rate(psi: Array, w: Array) -> Array:
-    """Rates (s, 3) of rotation vectors psi at angular velocities w, world axes (J. Stuelpnagel, SIAM Rev. 6, 1964).
-
-    ``psi' = w - psi x w / 2 + c psi x (psi x w)``, ``c = (1 - (a/2) cot(a/2))/a^2`` of the angle a.
-    """
-    half = 0.5 * np.linalg.norm(psi, axis=1)
-    large = half > 1e-3  # below it the next term of the series is 1e-9 of this one
-    safe = np.where(large, half, 1.0)
-    share = np.where(large, (1.0 - safe / np.tan(safe)) / (4.0 * safe * safe), 1.0 / 12.0)
-    across = np.cross(psi, w)
-    return np.asarray(w - 0.5 * across + share[:, None] * np.cross(psi, across))
+def _pose_when(path: Path, begin: Array, late: Array) -> Array:
+    """Poses (s, P) at times ``late`` after ``begin``, when intervals of this or of other bodies began."""
+    k = np.searchsorted(path.begin, begin, "right") - 1
+    return _pose_at(path, k, begin - path.begin[k] + late)
 
 
 def _pose_at(path: Path, k: Indices, t: Array) -> Array:
-    """Poses (s, P) on intervals k after the time t (s,) of each, by cubic Hermite polynomials."""
-    d = 2 if path.pose.shape[1] == 3 else 3
-    length = path.length[k]
-    s = np.clip(t / np.where(length > 0.0, length, 1.0), 0.0, 1.0)[:, None]
-    whole, late = s * s * (3.0 - 2.0 * s), length[:, None] * s
-    last = path.last[k]
-    if d == 3:
-        last = np.concatenate([last[:, :3], _vector_rate(path.way[k][:, 3:], last[:, 3:])], axis=1)
-    moved = whole * path.way[k] + late * (1.0 - s) ** 2 * path.first[k] + late * s * (s - 1.0) * last
-    place = path.pose[k][:, :d] + moved[:, :d]
-    if d == 2:
-        return np.concatenate([place, path.pose[k][:, 2:] + moved[:, 2:]], axis=1)
-    angle = np.linalg.norm(moved[:, 3:], axis=1, keepdims=True)
-    half = 0.5 * np.sinc(0.5 * angle / np.pi) * moved[:, 3:]
-    scalar, (w, v) = np.cos(0.5 * angle), (path.pose[k][:, 3:4], path.pose[k][:, 4:])
-    q = [scalar * w - (half * v).sum(axis=1, keepdims=True), scalar * v + w * half + np.cross(half, v)]
-    return np.concatenate([place, *q], axis=1)
+    """Poses (s, P) on intervals k after the time t (s,) of each."""
+    h = path.length[k][:, None]
+    t = np.clip(t[:, None], 0.0, h)
+    moved, _ = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
+    return moved_by(path.pose[k], moved + (t * (h - t)) ** 2 * (path.bend[0, k] + path.bend[1, k] * t))
 
 
 def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:

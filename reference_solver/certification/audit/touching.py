@@ -12,36 +12,42 @@ from typing import Any
 import numpy as np
 
 from reference_solver.certification.audit.choice import closes_sooner, is_cornered, strayed
+from reference_solver.certification.audit.contact import reduced_mass
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
-from reference_solver.certification.geometry import distinct, rotation
+from reference_solver.certification.audit.turning import SAME, pose_within, unseen
+from reference_solver.certification.geometry import core_of, distinct, rotation
 from reference_solver.model import Array, HalfSpace
+from reference_solver.shapes import smallest_extent
 
 #: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
 NO_GAP = 1e-13
+#: Share of a step up to which a piece is an instant: slips that have all but ended are taken out in 1e-8 of one (E54).
+INSTANT = 1e-7
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts that carry something, and of all pairs at impacts."""
-    yield from zip(("apart", "direction", "place", "choice"), _touching(run), strict=True)
+    yield from zip(("apart", "direction", "place", "choice", "stays"), _touching(run), strict=True)
     yield "together", _left_out(run)
 
 
-def _touching(run: Run) -> tuple[float, float, float, float]:
+def _touching(run: Run) -> list[float]:
     """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
 
-    And by how much faster bodies close along a normal than along another that is as good, as a share of their speeds.
+    And by how much faster bodies close along a normal than along another that is as good, as a share of their speeds,
+    and what `_opened` says of contacts that last.
     Of contacts that carry something. Those of the fixed-step law and of the impulse-level scheme may close a gap, and
     have the levers of another time: they are not asked.
     """
     pieces = run.pieces
-    worst = np.zeros(4)
+    worst, doubt, mass = np.zeros(5), unseen(run), reduced_mass(run)
     coarse = (run.is_fixed | run.is_impulse_level)[run.contact_owner]
     carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse & np.isfinite(pieces.normal).all(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     for pair in np.unique(pairs[carry]):
         rows = np.flatnonzero(carry & (pairs == pair))
         a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
-        pose_a, pose_b = (_pose(run, i, run.side[k][rows]) for k, i in enumerate((a, b)))
+        pose_a, pose_b = (pose_within(run, i, run.side[k][rows], 0.0) for k, i in enumerate((a, b)))
         shape_a, shape_b = run.model.bodies[a].shape, run.model.bodies[b].shape
         found = distinct(shape_a, pose_a, shape_b, pose_b)
         size = min(run.extent[a], run.extent[b])
@@ -63,8 +69,65 @@ def _touching(run: Run) -> tuple[float, float, float, float]:
         sides = [distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
         off_surface = max((np.abs(side) - np.abs(found.gap) - noise).max() for side in sides) / size
         here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), off_surface)
-        worst = np.maximum(worst, [*here, sooner])
-    return float(worst[0]), float(worst[1]), float(worst[2]), float(worst[3])
+        lasts = np.flatnonzero(pieces.length[run.contact_owner[rows]] > INSTANT * run.dt)
+        point = 0.5 * (found.point_a + found.point_b)[lasts]
+        opened = (
+            _opened(run, rows[lasts], (pose_a[lasts], pose_b[lasts]), point, noise, doubt, mass) if len(lasts) else 0.0
+        )
+        worst = np.maximum(worst, [*here, sooner, opened])
+    return [float(x) for x in worst]
+
+
+def _opened(
+    run: Run, rows: Indices, start: tuple[Array, Array], nearest: Array, noise: float, doubt: Array, mass: Array
+) -> float:
+    """How far contacts of one pair open by the middle and the end of their pieces, as a share of the extent.
+
+    No feature carries beyond its end. Then the bodies are apart, or a corner is off the face that it stood on within
+    its edges; where one of them is round they go apart along the normal of where they are, as a share of the speeds.
+    Half-way bodies are where cubic polynomials have them, but for the ``doubt``: as near as an overlap counts.
+    """
+    pieces, worst = run.pieces, 0.0
+    bodies = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
+    shapes = [run.model.bodies[i].shape for i in bodies]
+    size, still = min(run.extent[i] for i in bodies), min(run.still[i] for i in bodies)
+    corners = [_corner_on_face(shapes[k], start[k], shapes[1 - k], start[1 - k], pieces.point[rows]) for k in (0, 1)]
+    half_way = 1e-6 * size + sum(np.where(row[rows] >= 0, doubt[row[rows]], 0.0) for row in run.side)
+    for share, unsure in ((0.5, half_way), (1.0, 0.0)):
+        pose = [pose_within(run, i, run.side[k][rows], share) for k, i in enumerate(bodies)]
+        found = distinct(shapes[0], pose[0], shapes[1], pose[1])
+        off = np.abs(found.gap)
+        for k, (at, corner) in enumerate(corners):
+            if len(at):
+                place = placed(core_of(shapes[k], pose[k][at]).vertex[np.arange(len(at)), corner], run.d)
+                off[at] = np.maximum(off[at], np.abs(distinct(shapes[1 - k], pose[1 - k][at], POINT, place).gap))
+        worst = max(worst, float(((off - noise - unsure) / size).max()))
+    if (radius := _radius(shapes[0]) + _radius(shapes[1])) > 0.0:
+        # Of a rod that lies flush the nearest point is the other end, or the middle: it tells nothing of this one.
+        told = np.linalg.norm(nearest - pieces.point[rows], axis=1) <= SAME * size
+        point = 0.5 * (found.point_a + found.point_b)
+        first, last = (_moving(run, i, run.side[k][rows], point, pose[k]) for k, i in enumerate(bodies))
+        speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
+        parting = ((last - first) * found.normal).sum(axis=1) - noise / radius * speed - still
+        parting = np.minimum(parting, np.linalg.norm(pieces.impulse[rows], axis=1) / mass[rows]).clip(min=0.0)
+        worst = max(worst, float((parting / (speed + run.pull * run.dt + still))[told].max(initial=0.0)))
+    return worst
+
+
+def _corner_on_face(shape: Any, pose: Array, other: Any, pose_other: Array, point: Array) -> tuple[Indices, Indices]:
+    """Which points (s, d) are corners of one body within a face of the other, and which corners, both (k,)."""
+    if _radius(shape) + _radius(other) > 0.0 or isinstance(shape, HalfSpace):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    far = np.linalg.norm(core_of(shape, pose).vertex - point[:, None], axis=2)
+    found = far.min(axis=1) <= SAME * smallest_extent(shape)
+    if not isinstance(other, HalfSpace):
+        core, near = core_of(other, pose_other), SAME * smallest_extent(other)
+        if point.shape[1] == 2:
+            found &= (np.linalg.norm(core.vertex - point[:, None], axis=2) > near).all(axis=1)
+        else:
+            local = np.einsum("sij,si->sj", core.axes, point - core.centre)
+            found &= (core.half - np.abs(local) <= near).sum(axis=1) == 1
+    return np.flatnonzero(found), far.argmin(axis=1)[found]
 
 
 def _left_out(run: Run) -> float:
@@ -131,12 +194,6 @@ def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array) -> Array
 def _radius(shape: Any) -> float:
     """What a shape's core is grown by [m]."""
     return float(getattr(shape, "radius", 0.0))
-
-
-def _pose(run: Run, i: int, rows: Indices) -> Array:
-    """Poses (s, P) of body i as the pieces of ``rows`` begin; the model's where a piece does not hold it."""
-    own = np.array(run.model.bodies[i].pose, dtype=float)
-    return np.where((rows >= 0)[:, None], run.pieces.pose_before[rows], own)
 
 
 def _along(shape_a: Any, pose_a: Array, shape_b: Any, pose_b: Array, n: Array, d: int) -> Array:

@@ -49,7 +49,7 @@ def turned_contacts(run: Run) -> Turned:
     owner = run.contact_owner
     turning = ~run.is_frozen[owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    alone = _alone(owner, pairs)
+    alone, off = _alone(owner, pairs), unseen(run)
     if turning.any():
         change = np.where(turning, changes_of_force(run), 0.0)
     for pair in np.unique(pairs[turning]):
@@ -57,7 +57,12 @@ def turned_contacts(run: Run) -> Turned:
         a, b = int(pieces.body_a[rows[0]]), int(pieces.body_b[rows[0]])
         shapes = run.model.bodies[a].shape, run.model.bodies[b].shape
         seen = [
-            nearest(shapes[0], _pose(run, a, run.side[0][rows], at), shapes[1], _pose(run, b, run.side[1][rows], at))
+            nearest(
+                shapes[0],
+                pose_within(run, a, run.side[0][rows], at),
+                shapes[1],
+                pose_within(run, b, run.side[1][rows], at),
+            )
             for at in (0.0, 0.5, 1.0)
         ]
         most = _largest_turn(run, rows)
@@ -78,7 +83,8 @@ def turned_contacts(run: Run) -> Turned:
         sure = sure & told & alone[rows]
         point[rows] = np.where(sure[:, None], (place[0] + 4.0 * place[1] + place[2]) / 6.0, point[rows])
         last_point[rows] = np.where(sure[:, None], place[2], last_point[rows])
-        far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size + _unseen(run, rows)
+        far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size
+        far += sum(np.where(row[rows] >= 0, off[row[rows]], 0.0) for row in run.side)
         stray[rows] = np.where(sure, far, np.inf)
     return Turned(normal, last_normal, point, last_point, lean, stray, change)
 
@@ -155,7 +161,7 @@ def _largest_turn(run: Run, rows: Indices) -> Array:
         first, last = (np.where(known, x[row], 0.0) for x in (pieces.twist_before, pieces.twist_after))
         spins += np.maximum(np.linalg.norm(first[:, run.d :], axis=1), np.linalg.norm(last[:, run.d :], axis=1))
         passing += sign * 0.5 * (first + last)[:, : run.d]
-        places.append(_pose(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
+        places.append(pose_within(run, int((pieces.body_a, pieces.body_b)[k][rows[0]]), row, 0.0)[:, : run.d])
     apart = np.linalg.norm(places[0] - places[1], axis=1)
     apart = np.where(apart > 0.0, apart, run.size)
     shapes = [run.model.bodies[int(i[rows[0]])].shape for i in (pieces.body_a, pieces.body_b)]
@@ -186,7 +192,7 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
         return place, sure
     place, sure = [start, start, start], np.zeros(len(rows), bool)
     for k in range(2):
-        poses = [[_pose(run, i, run.side[j][rows], at) for j, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)]
+        poses = [[pose_within(run, i, run.side[j][rows], at) for j, i in enumerate(bodies)] for at in (0.0, 0.5, 1.0)]
         own = np.einsum("sji,sj->si", rotation(poses[0][k]), start - poses[0][k][:, : run.d])
         later = [np.einsum("sij,sj->si", rotation(x[k]), own) + x[k][:, : run.d] for x in poses]
         other = [
@@ -200,18 +206,12 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
     return place, sure
 
 
-def _unseen(run: Run, rows: Indices) -> Array:
-    """How far (s,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
-    pieces, length = run.pieces, run.pieces.length[run.contact_owner[rows]]
-    found = np.zeros(len(rows))
-    for k, body in enumerate((pieces.body_a, pieces.body_b)):
-        row = run.side[k][rows]
-        arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body[rows]]
-        first, last = (x[row, run.d :] for x in (pieces.twist_before, pieces.twist_after))
-        spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
-        turn = (length * spin) ** 2 + length * np.linalg.norm(last - first, axis=1)
-        found += np.where(row >= 0, arm * turn * turn / 128.0, 0.0)
-    return found
+def unseen(run: Run) -> Array:
+    """How far (m,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
+    first, last = (x[:, run.d :] for x in (run.pieces.twist_before, run.pieces.twist_after))
+    spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
+    turn = (run.length * spin) ** 2 + run.length * np.linalg.norm(last - first, axis=1)
+    return np.where(np.isfinite(run.reach), run.reach, 0.0)[run.pieces.body] * turn * turn / 128.0
 
 
 def _fastest(run: Run, rows: Indices) -> Array:
@@ -227,24 +227,64 @@ def _fastest(run: Run, rows: Indices) -> Array:
     return np.asarray(pieces.length[run.contact_owner[rows]] * found)
 
 
-def _pose(run: Run, i: int, rows: Indices, at: float) -> Array:
-    """Poses (s, P) of body i in the pieces of ``rows``: at their start, end, or middle by a cubic polynomial."""
-    own = np.array(run.model.bodies[i].pose, dtype=float)
-    pieces, d = run.pieces, run.d
-    known = (rows >= 0)[:, None]
-    if at != 0.5:
-        return np.where(known, (pieces.pose_after if at else pieces.pose_before)[rows], own)
+def pose_within(run: Run, i: int, rows: Indices, at: float) -> Array:
+    """Poses (s, P) of body i in the pieces of ``rows`` after the share ``at`` of them, by a cubic polynomial."""
+    pieces, length = run.pieces, run.length[rows]
     first, last = pieces.pose_before[rows], pieces.pose_after[rows]
-    bend = 0.125 * run.length[rows][:, None] * (pieces.twist_before[rows] - pieces.twist_after[rows])
-    if d == 2:
-        return np.where(known, 0.5 * (first + last) + bend, own)
-    # Half way on the shorter arc, and turned by what the spins add.
-    last = last.copy()
-    last[:, 3:] *= np.where((first[:, 3:] * last[:, 3:]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-    middle = 0.5 * (first + last)
-    middle[:, :3] += bend[:, :3]
-    w, v = middle[:, 3:4].copy(), middle[:, 4:].copy()
-    half = 0.5 * bend[:, 3:]
-    middle[:, 3:4] -= (half * v).sum(axis=1, keepdims=True)
-    middle[:, 4:] += w * half + np.cross(half, v)
-    return np.where(known, middle, own)
+    if 0.0 < at < 1.0:
+        way, twists = way_between(first, last), (pieces.twist_before[rows], pieces.twist_after[rows])
+        last = moved_by(first, cubic(way, *twists, length, at * length[:, None])[0])
+    return np.where((rows >= 0)[:, None], last if at else first, np.array(run.model.bodies[i].pose, dtype=float))
+
+
+def way_between(before: Array, after: Array) -> Array:
+    """Displacements and turns (s, 3 | 6) from poses to poses."""
+    if before.shape[1] == 3:
+        return np.asarray(after - before)
+    return np.concatenate([after[:, :3] - before[:, :3], rotation_vector(before[:, 3:], after[:, 3:])], axis=1)
+
+
+def rotation_vector(q: Array, p: Array) -> Array:
+    """Rotation vectors (s, 3) in world axes that turn orientation q into p, by less than a half turn."""
+    # p times the conjugate of q
+    scalar = (p * q).sum(axis=1)
+    vector = -p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
+    vector *= np.where(scalar < 0.0, -1.0, 1.0)[:, None]
+    sine = np.linalg.norm(vector, axis=1)
+    angle = 2.0 * np.arctan2(sine, np.abs(scalar))
+    return np.asarray(vector * np.where(sine > 1e-12, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
+
+
+def vector_rate(psi: Array, w: Array) -> Array:
+    """Rates (s, 3) of rotation vectors psi at angular velocities w, world axes (J. Stuelpnagel, SIAM Rev. 6, 1964).
+
+    ``psi' = w - psi x w / 2 + c psi x (psi x w)``, ``c = (1 - (a/2) cot(a/2))/a^2`` of the angle a.
+    """
+    half = 0.5 * np.linalg.norm(psi, axis=1)
+    large = half > 1e-3  # below it the next term of the series is 1e-9 of this one
+    safe = np.where(large, half, 1.0)
+    share = np.where(large, (1.0 - safe / np.tan(safe)) / (4.0 * safe * safe), 1.0 / 12.0)
+    across = np.cross(psi, w)
+    return np.asarray(w - 0.5 * across + share[:, None] * np.cross(psi, across))
+
+
+def cubic(way: Array, first: Array, last: Array, length: Array, t: Array) -> tuple[Array, Array]:
+    """Displacements (s, 3 | 6) and their rates after t (s, 1), by the cubic polynomial of a way and both its twists."""
+    if way.shape[1] == 6:
+        last = np.concatenate([last[:, :3], vector_rate(way[:, 3:], last[:, 3:])], axis=1)
+    h = np.where(length > 0.0, length, 1.0)[:, None]
+    s = t / h
+    moved = s * s * (3.0 - 2.0 * s) * way + t * (1.0 - s) ** 2 * first + t * s * (s - 1.0) * last
+    rate = 6.0 * s * (1.0 - s) / h * way + (1.0 - s) * (1.0 - 3.0 * s) * first + s * (3.0 * s - 2.0) * last
+    return moved, rate
+
+
+def moved_by(pose: Array, moved: Array) -> Array:
+    """Poses (s, 3 | 7) after displacements and turns (s, 3 | 6)."""
+    if pose.shape[1] == 3:
+        return np.asarray(pose + moved)
+    angle = np.linalg.norm(moved[:, 3:], axis=1, keepdims=True)
+    half = 0.5 * np.sinc(0.5 * angle / np.pi) * moved[:, 3:]
+    scalar, (w, v) = np.cos(0.5 * angle), (pose[:, 3:4], pose[:, 4:])
+    q = [scalar * w - (half * v).sum(axis=1, keepdims=True), scalar * v + w * half + np.cross(half, v)]
+    return np.concatenate([pose[:, :3] + moved[:, :3], *q], axis=1)

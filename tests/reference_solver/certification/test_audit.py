@@ -496,3 +496,24 @@ def test_a_rod_that_turns_by_radians_in_a_step_is_where_it_turns_to(height, met)
     record = replace(record, pose=np.concatenate([record.pose, sample], axis=1))
     found = {finding.name for finding in audit(floored, record, dt) if not finding.holds}
     assert found == ({"overlap"} if met else set())
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("beyond", [1e-8, 1e-4])
+def test_a_corner_that_slides_off_its_face_carries_nothing_there(dimension, beyond):
+    """A box slides flat over a table whose end the run knows too late; at rest on it the load stays where it is."""
+    half, table, steps, dt = 0.1, 0.5, 10, 1.0 / 240.0
+    across = () if dimension == 2 else (0.5,)
+    pose = lambda x, y: (x, y, 0.0) if dimension == 2 else (x, 0.0, y, 1.0, 0.0, 0.0, 0.0)  # noqa: E731
+    inertia = 2.0 / 3.0 * half**2
+    twist = (1.0,) + (0.0,) * (2 if dimension == 2 else 5)
+    start = pose(table - half + beyond - steps * dt, half)
+    box = Body(Box((half,) * dimension), 1.0, inertia if dimension == 2 else (inertia,) * 3, start, twist)
+
+    def with_table(longer):
+        fixed = Body(Box((table + longer, *across, 0.2)), pose=pose(0.0, -0.2), motion="fixed")
+        return Model(dimension, [fixed, box], (0.0,) * (dimension - 1) + (-9.81,), 0.0, 0.0)
+
+    record = Simulation(with_table(1e-3), Settings.reference(dt)).record(steps, pieces=True)
+    assert not [finding for finding in audit(with_table(1e-3), record, dt) if not finding.holds]
+    assert [finding.name for finding in audit(with_table(0.0), record, dt) if not finding.holds] == ["stays"]

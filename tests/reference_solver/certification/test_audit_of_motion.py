@@ -131,7 +131,7 @@ LIMITS = {
     1e-14: {"pull"},
     1e-12: {"time", "flight", "prescribed", "cone"},
     1e-10: {"momentum"},
-    1e-9: {"spin", "path", "turn", "normal", "friction", "moment", "apart", "direction", "place", "choice", "together",
+    1e-9: {"spin", "path", "turn", "normal", "friction", "moment", "apart", "stays", "direction", "place", "choice", "together",
            "gained", "lost"},
     1e-7: {"resolution"},
     1e-6: {"overlap", "start"},

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -19,6 +20,7 @@ from reference_solver.spatial.meeting import allocate_meeting, turn_bounds
 from reference_solver.spatial.motion import initialise
 from reference_solver.spatial.state import MANIFOLD, allocate_bodies
 from reference_solver.spatial.time_of_impact import begin_paths, is_pressed
+from reference_solver.stepping import time_of_impact
 from reference_solver.stepping.time_of_impact import first_contact
 
 G = 9.81
@@ -269,6 +271,36 @@ def test_a_free_body_never_turns_faster_than_its_bound(moments, spin):
     assert np.linalg.norm(spins, axis=1).max() <= fastest * (1 + 1e-12)
     # A difference over dt is a mean of the derivative, and the splitting errs by (w dt)^2 < 1 % of it.
     assert np.linalg.norm(np.diff(spins, axis=0), axis=1).max() <= 1.01 * quickest * dt
+
+
+@pytest.mark.parametrize("spin", [(0.0, 0.0, 3.0), (2.0, 3.0, -4.0)])
+def test_a_gap_bends_by_no_less_than_its_corners_turn(spin):
+    """About centres that go straight: r w^2 of each body, and half of it more for a rotation vector's bound."""
+    boxes = [Box((0.5, 0.2, 0.1)), Box((0.3, 0.3, 0.3))]
+    records = flying(*(moving(box, (9.0 * k, 0.0, 0.0), spin=spin) for k, box in enumerate(boxes)))
+    meeting = allocate_meeting(records)
+    begin_paths(records, meeting.paths, 0.1)
+    from_python(time_of_impact.introduce)(meeting, 0, 1)
+    turned = sum(np.linalg.norm(box.half_extents) for box in boxes) * np.dot(spin, spin)
+    assert turned <= from_python(time_of_impact.bend_bound)(meeting, 0.0, 0.1) * (1.0 + 1e-12) <= 1.5 * turned * 1.001
+
+
+@pytest.mark.parametrize("kick", [(0.0, 0.0, 2.0), (3.0, -1.0, 0.5)])
+def test_the_axis_of_a_ball_that_a_torque_turns_drifts_to_the_fifth_order(kick):
+    """Against DOP853: halving the time divides the error by 32; without the drift of the axis, or half of it, by 8."""
+    spin, off = np.array((1.0, -2.0, 0.7)), []
+
+    def rate(t, q):
+        w = spin + t * np.array(kick)
+        return 0.5 * np.concatenate([[-w @ q[1:]], q[0] * w + np.cross(w, q[1:])])
+
+    for time in (0.2, 0.1, 0.05):
+        records = flying(moving(Sphere(0.5), (0.0, 0.0, 0.0), spin=spin))
+        records.rate[0, 3:] = kick
+        place_at(records, 0, time, records, 0)
+        truth = solve_ivp(rate, (0.0, time), (1.0, 0.0, 0.0, 0.0), "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        off.append(np.linalg.norm(records.pose[0, 3:] - truth))
+    assert off[0] / off[1] == pytest.approx(32.0, rel=0.15) == off[1] / off[2]
 
 
 @pytest.mark.parametrize("spin", [(0.3, -0.2, 1.0), (2.0, 3.0, -4.0), (-5.0, 1.0, 0.5)])
