@@ -13,7 +13,9 @@ What is decided within round-off (which of two corners strikes first, whether wh
 order of bodies and by signs: the mirrored world, its bodies in reverse order, is as true, and ends where the run does.
 What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
 tells that is made to a hundredth of the accuracy.
-To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below).
+To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
+far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
+(`audit.sharing`). Where that distance is visible before the horizon, the run is refused.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -29,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.certification.audit import Finding, audit, ends_of_series
+from reference_solver.certification.audit import Finding, audit, ends_of_series, shared_loads
 from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
@@ -74,8 +76,8 @@ class Certificate:
     t
         (s,) times of the samples [s].
     error
-        (s,) bound of the distance between the run and the exact motion: of any point of any free body, for its finite
-        step and round-off [m].
+        (s,) bound of the distance between the run and any exact motion: of any point of any free body, for its finite
+        step, round-off, and loads that the laws do not determine [m].
     growth
         (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
     horizon
@@ -124,16 +126,19 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         raise ValueError(f"steps: {steps!r} must be a whole number of at least 1")
     run = Simulation(model, settings)
     record = run.record(steps, stride, pieces=True)
-    findings = audit(model, record, settings.dt, located=settings.scheme == "located")
+    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
+    apart, shared = shared_loads(model, record, settings.dt, horizon)
+    findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
-    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
-    error = np.maximum.accumulate(_error(model, run, record, steps, stride) + round_off)
+    error = _error(model, run, record, steps, stride) + round_off
     if not np.isfinite(error[record.t < horizon]).all():
         reasons.append("the run at half the step is no numbers")
+    # A difference of two motions that obey the laws grows as that disturbance does.
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart)
     holds = not reasons
     if horizon < record.t[-1]:
         reasons.append(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit import contact, energy, motion, space, touching
+from reference_solver.certification.audit import contact, energy, motion, sharing, space, touching
 from reference_solver.certification.audit.run import Run
 from reference_solver.model import Model
 from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
@@ -88,6 +88,8 @@ CHECKS = {
     # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
     "overlap": Check(1e-6, "bodies are in each other: a contact or an impact was missed"),
     "start": Check(1e-6, "bodies overlap at the start"),
+    # Two motions are one while they differ by no more than bodies may overlap.
+    "shared": Check(1e-6, "the motion is not determined"),
     # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
     "gained": Check(1e-9, "energy was gained"),
     # As much as may be gained.
@@ -140,6 +142,26 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     which, place = np.unique(run.contact_owner[ends], return_inverse=True)
     sums = [np.bincount(place, part[ends], len(which)) for part in contact.left_out_by_series(run, ends)]
     return record.pieces.begin[which], sums[0], sums[1]
+
+
+def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
+    """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
+
+    They differ where contacts share a load in more than one way and friction follows the shares (`sharing`). The
+    finding is the distance before ``until`` [s], as a share of the smallest half width.
+
+    Raises
+    ------
+    ValueError
+        If the record has no pieces.
+    """
+    if record.pieces is None:
+        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
+    run = Run(model, record.pieces, dt)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        apart, told = sharing.distances(run, record.t)
+    limit, meaning = CHECKS["shared"]
+    return apart, Finding("shared", float(apart[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
 
 
 def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:

@@ -111,7 +111,7 @@ def _laws(run: Run) -> Iterator[float]:
     along = pieces.impulse - pressed[:, None] * over.normal
     held_back = np.linalg.norm(along, axis=1)
     mass = reduced_mass(run)
-    speed = _speeds(run)
+    speed = speeds(run)
     scale = mass * speed + pressed.clip(min=0.0)
     owner = run.contact_owner
     # What corrects impulses at the end of a piece of the impulse-level scheme may be of any sign; the piece itself
@@ -205,7 +205,7 @@ def reduced_mass(run: Run) -> Array:
     return np.asarray(1.0 / np.where(inverse > 0.0, inverse, 1.0))
 
 
-def _speeds(run: Run) -> Array:
+def speeds(run: Run) -> Array:
     """Speeds (c,) whose differences a contact's velocity is: of both points, before and after, and of loads [m/s].
 
     At least what moves a body by some units in the last place of its size.

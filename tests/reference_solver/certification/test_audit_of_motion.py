@@ -134,7 +134,7 @@ LIMITS = {
     1e-9: {"spin", "path", "turn", "normal", "friction", "moment", "apart", "stays", "direction", "place", "choice", "together",
            "gained", "lost"},
     1e-7: {"resolution"},
-    1e-6: {"overlap", "start"},
+    1e-6: {"overlap", "start", "shared"},
     1e6: {"scale"},
 }  # fmt: skip
 

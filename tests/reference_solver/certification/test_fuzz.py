@@ -8,7 +8,7 @@ import pytest
 
 from reference_solver.certification.fuzz import trial
 from reference_solver.certification.fuzz.scenes import STRIDE, scene
-from reference_solver.certification.fuzz.trial import attack
+from reference_solver.certification.fuzz.trial import attack, conditions
 from reference_solver.certification.fuzz.variants import FINER, Variant, variants
 from reference_solver.certification.geometry import gap
 from reference_solver.certification.truth import certify, distance
@@ -22,6 +22,8 @@ ONCE_REFUSED = [
     *((2, seed) for seed in (0, 16, 46, 54, 63, 69, 124)),
     *((3, seed) for seed in (3, 18, 21, 45, 53, 65, 72)),
 ]
+#: Of these, a box slides and spins on four corners, and its motion is not determined.
+UNDETERMINED = {(3, 18), (3, 72)}
 #: Seeds that are attacked here; the command attacks hundreds.
 SAMPLE = {2: range(100, 106), 3: range(100, 104)}
 
@@ -120,7 +122,7 @@ class TestAttack:
     def test_short_pieces_obey_cone_sign_and_complementarity(self, dimension, seed):
         drawn = scene(seed, dimension)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
-        assert certificate.holds, certificate.reasons
+        assert set(conditions(certificate)) == ({"shared"} if (dimension, seed) in UNDETERMINED else set())
 
     @pytest.mark.parametrize("dimension", [2, 3])
     def test_a_variant_that_is_another_world_is_a_defect(self, monkeypatch, dimension):
