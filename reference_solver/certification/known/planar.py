@@ -9,7 +9,7 @@ import numpy as np
 from reference_solver.certification.known.motion import Motion, integrated
 from reference_solver.certification.space import GRAVITY, ROUNDNESS, Space
 from reference_solver.model import Array, Body, Model
-from reference_solver.shapes import Box, Capsule, Disc, HalfSpace, Polygon
+from reference_solver.shapes import Box, Capsule, Disc, HalfSpace, Polygon, Shape, Sphere
 
 Rng = np.random.Generator
 
@@ -27,7 +27,8 @@ def rollers(space: Space, rng: Rng) -> Motion:
     """Return a board on two rollers that turn inwards, and slip: it swings to and fro for ever.
 
     Rollers at -d and d carry N_1 and N_2. About the centre of a board of half thickness h at x,
-    ``N_1 (D + x) = N_2 (D - x)``, ``D = d - mu h``, so that ``x'' = mu (N_1 - N_2)/m = -(mu g/D) x``.
+    ``N_1 (D + x) = N_2 (D - x)``, ``D = d - mu h``, so that ``x'' = mu (N_1 - N_2)/m = -(mu g/D) x``. In space the
+    roller at d is a ball: on two rods the board has four contacts, and whether it yaws is not determined.
     """
     d, h, mu, radius = rng.uniform(0.6, 1.0), rng.uniform(0.03, 0.1), rng.uniform(0.2, 0.6), 0.2
     x, v, spin, time = rng.uniform(-0.3, 0.3), rng.uniform(-0.5, 0.5), rng.uniform(12.0, 20.0), rng.uniform(0.4, 0.8)
@@ -35,13 +36,11 @@ def rollers(space: Space, rng: Rng) -> Motion:
     bodies = []
     for side in (-1.0, 1.0):
         pose, twist = space.pose(side * d, 0.0), space.twist(spin=side * spin)
-        if space.dimension == 2:
-            bodies.append(Body(Disc(radius), pose=pose, twist=twist, motion="prescribed"))
-        else:  # the axis of a capsule across
+        shape: Shape = Disc(radius) if space.dimension == 2 else Sphere(radius)
+        if space.dimension == 3 and side < 0.0:  # the axis of a capsule across
             half = math.sqrt(0.5)
-            bodies.append(
-                Body(Capsule(1.0, radius), pose=(*pose[:3], half, 0.0, 0.0, half), twist=twist, motion="prescribed")
-            )
+            shape, pose = Capsule(1.0, radius), (*pose[:3], half, 0.0, 0.0, half)
+        bodies.append(Body(shape, pose=pose, twist=twist, motion="prescribed"))
     bodies.append(
         space.box(x, radius + h, space.twist(v), (2.5, h)) if space.dimension == 2 else _board(x, radius + h, v, h)
     )
