@@ -495,7 +495,7 @@ def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, c
     ("change", "field"),
     [
         ({"cone": "round"}, "cone"),
-        ({"integrator": "discrete"}, "integrator"),
+        ({"integrator": "Verlet"}, "integrator"),
         ({"iterations": 0}, "iterations"),
         ({"iterations": 3.0}, "iterations"),
         ({"tolerance": math.nan}, "tolerance"),
