@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,7 @@ from validation.cells import settings_of as settings_in
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
 from validation.settings.cures import Cure, cures_of
-from validation.settings.decisive import ALONE, COMPLETES, NEEDED, decisive
+from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, decisive
 from validation.settings.switching import switched
 
 #: What a setting's part in a cure is called.
@@ -35,14 +36,6 @@ class Change:
     after: str
     because: str
     role: str = ""
-
-
-def settings_of(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
-) -> list[Mapping[str, Any]]:
-    """Settings of a profile on a scene, as its representative cell (else its first one) got them."""
-    cell = shown_cell(observations, scene, dimension, engine, profile)
-    return list(cell.settings) if cell else []
 
 
 def shown_cell(
@@ -69,21 +62,49 @@ def shown_cell(
 
 
 def changes(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    before: str,
+    after: str,
+    params: Mapping[str, float] | None = None,
 ) -> list[Change]:
-    """Settings that profile ``after`` sets otherwise than ``before``, on this scene."""
-    old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
-    new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
+    """Settings that profile ``after`` sets otherwise than ``before``, in the engine's own words.
+
+    They are those of the cell of ``params``, see `shown_cell`.
+    """
+    cells = [shown_cell(observations, scene, dimension, engine, profile, params) for profile in (before, after)]
+    old, new = ({s["name"]: s for s in cell.settings} if cell else {} for cell in cells)
     measured = decisive(engine, scene, dimension, before, after)
     roles = {part.setting: ROLES[part.decides] for part in measured.parts} if measured else {}
     belongs = belongs_of(engine)
+    was, now = (_in_words(cell) if cell else {} for cell in cells)
     found = []
     for name, setting in new.items():
-        if name not in old or old[name]["value"] != setting["value"]:
-            was = setting_text(old[name]["value"]) if name in old else "as shipped"
+        if name in now and (name not in old or old[name]["value"] != setting["value"]):
             role = roles.get(name) or (f"belongs to {belongs[name]}" if measured and name in belongs else "")
-            found.append(Change(name, was, setting_text(setting["value"]), setting["because"], role))
+            word, value = now[name]
+            found.append(Change(word, was.get(name, ("", "as shipped"))[1], value, setting["because"], role))
     return found
+
+
+def _in_words(cell: Observation) -> dict[str, tuple[str, str]]:
+    """Settings of a cell, by name: what the engine itself calls them, and their values as text."""
+    settings = {s["name"]: s["value"] for s in cell.settings}
+    return in_words(cell.slot, settings)
+
+
+def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """What the engine of a slot calls settings, by our name: its own name, and the value or formula as text.
+
+    Without those that it tells with another one; see `adapters.engine.Engine.words`.
+    """
+    loaded = registry.adapter(slot.engine)
+    made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    words = loaded.words(settings, made, slot.dt) if loaded else {}
+    told = {name: words.get(name, (name, value)) for name, value in settings.items()}
+    return {name: (word, setting_text(value)) for name, (word, value) in told.items() if word}
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
@@ -92,10 +113,26 @@ def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int],
     What was measured in one dimension is said with it where rows of another fail as well.
     """
     measured = {d: decisive(engine, scene, d, before, after) for d in dimensions}
-    texts = {d: m.text for d, m in measured.items() if m is not None and m.version == version}
+    texts = {d: _decided(m) for d, m in measured.items() if m is not None and m.version == version}
     if len(texts) == len(dimensions) and len(set(texts.values())) == 1:
         return texts[dimensions[0]]
     return ", ".join(f"{text} ({d}-D)" for d, text in texts.items())
+
+
+def _decided(measured: Decisive) -> str:
+    """`Decisive.text` in the engine's own words."""
+    slot = Slot(measured.scene, (), measured.dimension, measured.engine, measured.better, QUICK_DT)
+    words = in_words(slot, _settings(slot))
+    return re.sub(r"\w+", lambda name: words.get(name[0], (name[0], ""))[0], measured.text)
+
+
+def _settings(slot: Slot) -> dict[str, Any]:
+    """Settings of a slot by name; none of an engine that is not ours."""
+    loaded = registry.adapter(slot.engine)
+    if loaded is None:
+        return {}
+    made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return {s.name: s.value for s in settings_in(loaded, slot, made)}
 
 
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
@@ -130,7 +167,7 @@ def cure_text(cure: Cure, where: str = "") -> str:
     where = where or f"{cure.dimension}-D"
     if not cure.helps:
         return f"{where}: none of {cure.tried} changes of its settings that were tried helps"
-    settings = ", ".join(f"{name}={setting_text(value)}" for name, value in cure.changes.items())
+    settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
     before, after, truth = _told_apart(cure.before, cure.after, cure.truth)
@@ -150,16 +187,27 @@ def _told_apart(before: float | None, after: float | None, truth: float) -> tupl
     return was, now, number(truth, digits)
 
 
+def changes_in_words(cure: Cure, changes: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Settings that a cure changes (or another of its scene) in the engine's own words, with values as text."""
+    slot = _slot(cure, changes)
+    words = in_words(slot, {**changes, **_settings(slot)})
+    return [words[name] for name in changes if name in words]
+
+
+def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
+    """The cell that a cure is told of, with settings replaced."""
+    params = tuple(sorted(cure.params.items()))
+    return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, QUICK_DT), changes)
+
+
 def cure_paste(cure: Cure) -> str:
     """The settings of a cure as lines of the engine's own language; empty if its adapter knows none."""
     loaded = registry.adapter(cure.engine)
     if loaded is None or not cure.changes:
         return ""
-    params = tuple(sorted(cure.params.items()))
-    slot = Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, QUICK_DT)
-    scene = resolve(cure.scene).scene(cure.dimension, dict(params))
-    settings = {s.name: s.value for s in settings_in(loaded, switched(slot, cure.changes), scene)}
-    return loaded.snippet(settings, list(cure.changes), scene, QUICK_DT)
+    slot = _slot(cure, cure.changes)
+    scene = resolve(cure.scene).scene(cure.dimension, dict(cure.params))
+    return loaded.snippet(_settings(slot), list(cure.changes), scene, slot.dt)
 
 
 def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
@@ -169,7 +217,7 @@ def how_measured(engine: str, scene: str, dimension: int, before: str, after: st
         return "Which of these matters was not measured, setting by setting: they are the profiles' difference."
     cells = "; ".join(params_text(cell) or "defaults" for cell in measured.cells)
     what = f"{', '.join(measured.metrics) or 'all checks'} of {scene} {measured.dimension}-D at {cells}"
-    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {measured.text}."
+    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {_decided(measured)}."
 
 
 def pasteable(
@@ -189,8 +237,10 @@ def pasteable(
     loaded = registry.adapter(engine)
     if cell is None or loaded is None:
         return ""
-    names = [change.name for change in changes(observations, scene, dimension, engine, before, after)]
+    shipped = shown_cell(observations, scene, dimension, engine, before, params)
+    old = {s["name"]: s["value"] for s in shipped.settings} if shipped else {}
     settings = {s["name"]: s["value"] for s in cell.settings}
+    names = [name for name, value in settings.items() if name not in old or old[name] != value]
     scene_of = resolve(cell.slot.scene)
     made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
     return loaded.snippet(settings, names, made, cell.slot.dt)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 
 import click
@@ -17,12 +16,12 @@ from adapters.registry import load, profile_of
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.cures import cure_paste, cure_text, setting_text
+from reports.cures import changes_in_words, cure_paste, cure_text
 from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
 from validation.catalogue import matching
-from validation.settings.cures import Changes, Cure, Unsearched, cures_of, search, write
+from validation.settings.cures import Cure, Unsearched, cures_of, search, write
 
 
 @main.command()
@@ -95,17 +94,18 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     costs = [duration(cost) if cost else "-" for cost in (found.cost_before, found.cost_after)]
     table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
     console.print(table, highlight=False)
-    for name, value in found.changes.items():
-        console.print(f"  {name} = {setting_text(value)}", markup=False, highlight=False, soft_wrap=True)
+    for name, value in changes_in_words(found, found.changes):
+        console.print(f"  {name} = {value}", markup=False, highlight=False, soft_wrap=True)
     if found.profile:
         console.print(f"  profile {found.profile} has all of it", markup=False, highlight=False)
     if found.others:
-        console.print(f"  or alone: {_alternatives(found.others)}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"  or alone: {_alternatives(found)}", markup=False, highlight=False, soft_wrap=True)
     paste = cure_paste(found)
     if paste:
         console.print("to paste:", style="bold")
         console.print(Text(paste), soft_wrap=True)
 
 
-def _alternatives(others: Sequence[Changes]) -> str:
-    return "; ".join(", ".join(f"{name} = {setting_text(value)}" for name, value in each.items()) for each in others)
+def _alternatives(found: Cure) -> str:
+    told = (changes_in_words(found, each) for each in found.others)
+    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in told)

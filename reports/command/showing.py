@@ -371,7 +371,7 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
     if not good or good[0] == row["profile"]:
         return "", "", []
     where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], good[0])
-    return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
+    return good[0], pasteable(*where, row["slot"]["params"]), changes(*where, row["slot"]["params"])
 
 
 def skill_text(row: Plain) -> str:
