@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters import registry
 from adapters.engine_folder import belongs_of
 from reports.wording import number, params_text
-from validation.cells import Observation, Slot
+from validation.cells import Observation, Slot, format_dt
 from validation.cells import settings_of as settings_in
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
-from validation.settings.cures import Cure, cures_of
-from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, decisive
+from validation.settings.cures import Cure, asked_of, cures_of
+from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, changes_of, decisive
 from validation.settings.switching import switched
 
 #: What a setting's part in a cure is called.
@@ -146,18 +147,77 @@ def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: 
 
 
 def told_cure(row: Mapping[str, Any]) -> str:
-    """What was measured to mend the check of one row, or that it is not among what the scene's cure mends."""
-    cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
-    if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
-        return ""
+    """What was measured to mend the check of one row, or that it is not among what was searched or is mended.
+
+    A cure is told of the cells, at the step, of which it was searched; of another case where it can be searched.
+    """
+    cure = _listed(row)
+    if cure is None:
+        return f"not searched for in this case: {search_command(row)}" if _can_be_searched(row) else ""
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
-    told = row["metric"] == cure.metric and _minimal(row) == _minimal({**row, "params": cure.params})
-    if not cure.helps or told or row["metric"].partition("[")[0] in kinds:
+    if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
     return f"none is known of this check; of {', '.join(kinds)} in this scene: {cure_text(cure)}"
 
 
-def _minimal(row: Mapping[str, Any]) -> object:
+def cure_of(row: Mapping[str, Any]) -> Cure | None:
+    """The listed cure that mends the check of a row in its own case, with its values there; None if none does."""
+    cure = _listed(row)
+    if cure is None or not cure.helps or not _is_mended(cure, row):
+        return None
+    params = dict(_minimal(row))
+    if params == dict(cure.params):
+        return cure
+    here = replace(cure, params=params)
+    if not cure.profile:
+        return here
+    wanted = changes_of(_slot(here, {}), cure.profile)
+    return replace(here, changes={name: wanted[name] for name in cure.changes if name in wanted})
+
+
+def _can_be_searched(row: Mapping[str, Any]) -> bool:
+    """Whether a row is of the profile that `search` starts from, in a cell that ran."""
+    brought = resolve(row["scene"]).brings.get(row["engine"])
+    start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")
+    return row["profile"] == start and row.get("outcome") not in ("unsupported", "not_installed")
+
+
+def _listed(row: Mapping[str, Any]) -> Cure | None:
+    """The listed cure that was searched in a row's own case, on its release."""
+    cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
+    if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
+        return None
+    asked = dict(_minimal(row)) in [dict(cell) for cell in cure.cells]
+    return cure if asked and row.get("dt", cure.dt) == cure.dt and row.get("iterations") is None else None
+
+
+def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
+    kinds = cure.mends or (cure.metric.partition("[")[0],)
+    told = row["metric"] == cure.metric and _minimal(row) == _minimal({**row, "params": cure.params})
+    return told or row["metric"].partition("[")[0] in kinds
+
+
+def is_standard(row: Mapping[str, Any]) -> bool:
+    """Whether a row's case is among those that a search of its scene asks by itself."""
+    if is_file(row["scene"]) or row.get("dt", QUICK_DT) != QUICK_DT or row.get("iterations") is not None:
+        return False
+    return dict(_minimal(row)) in asked_of(row["scene"], row["dimension"])
+
+
+def search_command(row: Mapping[str, Any]) -> str:
+    """Command that searches what mends a row's case."""
+    words = ["crosscheck", "cure", row["engine"], row["scene"]]
+    if not is_standard(row):
+        params = dict(_minimal(row))
+        words += [word for name, value in params.items() for word in ("--param", f"{name}={value:.12g}")]
+        brought = resolve(row["scene"]).brings.get(row["engine"])
+        if row.get("dt", QUICK_DT) != (brought.dt if brought else QUICK_DT):
+            words += ["--dt", format_dt(row["dt"])]
+        words += [] if is_file(row["scene"]) else ["--dim", str(row["dimension"])]
+    return shlex.join(words)
+
+
+def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
     """Parameters of a row, as what differs from its scene's defaults."""
     return resolve(row["scene"]).minimal(row.get("params", {}))
 
@@ -175,7 +235,11 @@ def cure_text(cure: Cure, where: str = "") -> str:
     numbers = f"{cure.metric}{f' at {at}' if at else ''} {before} -> {after}{unit}{aim}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
     cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
-    return f"{where} by {settings}: {numbers}{left}{cost}"
+    alone = ""
+    if cure.alone:
+        said = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.alone))
+        alone = f"; {said} alone: {number(cure.alone_after, 3)}{unit}"
+    return f"{where} by {settings}: {numbers}{left}{cost}{alone}"
 
 
 def _told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
@@ -197,7 +261,7 @@ def changes_in_words(cure: Cure, changes: Mapping[str, Any]) -> list[tuple[str, 
 def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
     """The cell that a cure is told of, with settings replaced."""
     params = tuple(sorted(cure.params.items()))
-    return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, QUICK_DT), changes)
+    return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
 
 
 def cure_paste(cure: Cure) -> str:
@@ -244,6 +308,27 @@ def pasteable(
     scene_of = resolve(cell.slot.scene)
     made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
     return loaded.snippet(settings, names, made, cell.slot.dt)
+
+
+def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str) -> tuple[str, str]:
+    """Lines to paste that mend the check of a row, and what they are; or that there are none to paste.
+
+    The smallest that was searched in the row's own case, else all that the profile ``better`` changes, which passes it:
+    both were run in this very case. Empty for a row that nothing is known to mend.
+    """
+    cure = cure_of(row)
+    if cure is None and not better:
+        return "", ""
+    if cure is not None:
+        paste, what = cure_paste(cure), "the smallest change that was found to mend this check"
+    else:
+        where = (row["scene"], row["dimension"], row["engine"], row["profile"], better)
+        paste, what = pasteable(observations, *where, row["slot"]["params"]), f"all that profile {better} changes"
+    if paste:
+        return paste, f"to paste ({what}):"
+    engine, scene = row["engine"], row["scene"]
+    shown = shlex.join(["crosscheck", "export", scene, "--to", "python", "--engine", engine, "--profile", better])
+    return "", f"nothing to paste: {engine} has no lines of settings; {shown} writes its calls"
 
 
 def setting_text(value: Any) -> str:

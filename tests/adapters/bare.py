@@ -20,61 +20,20 @@ from pathlib import Path
 import numpy as np
 
 from adapters.drives import velocity_over
-from adapters.lift import lift, lower_pose, lower_twist
+from adapters.engine import Contacts
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.needs import needs
-from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Sphere
-from adapters.trajectory import Trajectory
+from adapters.scene import Box, Capsule, Disc, HalfSpace, Hull, Sphere
+from adapters.stepping import step_count
+from adapters.trajectory import ContactRecord, Trajectory
+from validation.scenes.sized import enlarged, told_in_units_of
 
 #: Sizes, masses and the step of the models, beside a scene's.
 LENGTH, MASS, STEP = 0.3, 0.2, 1.0 / 500.0
 #: What is moved from outside outweighs what it moves by so much: its recoil is then far below a check's tolerance.
-HEAVY = 1e9
+HEAVY = 1e15
 #: Half width and half thickness of a box that stands for the ground [m].
 WIDE, THICK = 200.0, 20.0
-
-
-def enlarged(scene, length, mass):
-    """The scene in other sizes and masses, with the times of the same fall; see the module's docstring."""
-    time = math.sqrt(length)
-    d = scene.dimension
-
-    def body(one):
-        shape = {
-            Sphere: lambda s: Sphere(s.radius * length),
-            Disc: lambda s: Disc(s.radius * length),
-            Box: lambda s: Box(tuple(h * length for h in s.half_extents)),
-            Capsule: lambda s: Capsule(s.half_length * length, s.radius * length),
-            Cylinder: lambda s: Cylinder(s.half_length * length, s.radius * length),
-            Polygon: lambda s: Polygon(tuple(tuple(x * length for x in v) for v in s.vertices)),
-            Hull: lambda s: Hull(tuple(tuple(x * length for x in v) for v in s.vertices)),
-            HalfSpace: lambda s: HalfSpace(s.normal, s.offset * length),
-        }[type(one.shape)](one.shape)
-        moment = mass * length**2
-        return replace(
-            one,
-            name=f"my_{one.name}",
-            shape=shape,
-            mass=one.mass * mass,
-            inertia=tuple(i * moment for i in one.inertia) if isinstance(one.inertia, tuple) else one.inertia * moment,
-            pose=(*(x * length for x in one.pose[:d]), *one.pose[d:]),
-            twist=(*(v * length / time for v in one.twist[:d]), *(w / time for w in one.twist[d:])),
-            force=tuple(f * mass for f in one.force),
-            torque=tuple(t * mass * length for t in one.torque),
-            surface_velocity=tuple(v * length / time for v in one.surface_velocity),
-            course=one.course
-            and replace(
-                one.course,
-                amplitude=tuple(a * length for a in one.course.amplitude),
-                frequency=one.course.frequency / time,
-            ),
-        )
-
-    pairs = tuple(
-        replace(pair, **{end: f"my_{name}" for end, name in (("a", pair.a), ("b", pair.b)) if name != "*"})
-        for pair in scene.pairs
-    )
-    bodies = tuple(map(body, scene.bodies))
-    return replace(scene, bodies=bodies, pairs=pairs, duration=scene.duration * time)
 
 
 def run(engine, scene, paste, length=LENGTH, mass=MASS, step=STEP):
@@ -83,26 +42,31 @@ def run(engine, scene, paste, length=LENGTH, mass=MASS, step=STEP):
     Returns
     -------
     Trajectory
-        Without contacts.
+        With the contacts of every step.
     """
-    time = math.sqrt(length)
+    named = {body.name: f"my_{body.name}" for body in scene.bodies}
     mine = enlarged(scene, length, mass)
+    bodies = tuple(replace(body, name=named[body.name]) for body in mine.bodies)
+    pairs = tuple(replace(pair, a=named.get(pair.a, "*"), b=named.get(pair.b, "*")) for pair in mine.pairs)
+    mine = replace(mine, bodies=bodies, pairs=pairs)
     planar = scene.dimension == 2
     posed = lift(mine) if planar and engine != "chipmunk" else mine
-    steps = max(1, math.ceil(scene.duration * time / step - 1e-9))
-    pose, twist = (np.array(told, float) for told in zip(*BARE[engine](posed, step, steps, paste), strict=True))
+    steps = step_count(mine.duration, step)
+    *states, touching = zip(*BARE[engine](posed, step, steps, paste), strict=True)
+    pose, twist = (np.array(told, float) for told in states)
     for i, body in enumerate(mine.bodies):  # a belt that moves stands for one that runs where it is
         if any(body.surface_velocity):
             pose[:, i], twist[:, i] = posed.bodies[i].pose, 0.0
-    if planar and posed is not mine:
+    every = [row for rows in touching[1:] for row in rows]
+    contacts = Contacts.from_rows(every, posed.dimension)
+    if posed is not mine:
         pose = np.array([lower_pose(each) for each in pose])
         twist = np.array([lower_twist(each) for each in twist])
-    d = scene.dimension
-    pose[:, :, :d] /= length
-    twist[:, :, :d] *= time / length
-    twist[:, :, d:] *= time
-    own = step / time
-    return Trajectory(own * np.arange(len(pose)), pose, twist, None, own, "completed")
+        contacts = lower_contacts(contacts) if planar else contacts
+    offset = np.cumsum([0, *map(len, touching[1:])])
+    record = ContactRecord(np.arange(1, len(pose)), offset, contacts)
+    own = Trajectory(step * np.arange(len(pose)), pose, twist, record, step, "completed")
+    return told_in_units_of(own, length, mass)
 
 
 def motion(body, dt, k):
@@ -145,7 +109,7 @@ def mujoco(scene, dt, steps, paste):
     """MJCF as text: a geom for each body; friction of the geoms, or of pairs where they differ."""
     import mujoco as mj
 
-    pasted = pasted_mjcf(paste)
+    pasted, names = pasted_mjcf(paste), [body.name for body in scene.bodies]
     pairs = list(scene.contact_pairs())
     frictions = {material.friction for *_, material in pairs}
     shared = numbers(frictions.pop(), 0.005, 0.0001) if len(frictions) == 1 else None
@@ -197,16 +161,15 @@ def mujoco(scene, dt, steps, paste):
         elif element.tag == "option":
             options |= {name: value for name, value in element.attrib.items() if name != "timestep"}
     for i, j, material in pairs:
-        names = [scene.bodies[k].name for k in (i, j)]
         lines = [one for element in pasted if element.tag == "contact" for one in element if fits(one, material)]
         if all(isinstance(scene.bodies[k].shape, HalfSpace) for k in (i, j)) or not (lines or not shared):
             continue
         mu = numbers(material.friction, material.friction, 0.005, 0.0001, 0.0001)
         pair = ET.Element("pair", {"friction": mu})
-        for line in map(copy.copy, lines):
+        for line in map(copy.deepcopy, lines):
             valued(line, dt=dt, g=needs(scene).pull, e=material.restitution)
             pair.attrib |= line.attrib
-        pair.attrib |= {"geom1": names[0], "geom2": names[1]}
+        pair.attrib |= {"geom1": names[i], "geom2": names[j]}
         contacts.append(ET.tostring(pair, encoding="unicode"))
     options |= {"timestep": f"{dt:.17g}", "gravity": numbers(*scene.gravity)}
     option = " ".join(f'{name}="{value}"' for name, value in options.items())
@@ -232,8 +195,14 @@ def mujoco(scene, dt, steps, paste):
             pose[i] = data.qpos[joint : joint + 7].tolist()
             velocity = data.qvel[at : at + 6]
             twist[i] = [*velocity[:3], *(rotation(pose[i][3:]) @ velocity[3:])]
-        return pose, twist
+        force, rows = np.zeros(6), []
+        for k, contact in enumerate(data.contact):
+            mj.mj_contactForce(model, data, k, force)
+            frame = contact.frame.reshape(3, 3)
+            rows.append((*geoms[contact.geom], contact.pos.copy(), frame[0], dt * (force[:3] @ frame), contact.dist))
+        return pose, twist, rows
 
+    geoms = np.array([names.index(model.geom(k).name) for k in range(model.ngeom)])
     found = [state()]
     for k in range(steps):
         for i, (_, at, _) in places.items():
@@ -298,7 +267,8 @@ def turned_to(normal):
 # ---- Bullet ----------------------------------------------------------------------------------------------------------
 
 URDF = """<robot name="{name}"><link name="{name}">
-<inertial><mass value="{mass!r}"/><inertia ixx="{i[0]!r}" iyy="{i[1]!r}" izz="{i[2]!r}" ixy="0" ixz="0" iyz="0"/></inertial>
+<inertial><mass value="{mass!r}"/>
+<inertia ixx="{i[0]!r}" iyy="{i[1]!r}" izz="{i[2]!r}" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin rpy="0 {pitch!r} 0"/><geometry>{shape}</geometry></collision></link></robot>
 """
 
@@ -316,6 +286,7 @@ def bullet(scene, dt, steps, paste):
             for word in ast.parse(line.partition("#")[0].strip()).body[0].value.keywords:
                 value = eval(ast.unparse(word.value), {"p": p})
                 how[word.arg] = how["flags"] | value if word.arg == "flags" else value
+    solved = 0.0 if "contactProcessingThreshold=0.0" in paste else math.inf
     # The threshold is one of the whole process: what another model set must not stay.
     p.setPhysicsEngineParameter(fixedTimeStep=dt, contactBreakingThreshold=0.02)
     p.setGravity(*scene.gravity)
@@ -369,7 +340,14 @@ def bullet(scene, dt, steps, paste):
             turn = asked.pose[3:] if isinstance(asked.shape, HalfSpace) else (w, x, y, z)
             pose.append([*np.subtract(place, offset), *turn])
             twist.append(np.concatenate(p.getBaseVelocity(body)))
-        return pose, twist
+        rows = []
+        for told in p.getContactPoints():
+            on_a, on_b, normal, along, across = (np.array(told[column]) for column in (5, 6, 7, 11, 13))
+            pushed = told[9] * normal + told[10] * along + told[12] * across  # on the first body
+            # What is farther than its threshold is not solved, and tells the force of its last solution.
+            impulse = np.zeros(3) if told[8] > solved else -dt * pushed
+            rows.append((bodies.index(told[1]), bodies.index(told[2]), 0.5 * (on_a + on_b), -normal, impulse, told[8]))
+        return pose, twist, rows
 
     found = [state()]
     for k in range(steps):
@@ -431,7 +409,22 @@ def chipmunk(scene, dt, steps, paste):
     space.add(*bodies, *shapes)
 
     def state():
-        return [[*b.position, b.angle] for b in bodies], [[*b.velocity, b.angular_velocity] for b in bodies]
+        met = {}
+        for k, body in enumerate(bodies):
+            if scene.bodies[k].motion == "free":
+
+                def collect(arbiter, k=k):
+                    found = arbiter.contact_point_set
+                    other = shapes.index(arbiter.shapes[1])
+                    if (other, k) not in met:
+                        where = np.mean([point.point_a for point in found.points], axis=0)
+                        deepest = min(point.distance for point in found.points)
+                        row = (k, other, where, np.array(found.normal), -np.array(arbiter.total_impulse), deepest)
+                        met[k, other] = row
+
+                body.each_arbiter(collect)
+        pose, twist = zip(*(([*b.position, b.angle], [*b.velocity, b.angular_velocity]) for b in bodies), strict=True)
+        return pose, twist, list(met.values())
 
     found = [state()]
     for k in range(steps):
@@ -449,31 +442,30 @@ def start_deep(bodies, shapes, deep):
     """Move bodies by the least that lets all that touch overlap by ``deep``: as a user does by hand."""
     import pymunk
 
+    space, skin = pymunk.Space(), 1e-6 * LENGTH
+    before = [shape.radius for shape in shapes]
+    space.add(*bodies, *shapes)
+    for shape in shapes:
+        shape.unsafe_set_radius(shape.radius + skin)
     rows, wanted = [], []
-    for i, j in combinations(range(len(bodies)), 2):
-        moving = [bodies[k].body_type == pymunk.Body.DYNAMIC for k in (i, j)]
-        for body, shape in zip(bodies, shapes, strict=True):
-            shape.cache_bb()
-            assert body is shape.body
-        skin = 1e-6 * LENGTH
-        before = [shape.radius for shape in (shapes[i], shapes[j])]
-        for shape in (shapes[i], shapes[j]):
-            shape.unsafe_set_radius(shape.radius + skin)
-        touch = shapes[i].shapes_collide(shapes[j])
-        for shape, radius in zip((shapes[i], shapes[j]), before, strict=True):
-            shape.unsafe_set_radius(radius)
-        if not any(moving) or not touch.points:
-            continue
-        row = np.zeros((len(bodies), 2))
-        row[i], row[j] = -moving[0] * np.array(touch.normal), moving[1] * np.array(touch.normal)
-        gap = max(0.0, min(point.distance for point in touch.points) + 2.0 * skin)
-        rows.append(row.ravel())
-        wanted.append(-deep - gap)
+    for i, shape in enumerate(shapes):
+        for hit in space.shape_query(shape):
+            j = shapes.index(hit.shape)
+            free = [bodies[k].body_type == pymunk.Body.DYNAMIC for k in (i, j)]
+            if i < j and any(free):
+                normal = np.array(hit.contact_point_set.normal)
+                row = np.zeros((len(bodies), 2))
+                row[i], row[j] = -free[0] * normal, free[1] * normal
+                rows.append(row.ravel())
+                depth = max(abs(point.distance) for point in hit.contact_point_set.points)
+                wanted.append(-deep - max(0.0, 2.0 * skin - depth))
+    space.remove(*bodies, *shapes)
+    for shape, radius in zip(shapes, before, strict=True):
+        shape.unsafe_set_radius(radius)
     if rows:
         shift = np.linalg.lstsq(np.array(rows), np.array(wanted), rcond=None)[0].reshape(-1, 2)
-        for body, (x, y) in zip(bodies, shift, strict=True):
-            if (x, y) != (0.0, 0.0):
-                body.position = (body.position.x + x, body.position.y + y)
+        for body, moved in zip(bodies, shift, strict=True):
+            body.position = (body.position.x + moved[0], body.position.y + moved[1])
 
 
 BARE = {"mujoco": mujoco, "bullet": bullet, "chipmunk": chipmunk}

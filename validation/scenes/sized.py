@@ -15,24 +15,21 @@ import numpy as np
 
 from adapters.scene import Body, Scene
 from adapters.shapes import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Shape, Sphere
-from adapters.trajectory import Trajectory
+from adapters.trajectory import Sampling, Trajectory
 from validation.canonical import CanonicalScene
 
+#: Masses of a scene in other sizes: unlike those that the same matter would have, so that neither is a unit.
+MASS = 0.2
 
-def sized(base: CanonicalScene, length: float, mass: float) -> CanonicalScene:
-    """Return ``base`` with all lengths and masses multiplied; it is judged as ``base`` is, in the units of that.
 
-    Parameters
-    ----------
-    length, mass
-        Factors, > 0.
-    """
-    time = math.sqrt(length)
+def sized(base: CanonicalScene, length: float) -> CanonicalScene:
+    """Return ``base`` with all lengths multiplied, and masses by `MASS`; it is judged in the units of ``base``."""
+    mass, time = MASS, math.sqrt(length)
 
     def own(scene: Scene) -> Scene:
         return base.scene(scene.dimension, scene.params)
 
-    def sampling(scene: Scene):  # type: ignore[no-untyped-def]
+    def sampling(scene: Scene) -> Sampling:
         found = base.sampling(own(scene))
         start = found.contacts_from
         return replace(found, contacts_from=None if start is None else start * time)
@@ -102,7 +99,7 @@ def told_in_units_of(found: Trajectory, length: float, mass: float) -> Trajector
     twist[:, :, d:] *= time
     contacts = found.contacts
     if contacts is not None:
-        rows = contacts.rows
-        shorter = {"point": rows.point / length, "gap": rows.gap / length}
-        contacts = replace(contacts, rows=replace(rows, **shorter, impulse=rows.impulse * (time / (mass * length))))
+        rows, impulse = contacts.rows, contacts.rows.impulse * (time / (mass * length))
+        rows = replace(rows, point=rows.point / length, gap=rows.gap / length, impulse=impulse)
+        contacts = replace(contacts, rows=rows)
     return replace(found, t=found.t / time, pose=pose, twist=twist, contacts=contacts, dt=found.dt / time)
