@@ -10,6 +10,7 @@ from typing import Any
 
 from adapters import registry
 from adapters.engine_folder import belongs_of
+from adapters.scene import SceneError
 from reports.wording import number, params_text
 from validation.cells import Observation, Slot, format_dt
 from validation.cells import settings_of as settings_in
@@ -193,7 +194,7 @@ def _listed(row: Mapping[str, Any]) -> Cure | None:
 
 def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
     kinds = cure.mends or (cure.metric.partition("[")[0],)
-    told = row["metric"] == cure.metric and _minimal(row) == _minimal({**row, "params": cure.params})
+    told = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
     return told or row["metric"].partition("[")[0] in kinds
 
 
@@ -218,8 +219,15 @@ def search_command(row: Mapping[str, Any]) -> str:
 
 
 def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
-    """Parameters of a row, as what differs from its scene's defaults."""
-    return resolve(row["scene"]).minimal(row.get("params", {}))
+    """Parameters of a row, as what differs from its scene's defaults; as they are where the scene of today has not all.
+
+    A row may be of a run of before a parameter had another name or range.
+    """
+    params = row["slot"]["params"] if "slot" in row else row.get("params", {})
+    try:
+        return resolve(row["scene"]).minimal(params)
+    except SceneError:
+        return tuple(sorted(params.items()))
 
 
 def cure_text(cure: Cure, where: str = "") -> str:

@@ -30,8 +30,9 @@ from validation.scenes.sized import enlarged, told_in_units_of
 
 #: Sizes, masses and the step of the models, beside a scene's.
 LENGTH, MASS, STEP = 0.3, 0.2, 1.0 / 500.0
-#: What is moved from outside outweighs what it moves by so much: its recoil is then far below a check's tolerance.
-HEAVY = 1e15
+#: What is moved from outside outweighs what it moves by so much: its recoil is then far below a check's tolerance. A
+#: belt is lighter than a piston: its checks allow more, and MuJoCo ends its iterations by the mean inertia of all.
+HEAVY, BELT = 1e15, 1e9
 #: Half width and half thickness of a box that stands for the ground [m].
 WIDE, THICK = 200.0, 20.0
 
@@ -78,6 +79,12 @@ def is_moved(body):
     return body.motion == "prescribed" or any(body.surface_velocity)
 
 
+def heavy_of(scene, body):
+    """Mass of a body that is moved from outside [kg]."""
+    free = max((one.mass for one in scene.bodies if one.motion == "free"), default=1.0)
+    return (HEAVY if body.motion == "prescribed" else BELT) * free
+
+
 def by_product(scene, quantity):
     """A number for each body of which products are those of the pairs: engines that multiply are given such ones."""
     pairs = [(i, j, getattr(material, quantity)) for i, j, material in scene.contact_pairs()]
@@ -114,7 +121,6 @@ def mujoco(scene, dt, steps, paste):
     frictions = {material.friction for *_, material in pairs}
     shared = numbers(frictions.pop(), 0.005, 0.0001) if len(frictions) == 1 else None
     assets, bodies, contacts = [], [], []
-    heavy = HEAVY * max((b.mass for b in scene.bodies if b.motion == "free"), default=1.0)
     for body in scene.bodies:
         shape, x = body.shape, (0.0, 0.0, 0.0)
         turn, extra = (1.0, 0.0, 0.0, 0.0), ""
@@ -147,6 +153,7 @@ def mujoco(scene, dt, steps, paste):
             lines = f'<body pos="{numbers(*body.pose[:3])}" quat="{numbers(*body.pose[3:])}">{geom}</body>'
             bodies.append(geom if isinstance(shape, HalfSpace) else lines)
             continue
+        heavy = heavy_of(scene, body)
         mass, moments = (body.mass, body.inertia) if free else (heavy, (heavy,) * 3)
         inertial = f'<inertial pos="0 0 0" mass="{mass:.17g}" diaginertia="{numbers(*moments)}"/>'
         place = f'pos="{numbers(*body.pose[:3])}" quat="{numbers(*body.pose[3:])}"'
@@ -294,7 +301,6 @@ def bullet(scene, dt, steps, paste):
         if "setPhysics" in line:
             exec(line, {"p": p})
     bodies, offsets = [], []
-    heavy = HEAVY * max((b.mass for b in scene.bodies if b.motion == "free"), default=1.0)
     restitution, friction = (by_product(scene, name) for name in ("restitution", "friction"))
     with tempfile.TemporaryDirectory() as folder:
         for k, body in enumerate(scene.bodies):
@@ -315,7 +321,7 @@ def bullet(scene, dt, steps, paste):
                 kind = "capsule" if isinstance(shape, Capsule) else "cylinder"
                 said, pitch = f'<{kind} radius="{shape.radius!r}" length="{2 * shape.half_length!r}"/>', math.pi / 2
             free = body.motion == "free"
-            mass = body.mass if free else heavy if is_moved(body) else 0.0
+            mass = body.mass if free else heavy_of(scene, body) if is_moved(body) else 0.0
             moments = body.inertia if free else (mass, mass, mass)
             text = URDF.format(name=body.name, mass=mass, i=moments, shape=said, pitch=pitch)
             Path(folder, f"{k}.urdf").write_text(text, encoding="ascii")
