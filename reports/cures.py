@@ -208,14 +208,16 @@ def is_standard(row: Mapping[str, Any]) -> bool:
 def search_command(row: Mapping[str, Any]) -> str:
     """Command that searches what mends a row's case."""
     words = ["crosscheck", "cure", row["engine"], row["scene"]]
-    if not is_standard(row):
-        params = dict(_minimal(row))
-        words += [word for name, value in params.items() for word in ("--param", f"{name}={value:.12g}")]
-        brought = resolve(row["scene"]).brings.get(row["engine"])
-        if row.get("dt", QUICK_DT) != (brought.dt if brought else QUICK_DT):
-            words += ["--dt", format_dt(row["dt"])]
-        words += [] if is_file(row["scene"]) else ["--dim", str(row["dimension"])]
-    return shlex.join(words)
+    return shlex.join(words if is_standard(row) else [*words, *_case(row)])
+
+
+def _case(row: Mapping[str, Any]) -> list[str]:
+    """Options that ask for a row's case."""
+    words = [word for name, value in _minimal(row) for word in ("--param", f"{name}={value:.12g}")]
+    brought = resolve(row["scene"]).brings.get(row["engine"])
+    if row.get("dt", QUICK_DT) != (brought.dt if brought else QUICK_DT):
+        words += ["--dt", format_dt(row["dt"])]
+    return words if is_file(row["scene"]) else [*words, "--dim", str(row["dimension"])]
 
 
 def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
@@ -331,12 +333,12 @@ def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str
         paste, what = cure_paste(cure), "the smallest change that was found to mend this check"
     else:
         where = (row["scene"], row["dimension"], row["engine"], row["profile"], better)
-        paste, what = pasteable(observations, *where, row["slot"]["params"]), f"all that profile {better} changes"
-    if paste:
-        return paste, f"to paste ({what}):"
+        paste, what = pasteable(observations, *where, dict(_minimal(row))), f"all that profile {better} changes"
+    if paste or not better:
+        return paste, f"to paste ({what}):" if paste else ""
     engine, scene = row["engine"], row["scene"]
-    shown = shlex.join(["crosscheck", "export", scene, "--to", "python", "--engine", engine, "--profile", better])
-    return "", f"nothing to paste: {engine} has no lines of settings; {shown} writes its calls"
+    words = ["crosscheck", "export", scene, *_case(row), "--engine", engine, "--profile", better, "--to", "python"]
+    return "", f"nothing to paste: {engine} has no lines of settings; {shlex.join(words)} writes its calls"
 
 
 def setting_text(value: Any) -> str:

@@ -21,9 +21,10 @@ import numpy as np
 
 from adapters.drives import velocity_over
 from adapters.engine import Contacts
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
+from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
 from adapters.needs import needs
 from adapters.scene import Box, Capsule, Disc, HalfSpace, Hull, Sphere
+from adapters.shapes import reach
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.scenes.sized import enlarged, told_in_units_of
@@ -59,14 +60,15 @@ def run(engine, scene, paste, length=LENGTH, mass=MASS, step=STEP):
         if any(body.surface_velocity):
             pose[:, i], twist[:, i] = posed.bodies[i].pose, 0.0
     every = [row for rows in touching[1:] for row in rows]
-    contacts = Contacts.from_rows(every, posed.dimension)
+    contacts, outside = Contacts.from_rows(every, posed.dimension), None
     if posed is not mine:
+        outside = out_of_plane(pose, np.array([reach(body.shape) for body in mine.bodies])) / length
         pose = np.array([lower_pose(each) for each in pose])
         twist = np.array([lower_twist(each) for each in twist])
         contacts = lower_contacts(contacts) if planar else contacts
     offset = np.cumsum([0, *map(len, touching[1:])])
     record = ContactRecord(np.arange(1, len(pose)), offset, contacts)
-    own = Trajectory(step * np.arange(len(pose)), pose, twist, record, step, "completed")
+    own = Trajectory(step * np.arange(len(pose)), pose, twist, record, step, "completed", out_of_plane=outside)
     return told_in_units_of(own, length, mass)
 
 

@@ -11,6 +11,8 @@ from bare import LENGTH, MASS, STEP, run
 
 from adapters.registry import names
 from reports.cures import cure_paste
+from validation.cells import plane_of
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
 from validation.settings.cures import cures_of
@@ -33,9 +35,10 @@ def judged(engine, scene, dimension, params, paste, size):
     canonical = resolve(scene)
     asked = canonical.scene(dimension, dict(params))
     found = run(engine, asked, paste, length, mass, step)
-    measured = canonical.measure(asked, found)
+    measured = canonical.measure(asked, found) | {OUT_OF_PLANE: (found.out_of_plane, "")}
+    plane = [] if found.out_of_plane is None else plane_of(canonical, asked, found.dt)
     errors = {}
-    for check in canonical.checks(asked, found.dt):
+    for check in [*canonical.checks(asked, found.dt), *plane]:
         if check.truth is not None and check.bound:
             value, _ = measured.get(check.metric, (None, ""))
             errors[check.metric] = None if value is None else abs(value - check.truth) / check.bound

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from adapters.engine_folder import CURES, inside
 from adapters.registry import facts, find, names
 from reports.command import main
-from reports.cures import changes_in_words, cure_of, cure_paste, cure_text, decided_by, told_cure, told_cures
+from reports.cures import changes_in_words, cure_of, cure_paste, cure_text, decided_by, fix, told_cure, told_cures
 from validation.cells import Observation, Outcome, Slot
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
@@ -134,6 +134,24 @@ def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
     for params, damping in (({"e": 1.0}, -480), ({}, -432)):
         found = cure_of(row | {"params": params})
         assert f'solref="0 {damping}"' in cure_paste(found) and found.params == params
+
+
+def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_lines_says_so(monkeypatch):
+    listed = {("pinch", 2): replace(CURE, mends=("creep",))}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "<option/>")
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
+    row |= {"metric": "creep", "params": {"margin": 1.05}, "dt": 1 / 240, "iterations": None}
+    paste, said = fix(row, [], "tuned")
+    assert paste == cure_paste(CURE) and "smallest" in said
+    assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("<option/>", "to paste (all that profile tuned changes):")
+    assert fix(row | {"dt": 1 / 500}, [], "") == ("", "")
+    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "")
+    export = (
+        "crosscheck export pinch --param margin=1.05 --dt 1/500 --dim 2 --engine mujoco --profile tuned --to python"
+    )
+    said = f"nothing to paste: mujoco has no lines of settings; {export} writes its calls"
+    assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("", said)
 
 
 def test_no_fix_that_is_printed_has_a_word_that_its_engine_has_not():

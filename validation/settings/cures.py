@@ -48,8 +48,8 @@ MOST_CELLS = 6
 ROUNDS = 7
 #: Simulated time that is clocked [s].
 CLOCKED = 0.5
-#: Sizes, beside the scene's, and the step [s] at which a cure must hold as well: MuJoCo's customary step, and bodies of
-#: centimetres, as grippers have them, in place of decimetres and metres.
+#: Sizes, beside the scene's, and the step [s] at which a cure must hold as well: bodies of centimetres, as grippers
+#: have them, in place of decimetres and metres, and the step that is customary in robotics.
 ELSEWHERE = (0.3, 1.0 / 500.0)
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
 INVISIBLE = 1e-3
