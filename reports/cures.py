@@ -177,10 +177,11 @@ def cure_of(row: Mapping[str, Any]) -> Cure | None:
 
 
 def _can_be_searched(row: Mapping[str, Any]) -> bool:
-    """Whether a row is of the profile that `search` starts from, in a cell that ran."""
+    """Whether a row is of the profile that `search` starts from, in a cell that ran at its own iterations."""
     brought = resolve(row["scene"]).brings.get(row["engine"])
     start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")
-    return row["profile"] == start and row.get("outcome") not in ("unsupported", "not_installed")
+    ran = row.get("outcome") not in ("unsupported", "not_installed") and row.get("iterations") is None
+    return ran and row["profile"] == start
 
 
 def _listed(row: Mapping[str, Any]) -> Cure | None:

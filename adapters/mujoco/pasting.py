@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -98,7 +97,7 @@ def _of_all(
         depth, _ = pair["margin"]
         geom["margin"] = (0.5 * depth, _margin_formula(0.5 * depth, scene, dt))
     of_geoms = _comment([*said, *_holds(geom, bounces, scene, dt)])
-    of_pairs = _comment(["the same for explicit pairs, which take nothing from geoms", *_formulas(pair)])
+    of_pairs = _comment(["the same for explicit pairs, which take nothing from geoms", *_formulas(pair, bounces)])
     lines = (of_geoms, _element("geom", geom), of_pairs, _element("pair", pair))
     return ["<default>", *(f"  {line}" for line in lines), "</default>"]
 
@@ -139,22 +138,21 @@ def _margin_formula(margin: float, scene: Scene, dt: float) -> str:
     return f"{share:.4g}*g*dt^2" if share and abs(float(f"{share:.4g}") / share - 1.0) < 1e-9 else ""
 
 
-def _formulas(told: Mapping[str, Told]) -> list[str]:
+def _formulas(told: Mapping[str, Told], bounces: Collection[float]) -> list[str]:
     """Attributes with their formulas in place of the numbers; nothing where all are constants."""
     formulas = " ".join(f'{name}="{formula}"' for name, (_, formula) in told.items() if formula)
-    return [f"for others: {formulas}"] if formulas else []
+    which = f" with e {'>' if max(bounces) > 0.0 else '='} 0" if bounces else ""
+    return [f"for others{which}: {formulas}"] if formulas else []
 
 
-def _holds(told: Mapping[str, Told], bounces: set[float], scene: Scene, dt: float) -> list[str]:
+def _holds(told: Mapping[str, Told], bounces: Collection[float], scene: Scene, dt: float) -> list[str]:
     """For which e, step and gravity numbers are, and the formulas for others; nothing where all are constants."""
-    formulas = _formulas(told)
+    formulas = _formulas(told, bounces)
     if not formulas:
         return []
     e = max(bounces, default=0.0)
-    known = {"e": f"e = {e:g}", "dt": f"dt = {dt:.9g} s", "g": f"g = {needs(scene).pull:.9g} m/s^2"}
-    named = [text for name, text in known.items() if re.search(rf"\b{name}\b", formulas[0])]
-    positive = ", which hold for e > 0" if e > 0.0 else ", which hold for e = 0" if bounces else ""
-    return [f"the numbers are for {', '.join(named)}{positive}", *formulas]
+    known = {"1+e": f"e = {e:g}", "dt": f"dt = {dt:.9g} s", "g*": f"g = {needs(scene).pull:.9g} m/s^2"}
+    return [f"the numbers are for {', '.join(text for name, text in known.items() if name in formulas[0])}", *formulas]
 
 
 def _comment(said: Sequence[str]) -> str:

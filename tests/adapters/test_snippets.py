@@ -160,7 +160,7 @@ def test_a_pasted_rebound_holds_at_any_step_by_the_formula_beside_it_and_at_its_
     pytest.importorskip("mujoco")
     scene = drop(3, e, -9.81)
     paste = tuned_paste(scene)
-    assert f"the numbers are for e = {e:g}, dt = {DT:.9g} s, which hold for e > 0" in paste
+    assert f"the numbers are for e = {e:g}, dt = {DT:.9g} s;" in paste and "for others with e > 0: " in paste
     found = run("mujoco", scene, paste, size, 1.0, step)
     up = found.twist[:, 1, 2]
     k = int((up > 0.0).argmax())
