@@ -347,10 +347,19 @@ class Engine(ABC):
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
 
-        Written out for the material of the scene's first pair and step ``dt`` [s]; empty where an adapter knows no
-        such words.
+        Numbers are those of step ``dt`` [s] and of the scene's materials. Where one is made of the restitution e, the
+        step or gravity, its formula stands in a comment beside it, with ``dt`` and ``g`` and ``e`` for them. Where
+        pairs of different materials need different lines, each material has its own. Empty where an adapter knows no
+        such lines.
         """
         return ""
+
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """What the engine itself calls settings: by our name its own name, and the value or the formula in its words.
+
+        A setting that is not among them has one name for both. An empty name: the setting is told with another one.
+        """
+        return {}
 
     def settings(self, profile: str, needs: Needs, dt: float, iterations: int | None = None) -> list[Setting]:
         """Settings of ``profile``; ``iterations`` replaces the profile's own count.

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.cures import decided_by, told_cures
+from reports.cures import decided_by, is_standard, search_command, told_cures
 from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
@@ -161,30 +161,37 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
 
 
 def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
-    """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
+    """Which other profile passes every row, or is the nearest to it; that none is better, or that none was run."""
     failed = _failing(own[profile])
-    engine = failed[0]["engine"]
     if all(mark_of(row) == "invalid" for row in failed):
         return "nothing is said of the engine, so that there is nothing to cure"
-    others = {name: group for name, group in own.items() if name != profile and is_ranked(engine, name)}
+    row, dimensions = failed[0], sorted({row["dimension"] for row in failed if is_standard(row)})
+    others = {
+        name: group for name, group in own.items()
+        if name != profile and is_ranked(row["engine"], name) and {*map(_case, failed)} <= {*map(_case, group)}
+    }  # fmt: skip
     good = [name for name, group in others.items() if not _failing(group)]
-    row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
     listed = told_cures(row["engine"], row["engine_version"], row["scene"], profile, dimensions)
     if good:
         which = (row["engine"], row["engine_version"], row["scene"], dimensions, profile)
-        by = {name: decided_by(*which, name) for name in good} if not listed else {}
+        by = {name: decided_by(*which, name) for name in good} if dimensions and not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
         return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
-    # A search asks scenes of the catalogue: of a file nothing is promised.
-    searched = row["scene"] in CATALOGUE and not listed
-    unlisted = [f"crosscheck cure {row['engine']} {row['scene']} searches for settings"] if searched else []
+    unlisted = [] if listed else [f"{search_command(row)} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
-    if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):
+    if best is None:
+        return "; ".join(["no other profile was run in this case", *listed, *unlisted])
+    if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])
     nearer = f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
     return "; ".join([nearer, *listed, *unlisted])
+
+
+def _case(row: Plain) -> tuple[Any, ...]:
+    """What was asked of a row, but for the profile: a row of another step says nothing of this one."""
+    return row["dimension"], str(row["params"]), row["dt"], row["metric"]
 
 
 # ---- in words ----

@@ -153,20 +153,25 @@ class BulletEngine(Engine):
         return BulletSimulation(scene, dt, settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: parameters of the world, of how bodies are made, and of each body."""
-        lines = [f"# p: pybullet; fixedTimeStep={dt:.9g}; body: each of your bodies"]
-        world = [f"numSolverIterations={settings[n]}" if n == "iterations" else f"{n}={settings[n]!r}"
-                 for n in names if n in WORLD | {"iterations"}]  # fmt: skip
+        """Python: parameters of the world, of how bodies are made, and of each body; none depends on the step."""
+        lines = []
+        world = [f"{_WORDS.get(n, n)}={settings[n]!r}" for n in names if n in WORLD | {"iterations"}]
         if world:
-            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})")
+            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})  # of the whole world")
         if "useMaximalCoordinates" in names:
-            lines.append(f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})")
+            lines.append(
+                f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})  # each body"
+            )
         if settings.get("enableSAT") and "enableSAT" in names:
             lines.append("p.loadURDF(..., flags=p.URDF_INITIALIZE_SAT_FEATURES)  # each box and hull")
         body = [f"{n}={settings[n]!r}" for n in names if n in BODY]
         if body:
-            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})")
-        return "\n".join(lines)
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})  # each body")
+        return "\n".join(["# p: pybullet", *lines]) if lines else ""
+
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """Parameters of pybullet."""
+        return {name: (word, settings[name]) for name, word in _WORDS.items() if name in settings}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
@@ -184,6 +189,10 @@ class BulletEngine(Engine):
         because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
         rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
         return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
+
+
+#: What pybullet calls a setting otherwise than we do.
+_WORDS = {"iterations": "numSolverIterations"}
 
 
 def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str, Declared]:

@@ -30,6 +30,10 @@ KINDS: Mapping[str, Check] = MappingProxyType(
     }
 )
 UNSET = ("damping", "idle_speed_threshold", "sleep_time_threshold")
+#: Overlap that is never pushed out, as a share of the smallest body.
+SLOP_SHARE = 1e-3
+#: How deep touching bodies start, as a share of the way that they fall in a step.
+START_SHARE = 0.3
 SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
 
 
@@ -47,7 +51,7 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for what the scene needs."""
-    slop, resting = 1e-3 * needs.smallest_size, needs.regime == "rest"
+    slop, resting = SLOP_SHARE * needs.smallest_size, needs.regime == "rest"
     heavy = needs.mass_ratio >= 100.0
     return [
         Setting(
@@ -92,8 +96,8 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
     """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
-    fall = needs.pull * dt * dt
-    return min(0.5 * slop, 0.3 * fall) if fall > 0.0 else 0.5 * slop
+    fall = START_SHARE * (needs.pull * dt * dt)
+    return min(0.5 * slop, fall) if fall > 0.0 else 0.5 * slop
 
 
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})

@@ -20,7 +20,8 @@ from adapters.mujoco.combination import MINVAL
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
 from adapters.mujoco.options import own_kinds
-from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
+from adapters.mujoco.pairs import contact_law
+from adapters.mujoco.pasting import snippet, words
 from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
@@ -173,44 +174,12 @@ class MujocoEngine(Engine):
         return declared
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """MJCF: ``<option>``, and the contact parameters on every geom (on a pair where only a pair has them)."""
-        material = next((material for _, _, material in scene.contact_pairs()), None)
-        option = {name: settings[name] for name in _OPTIONS if name in names}
-        contact: dict[str, Any] = {}
-        if material is None:  # nothing meets: what is set of contacts does nothing
-            names = set(names) & set(_OPTIONS)
-        elif {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
-            contact["solref"] = pair_solref(settings, material.restitution, dt)
-        if "solimp" in names:
-            contact["solimp"] = settings["solimp"]
-        if material is not None and "smooth_condim" in names and material.friction == 0.0:
-            contact["condim"] = settings["smooth_condim"]
-        paired = "solreffriction" in names
-        if "margin" in names:
-            contact["margin"] = settings["margin"] * (1.0 if paired else 0.5)  # a pair's is the sum of its geoms'
-        if paired:
-            contact["solreffriction"] = pair_solreffriction(settings, dt)
-        lines = [_element("option", {"timestep": dt, **option})]
-        if contact and paired:
-            lines.append(f"<contact>{_element('pair', {'geom1': 'A', 'geom2': 'B', **contact})}</contact>")
-        elif contact:
-            lines.append(f"<default>{_element('geom', contact)}</default>")
-        return "\n".join(lines)
+        """MJCF: ``<option>``, and the contact parameters of every geom, or of each pair where materials differ."""
+        return snippet(settings, names, scene, dt)
 
-
-#: Settings that are attributes of MJCF's ``<option>``, by the same name.
-_OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
-
-
-def _element(name: str, attributes: Mapping[str, Any]) -> str:
-    """One empty MJCF element; numbers keep all digits that matter to a step."""
-
-    def text(value: Any) -> str:
-        if isinstance(value, tuple | list):
-            return " ".join(text(item) for item in value)
-        return f"{value:.9g}" if isinstance(value, float) else str(value)
-
-    return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, value in attributes.items()) + "/>"
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """Attributes of MJCF."""
+        return words(settings, scene, dt)
 
 
 def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:

@@ -91,17 +91,18 @@ def parameter(text: str) -> tuple[str, float]:
         raise SceneError(f"param: {name}={value!r} is not a number") from None
 
 
-def _once(texts: Sequence[str]) -> dict[str, float]:
-    """Parameters that are fixed; of two values for one of them neither is what was asked for."""
+def fixed(texts: Sequence[str]) -> dict[str, float] | None:
+    """Parameters that are fixed, None if none is; of two values for one of them neither is what was asked for."""
     found: dict[str, float] = {}
     for name, value in map(parameter, texts):
         if name in found:
             raise SceneError(f"param: {name} is given twice; crosscheck sweep --grid asks several values")
         found[name] = value
-    return found
+    return found or None
 
 
-def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
+def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
+    """Names of the scenes that are meant: of the catalogue by name or pattern (all by default), and files, pinned."""
     names: list[str] = []
     for argument in arguments or ["*"]:
         names += [pinned(argument, drop)] if is_file(argument) else [scene.name for scene in matching(argument)]
@@ -116,13 +117,13 @@ def request_from(options: dict[str, Any]) -> Request:
         registry.find(name)
     dimensions = list(options["dim"])
     request = Request(
-        scenes=_scene_names(options["scenes"], options.get("drop", False)),
+        scenes=scene_names_of(options["scenes"], options.get("drop", False)),
         engines=list(options["engine"]) or registry.usual(),
         profiles=list(options["profile"]),
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
-        params=_once(options["param"]) or None,
+        params=fixed(options["param"]),
         suite=suite,
         ulps=tuple(options["ulp"]) or (0,),
         floors=suite == "full" and not options["ulp"],

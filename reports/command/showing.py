@@ -22,7 +22,7 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.command.selection import SET
-from reports.cures import Change, changes, how_measured, pasteable, told_cure
+from reports.cures import Change, changes, fix, how_measured, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
@@ -266,7 +266,7 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
     observations = _where(kept.observations, row)
     rows = judged(kept.run, observations)
     found = find_row(rows, row)
-    better, paste, differing = _cure(rows, observations, found)
+    better, paste, said, differing = _cure(rows, observations, found)
     if as_json:
         plain = [
             {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
@@ -288,7 +288,7 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
             )
         )
         return
-    _print_explanation(found, _beside_the_plane(rows, found), better, paste, differing, terminal())
+    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, terminal())
 
 
 def _with_own(row: str, sets: Sequence[str]) -> str:
@@ -380,19 +380,20 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
     return next(row for row in rows if row_id(row).startswith(name.lower()))
 
 
-def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, list[Change]]:
-    """A profile of the same engine that passes this very row, its settings to paste, and what it changes."""
+def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:
+    """A profile of the same engine that passes this very row, lines to paste and what they are, and what it changes."""
     if mark_of(row) == "pass":
-        return "", "", []
+        return "", "", "", []
     same = ("engine", "scene", "dimension", "params", "dt", "metric")
     good = [
         other["profile"] for other in rows
         if other["physics"] == "pass" and other["iterations"] is None and all(other[n] == row[n] for n in same)
     ]  # fmt: skip
-    if not good or good[0] == row["profile"]:
-        return "", "", []
-    where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], good[0])
-    return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
+    better = good[0] if good and good[0] != row["profile"] else ""
+    where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], better)
+    params = row["slot"]["params"]
+    paste, said = fix(row, observations, better)
+    return better, paste, said, changes(*where, params) if better else []
 
 
 def skill_text(row: Plain) -> str:
@@ -425,7 +426,7 @@ def _measured_text(row: Plain) -> str:
 
 
 def _print_explanation(
-    row: Plain, beside: str, better: str, paste: str, differing: Sequence[Change], console: Console
+    row: Plain, beside: str, better: str, fixed: tuple[str, str], differing: Sequence[Change], console: Console
 ) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
     asked = ", ".join(filter(None, (f"{row['scene']} {row['dimension']}-D", params_text(row["params"]))))
@@ -455,7 +456,8 @@ def _print_explanation(
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
     console.print(table)
-    if paste:
+    paste, said = fixed
+    if said:
         console.print()
-        console.print(Text("to paste:", style="bold"))
+        console.print(Text(said, style="bold"))
         console.print(Text(paste), soft_wrap=True)

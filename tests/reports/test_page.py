@@ -543,7 +543,7 @@ def cure_of(engine, scene, dimension=2, changed="10", paste="iterations = 30"):
     """A cure with one changed setting."""
     mark = Mark("fail", "")
     return Cure(scene, dimension, engine, "default", "tuned", mark, mark, "drift", "1", "0",
-                [Change("iterations", changed, "30", "fewer leave more")], paste, "")  # fmt: skip
+                [Change("iterations", changed, "30", "fewer leave more")], paste, "to paste:", "")  # fmt: skip
 
 
 def test_equal_cures_are_said_once_and_others_point_at_the_first():
