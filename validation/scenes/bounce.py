@@ -107,12 +107,13 @@ def _force_in_flight(scene: Scene, trajectory: Trajectory, clearance: Array, vel
     A step is one of flight if at both of its ends the floor is farther away than the ball could move in a step: what
     finds an impact ahead of it, or late, acts nearer.
     """
-    g, dt = scene.params["g"], trajectory.dt
-    force = metrics.forces(trajectory, 1, [0])
-    is_far = clearance > (np.abs(velocity) + g * dt) * dt
-    in_flight = force[(is_far[1:] & is_far[:-1])[: len(force)]]
+    g, dt, contacts = scene.params["g"], trajectory.dt, trajectory.contacts
+    if contacts is None:
+        return None, metrics.NOT_RECORDED
+    is_far, end = clearance > (np.abs(velocity) + g * dt) * dt, contacts.step
+    in_flight = metrics.forces(trajectory, 1, [0])[is_far[end] & is_far[np.maximum(end - 1, 0)]]
     if len(in_flight) == 0:
-        return None, metrics.NOT_RECORDED if len(force) == 0 else "no step is one of flight"
+        return None, "no step is one of flight"
     if np.isnan(in_flight).any():
         return None, metrics.UNAVAILABLE
     return float(np.linalg.norm(in_flight, axis=1).max() / (scene.params["mass"] * g)), ""
