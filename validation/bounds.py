@@ -146,11 +146,11 @@ def settled(interfaces: int, dt: float, duration: float) -> Bound:
     return Bound(min(interfaces / STILL * dt, duration - WINDOW), because)
 
 
-def carried(dt: float, window: float = WINDOW) -> Bound:
+def carried(dt: float, window: float | None = None) -> Bound:
     """Mean load over ``window`` [s], by default the last `WINDOW`, relative to the weight that is carried."""
-    when = "the last second" if window == WINDOW else f"{window:.2g} s"
+    when = "the last second" if window is None else f"{window:.2g} s"
     because = f"bodies slower than v1/100 before and after {when} leave 2 v1/100 of momentum unaccounted"
-    return Bound(2.0 * STILL * dt / window, because)
+    return Bound(2.0 * STILL * dt / (window or WINDOW), because)
 
 
 def steady() -> Bound:
@@ -160,11 +160,11 @@ def steady() -> Bound:
 
 
 def load(
-    name: str, dt: float, truth: Mapping[str, float], source: str, window: float = WINDOW, share: float = 1.0
+    name: str, dt: float, truth: Mapping[str, float], source: str, window: float | None = None, share: float = 1.0
 ) -> list[Check]:
     """Checks of a load over time (`metrics.over_time`): its mean over ``window`` [s], and the least and the greatest.
 
-    ``share``: the weight that is carried over what the load is relative to.
+    Those that ``truth`` names. ``share``: the weight that is carried over what the load is relative to.
     """
     allowed = {"mean": carried(dt, window), "least": steady(), "greatest": steady()}
     found = [(f"{name}[{by}]", Bound(share * bound.value, bound.because)) for by, bound in allowed.items()]

@@ -84,8 +84,8 @@ def window_of(trajectory: Trajectory, at: float | None, length: float) -> tuple[
     """
     if at is None:
         return float(trajectory.t[-1]) - length, math.inf
-    end = max(1.0, math.ceil(at / trajectory.dt - 1e-9)) * trajectory.dt  # 1e-9: rounding of at / dt
-    return end - trajectory.dt, end
+    step = math.ceil(at / trajectory.dt - 1e-9) or 1  # 1e-9: rounding of at / dt
+    return (step - 1) * trajectory.dt, step * trajectory.dt
 
 
 def _axis(what: str) -> int:
