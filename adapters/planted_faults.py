@@ -22,8 +22,8 @@ from adapters.scene import Body, Box, Capsule, Cylinder, Disc, Hull, Polygon, Sc
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
 #: ... or in what it reports.
 REPORTED = (
-    "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "lasting", "late", "pull",
-    "order",
+    "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "lasting", "uneven", "late",
+    "pull", "order",
 )  # fmt: skip
 SIZED = TOLD + REPORTED
 
@@ -39,8 +39,8 @@ class Planted(Engine):
         upwards, as a correction of places that never ends does, and ``twirl`` turns it by ``size`` times 1 rad/s in
         the plane of x and the vertical; ``tremble`` adds ``size`` times 1 m/s along x with a
         sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``lasting`` tells a share
-        of the last impulses on where nothing touches any more; ``damping`` takes the share of all speeds away in a
-        second.
+        of the last impulses on where nothing touches any more; ``uneven`` takes a share of the impulses that grows with
+        the place of the body that is pushed; ``damping`` takes the share of all speeds away in a second.
     size
         Share by which it is off, 0.02 for two per cent.
     """
@@ -184,6 +184,9 @@ class _Misread(Simulation):
             return replace(found, impulse=self.factor * found.impulse)
         if self.fault == "flicker":
             return replace(found, impulse=(1.0 + self._turn() * self.size) * found.impulse)
+        if self.fault == "uneven":
+            last = max(1, len(self.inner.twist()) - 1)
+            return replace(found, impulse=(1.0 - self.size * found.b / last)[:, None] * found.impulse)
         if self.fault == "lasting":
             if len(found.a) == 0 and self.told is not None:
                 return replace(self.told, impulse=self.size * self.told.impulse)
