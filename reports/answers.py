@@ -17,7 +17,6 @@ from reports.cures import decided_by, is_standard, search_command, told_cures
 from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
-from validation.catalogue import CATALOGUE
 from validation.metrics import SILENT, WORDS
 from validation.posed import is_file, resolve
 

@@ -277,8 +277,10 @@ def sensitivity(
         "faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:",
         "drift along x, climb upwards, tremble to and fro along x at every step, pull towards the middle of all",
         "bodies; of twirl it is a turn of 0.01 rad/s. 1 % of flicker: impulses 1 % too high and too low in turn;",
-        "of damping: speeds lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last",
-        "body of the scene is 1 % too slow, and those before it less, by their place in the order",
+        "of lasting: 1 % of the last impulses is told on where nothing touches any more; of uneven: impulses on the",
+        "last body of the scene are 1 % too weak, and others less, by their place in the order; of damping: speeds",
+        "lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last body is 1 % too slow,",
+        "and those before it less, by their place in the order",
     ):
         console.print(Text(line))
     _heading("Primary quantities that hang on a parameter and do not see 1 % of it,", console)

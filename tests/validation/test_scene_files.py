@@ -208,10 +208,19 @@ def test_places_angles_velocities_and_forces_are_shown(tmp_path):
         (", normal = [0.0, 1.0]", "", "its normal or by its angle"),
         ("ball.vy", "cube.vy", "checks.0.quantity: 'cube.vy' names no body"),
         ("ball.vy", "ball.vz", "checks.0.quantity: 'vz' is not one of"),
-        ("ball.vy", "floor/ball.vy", "only a force is between two bodies"),
+        ("ball.vy", "floor/ball.vy", "only a force and its like is between two bodies"),
+        ("ball.vy", "ball.overlap_without_force", "an overlap is of two bodies"),
+        ("at = 0.1", 'over = "least"', "checks.0.over: only a force and its like is told over time"),
+        ("at = 0.1", 'over = "median"', "checks.0.over"),
+        ('ball.vy"', 'ball.fy"\nover = "least"', "checks.0.over: at an instant there is one number"),
+        (
+            'ball.vy"\nvalue = -0.981\ntolerance = 1e-3\nat = 0.1',
+            'ball.fy"\nvalue = 1.0\ntolerance = 1e-3\n[[checks]]\n'
+            'quantity = "ball.fy"\nover = "greatest"\nvalue = 2.0\ntolerance = 1e-3',
+            "'ball.fy' is stated 2 times",
+        ),
         ("at = 0.1", "at = 0.9", "checks.0.at: 0.9 s is after the end"),
         ("tolerance = 1e-3", "tolerance = 0.0", "checks.0.tolerance"),
-        ("ball.vy", "ball.fy", "checks.0.at: a force is a mean"),
         ("ball.angle", "ball.vy", "checks.1.at"),
     ],
 )
