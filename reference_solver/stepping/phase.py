@@ -45,6 +45,7 @@ from reference_solver.stepping.operations import (
     evaluate,
     feature_limits,
     free_accelerations,
+    next_features,
 )
 from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slips, stops_across
 
@@ -72,6 +73,8 @@ NEXT_TO_NOTHING = 1e-4
 SAFETY = 0.8
 #: Attempts to find a length whose error is small enough, and a step without a second change of modes inside.
 LENGTHS = 24
+#: Changes of mode and of features for each contact.
+CHANGES = 8
 #: Steps in search of the end of a mode.
 SEARCHES = 40
 #: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
@@ -354,13 +357,14 @@ def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
 def rises_first(bodies: Bodies, lasting: Lasting, which: int, what: int, length: float) -> bool:
     """Whether the way to an end of a feature that has fallen below zero grows where the phase begins.
 
-    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Asked of bodies that
-    move: by their velocities at the start, and they are left where those take them in `GLANCE` of the phase.
+    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Told by velocities and
+    accelerations at the start; bodies are left where those take them in `GLANCE` of the phase.
     """
     go_back(bodies, lasting)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
-            lasting.displacement[i, d] = GLANCE * length * lasting.rate[0, i, d]
+            bend = 0.5 * GLANCE * length * lasting.bend[0, i, d]
+            lasting.displacement[i, d] = GLANCE * length * (lasting.rate[0, i, d] + bend)
         displace(bodies, lasting, i)
     evaluate(bodies, lasting)
     weigh_limits(bodies, lasting, which, BETWEEN)
@@ -398,10 +402,12 @@ def end_first(bodies: Bodies, lasting: Lasting) -> None:
 @inner_kernel
 def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
     """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
-    if what == LOAD or what >= FEATURE:
+    if what >= FEATURE:
+        go_back(bodies, lasting)
+        if not next_features(bodies, lasting, which):
+            lasting.mode[which], lasting.parts[which] = OPEN, GONE
+    elif what == LOAD:
         lasting.mode[which] = OPEN
-        if what >= FEATURE:
-            lasting.parts[which] = GONE
     elif what == ONWARD:
         lasting.mode[which], lasting.slides[which] = STICK, 0
     else:
@@ -527,7 +533,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
         go_back(bodies, lasting)
         return 0.0, FAILED
     length, outcome = left, WHOLE
-    for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
+    for _ in range(LENGTHS + CHANGES * lasting.size[CONTACTS]):
         if changed:
             if not start_again(bodies, lasting):
                 break
