@@ -115,6 +115,7 @@ def hold(bodies: Bodies, rows: Rows, lasting: Lasting, c: int, k: int) -> None:
         lasting.kind[k, TRIED] = 0
         while next_features(bodies, lasting, k) and leaves_edge(bodies, lasting, k, near):
             pass
+        lasting.kind[k, TRIED] = 1
     elif far_a > near or far_b > near or ra + rb == 0.0:  # neither: a point of B that keeps to the plane through it
         lasting.kind[k, FORM] = EDGE_OF_A
         set_pair(lasting.place[k], NORMAL, into_body(bodies, a, nx, ny))
