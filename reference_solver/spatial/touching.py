@@ -17,12 +17,25 @@ from reference_solver.spatial.manifolds import (
     sort_points,
 )
 from reference_solver.spatial.narrowphase import collide
-from reference_solver.spatial.prepare import set_response
-from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
+from reference_solver.spatial.operations import Spatial
+from reference_solver.spatial.prepare import set_response, still_speed
+from reference_solver.spatial.state import (
+    CANDIDATES,
+    MANIFOLDS,
+    PAST,
+    POINTS,
+    REMEMBERED,
+    Bodies,
+    Detection,
+    Manifolds,
+    Memory,
+)
 from reference_solver.spatial.vector import dot, row, sub, times
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
+from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import LATE, NEARLY, NO_GAP
 from reference_solver.stepping.options import Options
+from reference_solver.stepping.phase import passes_by
 
 
 @inner_kernel
@@ -34,12 +47,13 @@ def detect_touching(
     past: Memory,
     options: Options,
     clock: Array,
+    lasting: Lasting,
 ) -> int:
     """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room.
 
     Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed; at the end of such a
     sub-step those that carried load in it are wanted, and overlaps (E28). ``own``: memory of the sub-step before;
-    ``past``: of the step before; ``clock``: of the sub-step.
+    ``past``: of the step before; ``clock`` and ``lasting``: of the sub-step.
     """
     if not find_candidates(bodies, detection, options):
         return -1
@@ -67,6 +81,7 @@ def detect_touching(
             may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, key // n, key % n) == 0.0
             late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
             keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
+            drop_passing(bodies, manifolds, m, lasting, options.dt)
         if manifolds.points[m] > 0:
             describe(bodies, detection, manifolds, m, options)
             m += 1
@@ -90,12 +105,9 @@ def keep_points(
     ``late``: time [s] within which what touches may close its gap; ``ahead``: the step, where others may be closed as
     well if their approach is soft (E28), else 0.
     """
-    a, b = manifolds.body_a[m], manifolds.body_b[m]
     kept = 0
     for p in range(manifolds.points[m]):
-        at_a = point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0))
-        at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
-        approach = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
+        approach = approach_of(bodies, manifolds, m, p)
         lasts = recall_force(manifolds, m, p, memory, known)
         meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + late * abs(approach)
         if lasts or meets or (ahead > 0.0 and -approach <= soft_speed(bodies, manifolds, m, p, ahead)):
@@ -104,6 +116,29 @@ def keep_points(
             manifolds.meets[m, kept] = 1 if meets else 0
             kept += 1
     manifolds.points[m] = kept
+
+
+@inner_kernel
+def drop_passing(bodies: Bodies, manifolds: Manifolds, m: int, lasting: Lasting, dt: float) -> None:
+    """Drop the points that only pass by (E21)."""
+    space, kept = Spatial(bodies, bodies.pose, bodies.twist), 0
+    for p in range(manifolds.points[m]):
+        if manifolds.meets[m, p] == 1 and manifolds.lasts[m, p] == 0:
+            closes = approach_of(bodies, manifolds, m, p) < -still_speed(bodies, manifolds, m, dt)
+            if closes and passes_by(space, manifolds, lasting, POINTS * m + p, gap_noise(bodies, manifolds, m, p)):
+                continue
+        move_point(manifolds, m, p, kept)
+        manifolds.lasts[m, kept], manifolds.meets[m, kept] = manifolds.lasts[m, p], manifolds.meets[m, p]
+        kept += 1
+    manifolds.points[m] = kept
+
+
+@inner_kernel
+def approach_of(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
+    """Rate of the gap of point p [m/s]."""
+    at_a = point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0))
+    at_b = point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0))
+    return float(dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a)))
 
 
 @inner_kernel
