@@ -51,8 +51,8 @@ GATES = (
 LOCATED_OVERLAP = 1e-3
 
 
-def summary(tally: Array) -> dict[str, Any]:
-    """Return the tally under its public names (see ``Simulation.certificate``)."""
+def summary(tally: Array, located: bool) -> dict[str, Any]:
+    """Return the tally under its public names (see ``Simulation.certificate``); ``located`` as in `reasons`."""
     values: dict[str, Any] = {
         "residual": float(tally[entries.RESIDUAL]),
         "sweeps": int(tally[entries.SWEEPS]),
@@ -75,21 +75,23 @@ def summary(tally: Array) -> dict[str, Any]:
         "surface_work": float(tally[entries.SURFACE_WORK]),
         "load_work": float(tally[entries.LOAD_WORK]),
     }
-    found = reasons(tally)
+    found = reasons(tally, located)
     return values | {"holds": not found, "reasons": found}
 
 
-def columns(tallies: Sequence[Array]) -> dict[str, NDArray[Any]]:
+def columns(tallies: Sequence[Array], located: bool) -> dict[str, NDArray[Any]]:
     """Return the numbers of `summary`, and ``holds``, as one array (s,) each over s tallies."""
-    rows = [summary(tally) for tally in tallies]
+    rows = [summary(tally, located) for tally in tallies]
     return {name: np.array([row[name] for row in rows]) for name in rows[0] if name != "reasons"}
 
 
-def reasons(tally: Array) -> tuple[str, ...]:
-    """Return what keeps a run from serving as truth, one sentence each; empty if nothing does."""
+def reasons(tally: Array, located: bool) -> tuple[str, ...]:
+    """Return what keeps a run from serving as truth, one sentence each; empty if nothing does.
+
+    ``located``: steps are cut at events, so that bodies overlap by no more than what is left of one.
+    """
     missed = [gate for gate in GATES if not tally[gate.entry] <= gate.limit]
     found = [f"{gate.meaning}: {gate.name} {tally[gate.entry]:.3g}, at most {gate.limit:.3g}" for gate in missed]
-    located = tally[entries.EVENTS_LOCATED] > 0.0 or tally[entries.STEPS_HELD] > 0.0
     if located and not tally[entries.PENETRATION] <= LOCATED_OVERLAP:
         overlap = f"penetration {tally[entries.PENETRATION]:.3g}, at most {LOCATED_OVERLAP:.3g}"
         found.append(f"bodies overlap where events are located: {overlap}")

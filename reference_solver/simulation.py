@@ -77,6 +77,7 @@ class Simulation:
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
         package = import_module(WORLDS[model.dimension])
         self._world: World = package.World(model, settings, self.needs)
+        self._located = settings.scheme != "fixed"
         self._steps = 0
 
     def advance(self, steps: int) -> None:
@@ -127,7 +128,7 @@ class Simulation:
             twist=np.concatenate([start_twist[None], frames.twist]),
             offset=np.concatenate([[0], frames.offset]),
             contacts=frames.contacts,
-            certificates=columns([new_tally(), *tallies]) if certificates else {},
+            certificates=columns([new_tally(), *tallies], self._located) if certificates else {},
             pieces=pieces_of(journals, self.model.dimension, self.settings.dt, first) if pieces else None,
         )
 
@@ -227,7 +228,7 @@ class Simulation:
         ``direct``, ``factorisations``
             Contact solves that the direct solver finished (E44), and its factorisations in all of them.
         """
-        return summary(self._world.tally)
+        return summary(self._world.tally, self._located)
 
     @property
     def left_out(self) -> tuple[str, ...]:

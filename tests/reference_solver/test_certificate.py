@@ -172,7 +172,7 @@ class Planted:
 class TestPlantedFaults:
     def test_no_fault_no_reason(self, dimension):
         planted = Planted(dimension)
-        assert planted.exceeded() == set() and reasons(planted.tally) == ()
+        assert planted.exceeded() == set() and reasons(planted.tally, True) == ()
 
     def test_a_velocity_that_impulses_do_not_explain(self, dimension):
         planted = Planted(dimension)
@@ -229,7 +229,7 @@ class TestPlantedFaults:
         planted = Planted(dimension)
         planted.bodies.twist[1, 0] = math.nan
         assert planted.exceeded() == set()
-        assert "no numbers" in reasons(planted.tally)[0]
+        assert "no numbers" in reasons(planted.tally, True)[0]
         assert np.isfinite(planted.tally).all()
 
 
