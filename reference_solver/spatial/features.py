@@ -94,35 +94,28 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
     lasting.body[k, 0], lasting.body[k, 1] = a, b
     lasting.friction[k] = manifolds.friction[m]
     lasting.place[k, SIDE] = 1.0
-    lasting.kind[k, CHOICE], lasting.kind[k, TRIED] = NEAREST, 1
+    lasting.kind[k, TRIED] = 1
     set_part(lasting, k, NOTED, 0, times_transposed(bodies.axes, a, row(manifolds.arm_a[m], p, 0)))
     set_part(lasting, k, NOTED, 1, times_transposed(bodies.axes, b, row(manifolds.arm_b[m], p, 0)))
     n = row(manifolds.frame[m], 2, 0)
     for d in range(3):
         lasting.frame[k, 1, d] = manifolds.frame[m, 0, d]
-    face_a, face_b = facing(bodies, a, n), facing(bodies, b, scale(-1.0, n))
-    core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
-    core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
     for side in range(2):
-        i, face = (a, face_a) if side == 0 else (b, face_b)
-        own, other = (core_a, core_b) if side == 0 else (core_b, core_a)
-        if face < 0 or other != POINT:
+        if not take_features(bodies, lasting, k, n, side):
             continue
-        if own != PLANE and goes_off(bodies, manifolds, lasting, c, k, side, face):
-            if lasting.place[k, RADIUS + 1 - side] > 0.0:
-                return True
-            if cross_over(bodies, manifolds, lasting, c, k):
-                core_a = core_b = LINE
-                lasting.kind[k, CHOICE] = ON_B
-                break
-            if side == 0 and face_b >= 0 and own == POINT:
-                continue  # a corner on a corner: the other one comes onto the other's face
-        set_face(bodies, i, face, scale(1.0 - 2.0 * side, n), lasting, k, side)
         lasting.kind[k, CHOICE] = side
-        return True
-    if core_a == LINE and core_b == LINE:
-        return cross_lines(bodies, lasting, k, n)
-    return core_a != PLANE and core_b != PLANE
+        if bodies.kind[lasting.body[k, side]] == HALF_SPACE or not goes_off(bodies, manifolds, lasting, c, k, side):
+            return True
+        if lasting.place[k, RADIUS + 1 - side] > 0.0:
+            break
+        lasting.kind[k, CHOICE] = ON_B
+        if cross_over(bodies, manifolds, lasting, c, k):
+            return cross_lines(bodies, lasting, k, n)
+        if side == 1 or not take_features(bodies, lasting, k, n, ON_B):  # corners on each other: that of A on B's face
+            lasting.kind[k, CHOICE] = side
+            return take_features(bodies, lasting, k, n, side)
+    lasting.kind[k, CHOICE] = NEAREST
+    return take_features(bodies, lasting, k, n, NEAREST)
 
 
 @inner_kernel
@@ -223,8 +216,8 @@ def cross_over(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k
 
 
 @inner_kernel
-def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int, face: int) -> bool:
-    """Whether the point of the other body stands where a face of the box on this side ends, and goes on over its edge.
+def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int) -> bool:
+    """Whether the point of the other body stands where the face of the box on this side ends, and goes on over its end.
 
     What is round rolls on over it: its core, which is above the point of contact by its radius, moves out of the face.
     """
@@ -240,7 +233,11 @@ def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: 
     local, passing = times_transposed(bodies.axes, i, arm), times_transposed(bodies.axes, i, sub(at_other, own))
     for d in range(3):
         half = bodies.geometry[i, d]
-        if d != face and half - abs(local[d]) <= AT_EDGE * half and passing[d] * local[d] > 0.0:
+        if (
+            part(lasting, k, DIRECTION, side)[d] == 0.0
+            and half - abs(local[d]) <= AT_EDGE * half
+            and passing[d] * local[d] > 0.0
+        ):
             return True
     return False
 

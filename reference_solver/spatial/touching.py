@@ -80,8 +80,7 @@ def detect_touching(
         else:
             may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, key // n, key % n) == 0.0
             late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
-            keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
-            drop_passing(bodies, manifolds, m, lasting, options.dt)
+            keep_points(bodies, manifolds, m, memory, known, late, may_close, options.dt, lasting)
         if manifolds.points[m] > 0:
             describe(bodies, detection, manifolds, m, options)
             m += 1
@@ -98,47 +97,37 @@ def closed_gap(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 
 @inner_kernel
 def keep_points(
-    bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, late: float, ahead: float
+    bodies: Bodies,
+    manifolds: Manifolds,
+    m: int,
+    memory: Memory,
+    known: int,
+    late: float,
+    may_close: bool,
+    dt: float,
+    lasting: Lasting,
 ) -> None:
-    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap.
+    """Keep the points that touch, and do not only pass by (E21), and those that `memory` knows to carry load.
 
-    ``late``: time [s] within which what touches may close its gap; ``ahead``: the step, where others may be closed as
-    well if their approach is soft (E28), else 0.
+    ``late``: time [s] within which what touches may close its gap; where others ``may_close`` theirs they do if their
+    approach is soft in a step of ``dt`` (E28).
     """
-    kept = 0
+    space, kept = Spatial(bodies, bodies.pose, bodies.twist), 0
     for p in range(manifolds.points[m]):
-        approach = approach_of(bodies, manifolds, m, p)
+        at_a = point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0))
+        at_b = point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0))
+        approach, noise = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a)), gap_noise(bodies, manifolds, m, p)
         lasts = recall_force(manifolds, m, p, memory, known)
-        meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + late * abs(approach)
-        if lasts or meets or (ahead > 0.0 and -approach <= soft_speed(bodies, manifolds, m, p, ahead)):
+        meets = manifolds.gap[m, p] <= noise + late * abs(approach)
+        if meets and not lasts and approach < -still_speed(bodies, manifolds, m, dt):
+            if passes_by(space, manifolds, lasting, POINTS * m + p, noise):
+                continue
+        if lasts or meets or (may_close and -approach <= soft_speed(bodies, manifolds, m, p, dt)):
             move_point(manifolds, m, p, kept)
             manifolds.lasts[m, kept] = 1 if lasts else 0
             manifolds.meets[m, kept] = 1 if meets else 0
             kept += 1
     manifolds.points[m] = kept
-
-
-@inner_kernel
-def drop_passing(bodies: Bodies, manifolds: Manifolds, m: int, lasting: Lasting, dt: float) -> None:
-    """Drop the points that only pass by (E21)."""
-    space, kept = Spatial(bodies, bodies.pose, bodies.twist), 0
-    for p in range(manifolds.points[m]):
-        if manifolds.meets[m, p] == 1 and manifolds.lasts[m, p] == 0:
-            closes = approach_of(bodies, manifolds, m, p) < -still_speed(bodies, manifolds, m, dt)
-            if closes and passes_by(space, manifolds, lasting, POINTS * m + p, gap_noise(bodies, manifolds, m, p)):
-                continue
-        move_point(manifolds, m, p, kept)
-        manifolds.lasts[m, kept], manifolds.meets[m, kept] = manifolds.lasts[m, p], manifolds.meets[m, p]
-        kept += 1
-    manifolds.points[m] = kept
-
-
-@inner_kernel
-def approach_of(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
-    """Rate of the gap of point p [m/s]."""
-    at_a = point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0))
-    at_b = point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0))
-    return float(dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a)))
 
 
 @inner_kernel

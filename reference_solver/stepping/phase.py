@@ -346,13 +346,13 @@ def lowest(lasting: Lasting, place: int) -> float:
 
 
 @inner_kernel
-def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
-    """Contact and monitor that was zero at the start and has fallen most; (-1, `LOAD`) if there is none."""
-    worst, which, what = -FORCE_NOISE, -1, LOAD
+def fallen(lasting: Lasting, least: float, above: bool) -> tuple[int, int]:
+    """Contact and monitor, zero at the start or ``above`` it, that has fallen most below ``least``; -1 if none has."""
+    which, what = -1, LOAD
     for k in range(lasting.size[CONTACTS]):
         for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
-                worst, which, what = lasting.monitor[LAST, k, m], k, m
+            if (lasting.monitor[START, k, m] > FORCE_NOISE) == above and lasting.monitor[LAST, k, m] < least:
+                least, which, what = lasting.monitor[LAST, k, m], k, m
     return which, what
 
 
@@ -388,18 +388,6 @@ def stops_at_once(lasting: Lasting) -> bool:
             if lasting.monitor[START, k, ONWARD] <= FORCE_NOISE and onward < -FORCE_NOISE:
                 return True
     return False
-
-
-@inner_kernel
-def end_first(bodies: Bodies, lasting: Lasting) -> None:
-    """Change the mode that ends as soon as the phase has begun: gaps that were open by round-off are closed by then."""
-    worst, which, what = 0.0, -1, LOAD
-    for k in range(lasting.size[CONTACTS]):
-        for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] > FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
-                worst, which, what = lasting.monitor[LAST, k, m], k, m
-    if which >= 0:
-        end_mode(bodies, lasting, which, what)
 
 
 @inner_kernel
@@ -567,8 +555,8 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif fallen_at_once(lasting)[0] >= 0:
-            which, what = fallen_at_once(lasting)
+        elif fallen(lasting, -FORCE_NOISE, False)[0] >= 0:
+            which, what = fallen(lasting, -FORCE_NOISE, False)
             if what >= FEATURE and length > SHORTEST * left and rises_first(bodies, lasting, which, what, length):
                 length, outcome = 0.25 * length, SHORTENED
                 continue
@@ -587,7 +575,10 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
                 continue
             if end < 0.0:
                 break
-            end_first(bodies, lasting)
+            # As soon as the phase has begun: gaps that were open by round-off are closed by then.
+            which, what = fallen(lasting, 0.0, True)
+            if which >= 0:
+                end_mode(bodies, lasting, which, what)
             changed = True
         else:
             return length, outcome
