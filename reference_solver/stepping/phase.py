@@ -216,7 +216,7 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
         if stage < STAGES - 1:
             weigh_stage(bodies, lasting, stage, length)
             watch(bodies, lasting, BETWEEN)
-            if lowest(lasting, BETWEEN) < -SURELY:
+            if lowest(lasting, BETWEEN, True)[0] < -SURELY:
                 lasting.early[0] = min(lasting.early[0], NODES[stage])
     error = lasting.error[0] = relative_error(lasting, length)
     if not clean_up(bodies, lasting):
@@ -335,25 +335,14 @@ def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
 
 
 @inner_kernel
-def lowest(lasting: Lasting, place: int) -> float:
-    """Least monitor of those that were above zero at the start."""
-    least = math.inf
+def lowest(lasting: Lasting, place: int, above: bool) -> tuple[float, int, int]:
+    """Least monitor of those that were ``above`` zero at the start, or not; its contact and what it is."""
+    least, which, what = math.inf, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
         for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] > FORCE_NOISE:
-                least = min(least, lasting.monitor[place, k, m])
-    return least
-
-
-@inner_kernel
-def fallen(lasting: Lasting, least: float, above: bool) -> tuple[int, int]:
-    """Contact and monitor, zero at the start or ``above`` it, that has fallen most below ``least``; -1 if none has."""
-    which, what = -1, LOAD
-    for k in range(lasting.size[CONTACTS]):
-        for m in range(lasting.monitor.shape[2]):
-            if (lasting.monitor[START, k, m] > FORCE_NOISE) == above and lasting.monitor[LAST, k, m] < least:
-                least, which, what = lasting.monitor[LAST, k, m], k, m
-    return which, what
+            if (lasting.monitor[START, k, m] > FORCE_NOISE) == above and lasting.monitor[place, k, m] < least:
+                least, which, what = lasting.monitor[place, k, m], k, m
+    return least, which, what
 
 
 @inner_kernel
@@ -449,7 +438,7 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
             return -1.0
         if lasting.size[TANGENTS] > 1 and lasting.error[0] > 1.0:
             return guess  # a slip turns on its way to its end
-        value = lowest(lasting, LAST)
+        value, _, _ = lowest(lasting, LAST, True)
         if abs(value) <= LOCATED:
             return guess
         if value < 0.0:
@@ -548,6 +537,8 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
                 length, left, outcome = back, back, SHORTENED
             changed = False
         error = step_phase(bodies, lasting, length)
+        later, _, _ = lowest(lasting, LAST, True)
+        at_once, which, what = lowest(lasting, LAST, False)
         if error < 0.0:
             length, outcome = 0.25 * length, SHORTENED
         elif error > 1.0:
@@ -555,29 +546,28 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif fallen(lasting, -FORCE_NOISE, False)[0] >= 0:
-            which, what = fallen(lasting, -FORCE_NOISE, False)
+        elif at_once < -FORCE_NOISE:
             if what >= FEATURE and length > SHORTEST * left and rises_first(bodies, lasting, which, what, length):
                 length, outcome = 0.25 * length, SHORTENED
                 continue
             end_mode(bodies, lasting, which, what)
             changed = True
             continue
-        elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
+        elif lasting.early[0] < 1.0 and later >= 0.0:
             length, outcome = lasting.early[0] * length, SHORTENED
-        elif lowest(lasting, LAST) < -LOCATED:
+        elif later < -LOCATED:
             end = find_end(bodies, lasting, length)
             if end >= SHORTEST * left:
-                ends = not stops_across(lasting) and lasting.error[0] <= 1.0
-                if ends or BEFORE_END * end < SHORTEST * left:
+                settled = not stops_across(lasting) and lasting.error[0] <= 1.0
+                if settled or BEFORE_END * end < SHORTEST * left:
                     return end, ENDED
                 length, outcome = BEFORE_END * end, SHORTENED
                 continue
             if end < 0.0:
                 break
             # As soon as the phase has begun: gaps that were open by round-off are closed by then.
-            which, what = fallen(lasting, 0.0, True)
-            if which >= 0:
+            later, which, what = lowest(lasting, LAST, True)
+            if later < 0.0:
                 end_mode(bodies, lasting, which, what)
             changed = True
         else:
