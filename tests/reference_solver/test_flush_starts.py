@@ -106,11 +106,11 @@ def pulled_in(d, kind, narrower):
 
 
 SCENES = [slope, books, tablecloth, pulled_off, pulled_in]
-WORLDS = [(d, kind) for d in (2, 3) for kind in ("box", "polygon", "capsule") if (d, kind) != (3, "polygon")]
+STACKS = [(d, kind) for d in (2, 3) for kind in ("box", "polygon", "capsule") if (d, kind) != (3, "polygon")]
 
 
 def truth(model, accelerations, t):
-    """Poses (n, 3 | 7) at the time t: motion along the first velocity, or along x; the first body goes on as it does."""
+    """Poses (n, 3 | 7) at the time t: motion along the first velocity, or along x; the first body goes on."""
     d = model.dimension
     poses = np.array([body.pose for body in model.bodies])
     for i, acceleration in enumerate([0.0, *accelerations]):
@@ -122,7 +122,7 @@ def truth(model, accelerations, t):
 
 @pytest.mark.parametrize("narrower", [0.0, 0.04], ids=["equal", "narrower"])
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize(("d", "kind"), WORLDS)
+@pytest.mark.parametrize(("d", "kind"), STACKS)
 def test_what_is_flush_slides_as_newton_and_coulomb_say(d, kind, scene, narrower):
     """Mirrored, renumbered and far from the origin as well; off by the last places of speeds and coordinates only."""
     model, accelerations = scene(d, kind, narrower)
