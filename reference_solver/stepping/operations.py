@@ -67,6 +67,15 @@ def hold(bodies: Any, rows: Any, lasting: Any, c: int, k: int) -> None:
 
 
 @operation
+def next_features(bodies: Any, lasting: Any, k: int) -> bool:
+    """Let contact k go on with other features that touch in its place; False, with those it has, if all were tried.
+
+    Bodies stand at the start of the phase.
+    """
+    raise NotImplementedError
+
+
+@operation
 def evaluate(bodies: Any, lasting: Any) -> None:
     """Follow the noted features of all contacts at the present poses and twists.
 
