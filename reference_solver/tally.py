@@ -44,8 +44,10 @@ DIRECT, FACTORISATIONS = 20, 21
 EVENTS_LOCATED = 22
 #: Steps with more events than are located; what was left of them went at impulse level (E28).
 STEPS_HELD = 23
-#: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
-RELEASED_SPEED = 24
+#: Bodies A and B, one more than their numbers, of impacts that follow each other in an instant: in an order that
+#: hangs on gaps below round-off; without end, and to no limit that is proven (E22). 0 where there are none.
+UNORDERED_A, UNORDERED_B = 24, 32
+ENDLESS_A, ENDLESS_B = 33, 34
 #: Contact solves whose velocities are proven to be the only answer (E66).
 UNIQUE = 25
 
@@ -60,7 +62,7 @@ EXHAUSTED = 29
 #: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
 CONTRADICTED_A, CONTRADICTED_B = 30, 31
 
-SIZE = 32
+SIZE = 35
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (

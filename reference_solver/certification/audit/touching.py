@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from reference_solver.certification.audit.choice import closes_sooner, is_cornered, strayed
+from reference_solver.certification.audit.contact import PARTS
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
 from reference_solver.certification.geometry import distinct, rotation
 from reference_solver.model import Array, HalfSpace
@@ -70,7 +71,8 @@ def _touching(run: Run) -> tuple[float, float, float, float]:
 def _left_out(run: Run) -> float:
     """Approach after an impact of a pair of its bodies that touches and is no contact of it, over the speeds there.
 
-    All that touches at that instant is solved together (E21): pair after pair would be another law.
+    All that touches at that instant and does not part is solved together (E21): pair after pair would be another law.
+    What parts may come closer, if the same instant has another impact.
     """
     pieces, d = run.pieces, run.d
     worst = 0.0
@@ -101,15 +103,19 @@ def _left_out(run: Run) -> float:
         size = min(run.extent[i], run.extent[j])
         # At the middle of both points: of a face that lies flush the mean of its corners, as good as any.
         point = 0.5 * (found.point_a + found.point_b)
-        speeds = [
-            _moving(run, body, side[near], point, pose[near])
-            for body, side, pose in zip((i, j), sides, poses, strict=True)
-        ]
-        closing = -((speeds[1] - speeds[0]) * found.normal).sum(axis=1)
+        shares, noise = [], run.pull * run.dt * 1e-9 + 1e-15 * size / run.dt
+        for after in (False, True):
+            one, other = (
+                _moving(run, body, side[near], point, pose[near], after)
+                for body, side, pose in zip((i, j), sides, poses, strict=True)
+            )
+            closing, speed = (
+                -((other - one) * found.normal).sum(axis=1),
+                np.linalg.norm([one, other], axis=2).sum(axis=0),
+            )
+            shares.append(np.where(speed > 0.0, closing / (speed + noise), 0.0))
         touch = np.abs(found.gap) <= NO_GAP * size
-        speed = np.linalg.norm(speeds[0], axis=1) + np.linalg.norm(speeds[1], axis=1)
-        noise = run.pull * run.dt * 1e-9 + 1e-15 * size / run.dt
-        share = np.where(touch & (speed > 0.0), closing / (speed + noise), 0.0)
+        share = np.where(touch & ~(run.is_followed[at[near]] & (shares[0] < -PARTS)), shares[1], 0.0)
         worst = max(worst, float(share.max()))
     return worst
 
@@ -121,10 +127,11 @@ def _at(run: Run, i: int, rows: Indices, pieces: Indices) -> Array:
     return run.prescribed_pose(i, run.pieces.begin[pieces])
 
 
-def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array) -> Array:
-    """Velocities (s, d) of points of body i after impacts."""
+def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array, after: bool) -> Array:
+    """Velocities (s, d) of points of body i before or ``after`` impacts."""
     own = np.tile(twist_of(run.model.bodies[i]), (len(rows), 1))
-    twist = np.where((rows >= 0)[:, None], run.pieces.twist_after[rows], own) if run.free[i] else own
+    told = run.pieces.twist_after if after else run.pieces.twist_before
+    twist = np.where((rows >= 0)[:, None], told[rows], own) if run.free[i] else own
     return np.asarray(twist[:, : run.d] + turned(twist[:, run.d :], point - pose[:, : run.d]))
 
 
