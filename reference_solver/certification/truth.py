@@ -15,6 +15,9 @@ What all of these are off alike, since phases end by the solver's judgement of t
 tells that is made to a hundredth of the accuracy.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below).
 
+*Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
+is made twice more far from the origin: what differs there, beyond X and what coarser coordinates explain, refuses.
+
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
 afterwards no run at this precision can, and only its laws are certified.
@@ -53,6 +56,11 @@ BLOCK, FINER, FINEST = 5, 5.618, 11.09
 CLOSER = 1e-2
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
+#: Distances from the origin to which the run is moved, in smallest half widths: its coordinates are rounded thirty and
+#: thirty thousand times as coarsely.
+PLACES = (30.0, 30_000.0)
+#: Direction of the move: all coordinates change, none as much as another.
+AWAY = (0.83, -0.47, 0.31)
 #: Signs of the disturbance, one after the other.
 SEED = 20
 
@@ -80,6 +88,10 @@ class Certificate:
         (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
     horizon
         First time at which ``growth`` reaches `GROWTH` [s]; infinite if it does not.
+    disturbed
+        (s,) way that the disturbance moves a body, over its speed [s].
+    dt
+        Step [s].
     light
         What the solver says of itself (`Simulation.certificate`).
     pose
@@ -93,6 +105,8 @@ class Certificate:
     error: Array
     growth: Array
     horizon: float
+    disturbed: Array
+    dt: float
     light: dict[str, Any]
     pose: Array
 
@@ -102,7 +116,17 @@ class Certificate:
             return float("inf")
         return float(self.error[min(int(np.searchsorted(self.t, t)), len(self.t) - 1)])
 
+    def rounding(self, place: float) -> Array:
+        """Return what coordinates of the size ``place`` [m] move a body in any run of the scene (s,) [m].
 
+        Gaps and places are known to some units in the last place, anew in every step: that is a speed of as much in a
+        step, and moves bodies as the disturbance does.
+        """
+        return np.maximum.accumulate(COORDINATE_UNITS * np.spacing(place) * (1.0 + self.disturbed / self.dt))
+
+
+#: Units in the last place of a coordinate to which a gap is known: below ten the solver calls it closed (E8).
+COORDINATE_UNITS = 10.0
 #: What the end of a slip in space leaves out, as a share of the smallest half width: one below 1e-9 of a contact's
 #: reference speed, which is what loads do in a step, is taken out at once, at whatever time its step has it.
 SLIP_ENDS = 1e-11
@@ -113,7 +137,7 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs about ten runs, or twenty, and the audit.
+    """Run ``model`` and certify the run; costs about twelve runs, or twenty, and the audit.
 
     Raises
     ------
@@ -129,17 +153,45 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
         reasons.append("solves were used that had not converged")
-    growth, horizon, moved = _horizon(model, settings, record, steps, stride)
+    growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = np.maximum.accumulate(_error(model, run, record, steps, stride) + round_off)
-    if not np.isfinite(error[record.t < horizon]).all():
+    within = record.t < horizon
+    if not np.isfinite(error[within]).all():
         reasons.append("the run at half the step is no numbers")
+    made = (tuple(findings), record.t, error, growth, horizon, moved / size, settings.dt, light, record.pose)
+    found = Certificate(not reasons, tuple(reasons), *made)
+    reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons
     if horizon < record.t[-1]:
         reasons.append(
             f"beyond {horizon:.3g} s a last-place disturbance has grown {GROWTH:.0g}-fold: only laws hold there"
         )
-    return Certificate(holds, tuple(reasons), tuple(findings), record.t, error, growth, horizon, light, record.pose)
+    return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def away(model: Model, far: float) -> Change:
+    """Return the change of a world that moves it by ``far`` smallest half widths (`AWAY`)."""
+    d, least = model.dimension, min(smallest_extent(body.shape) for body in model.bodies)
+    return Change(d, shift=tuple(far * (least if np.isfinite(least) else 1.0) * x for x in AWAY[:d]))
+
+
+def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int, stride: int) -> list[str]:
+    """Where a run that holds so far comes out otherwise far from the origin: one sentence for the first such place."""
+    within = found.t < found.horizon
+    for far in PLACES:
+        change = away(model, far)
+        moved = Simulation(change.model(model), settings).record(steps, stride).pose
+        apart = distance(model, change.pose(found.pose, found.t), moved)
+        allowed = found.error + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
+        beyond = np.flatnonzero(within & ~(apart <= allowed))
+        if len(beyond):
+            k = int(beyond[0])
+            return [
+                f"moved by {far:g} half widths it comes out otherwise: {apart[k]:.3g} m at {found.t[k]:.3g} s, at most "
+                f"{allowed[k]:.3g} m is round-off"
+            ]
+    return []
 
 
 def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
@@ -189,8 +241,10 @@ def _mirrored(model: Model, settings: Settings, steps: int, stride: int) -> Arra
     return mirror.pose(record.pose[:, backwards], record.t)
 
 
-def _horizon(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> tuple[Array, float, Array]:
-    """Growth (s,) of a disturbance of all free bodies' velocities, the time at which it is too large, what it moves."""
+def _horizon(
+    model: Model, settings: Settings, record: Record, steps: int, stride: int
+) -> tuple[Array, float, Array, float]:
+    """Growth (s,) of a disturbance of all free bodies' velocities, when it is too large, what it moves, its size."""
     d, random = model.dimension, np.random.default_rng(SEED)
     fastest = float(np.abs(record.twist[:, :, :d]).max())
     size = DISTURBANCE * (fastest if np.isfinite(fastest) and fastest > 0.0 else 1.0)
@@ -206,7 +260,7 @@ def _horizon(model: Model, settings: Settings, record: Record, steps: int, strid
     free_flight = size * np.sqrt(d) * max(record.t[-1], settings.dt) + noise
     growth = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf) / free_flight)
     over = np.flatnonzero(growth >= GROWTH)
-    return growth, float(record.t[over[0]]) if len(over) else float("inf"), apart
+    return growth, float(record.t[over[0]]) if len(over) else float("inf"), apart, size
 
 
 def distance(model: Model, one: Array, other: Array) -> Array:

@@ -1,7 +1,8 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
-A contact that parts has no part in an impact. One that the impact drives together again is struck next, in the same
-instant: its gap is round-off, and so is the time until it is closed. Where one pair of bodies meets and all others that
+A contact that parts has no part in an impact; one that drifts, slower than a millionth of the impact, lies. What the
+impact drives together again is struck next, in the same instant: its gap is round-off, and so is the time until it is
+closed. Where one pair of bodies meets and all others that
 touch them part, the order of impacts is forced. Without friction each then changes the normal velocities u by a linear
 map, ``u -> u - (1 + e_j) u_j W_j/W_jj`` with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see
 whether it ends. It does not if the order repeats, with all u a factor below one smaller each time.
@@ -11,10 +12,11 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.clock import BLOWS, HELD
+from reference_solver.stepping.clock import BLOWS, HELD, follows_soon
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
+from reference_solver.stepping.noise import DRIFT
 from reference_solver.stepping.operations import Island, ending_of, is_free, mark_contact, note_touching, number_of
 from reference_solver.tally import ENDLESS_A, UNORDERED_A
 
@@ -51,17 +53,22 @@ def open_instant(island: Island) -> None:
     join_contacts(island, count)
     for i in range(len(lasting.label)):
         members = list_cluster(island, i, count)
-        met, pairs, parts, rubs = -1, 0, 0, False
+        met, pairs, parts, rubs, fastest = -1, 0, 0, False, 0.0
         for m in range(members):
             k = lasting.order[m]
-            parts += 1 if lasting.mode[k] == LEAVES else 0
             rubs = rubs or lasting.friction[k] > 0.0
             if lasting.mode[k] == MEETS:
+                fastest = max(fastest, -lasting.speed[k, 0])
                 pairs += 1 if met < 0 or not same_pair(lasting, met, k) else 0
                 met = k
+        for m in range(members):
+            k = lasting.order[m]
+            if lasting.mode[k] == LEAVES and lasting.speed[k, 0] <= DRIFT * fastest:
+                lasting.mode[k] = LIES
+            parts += 1 if lasting.mode[k] == LEAVES else 0
         if met < 0 or parts == 0:
             continue
-        if pairs > 1:
+        if pairs > 1 and (clock[BLOWS] > 0.0 or follows_soon(clock)):
             name_bodies(island, met, UNORDERED_A)
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:

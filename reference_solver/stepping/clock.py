@@ -116,6 +116,12 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
 
 
 @kernel
+def follows_soon(clock: Array) -> bool:
+    """Whether the event at hand came within a thousandth of a step of the one before."""
+    return bool(clock[WEIGHT] == HASTE)
+
+
+@kernel
 def count_blow(clock: Array, tally: Array) -> None:
     """Enter an impact that another one follows at once; too many of them, and the run ends."""
     clock[BLOWS] += 1.0

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from reference_solver.certification.audit.choice import closes_sooner, is_cornered, strayed
-from reference_solver.certification.audit.contact import PARTS
 from reference_solver.certification.audit.run import POINT, Indices, Run, placed, turned, twist_of
 from reference_solver.certification.geometry import distinct, rotation
 from reference_solver.model import Array, HalfSpace
 
 #: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
 NO_GAP = 1e-13
+#: Share of the speeds there above which what touches parts.
+PARTING = 1e-9
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
@@ -115,7 +116,7 @@ def _left_out(run: Run) -> float:
             )
             shares.append(np.where(speed > 0.0, closing / (speed + noise), 0.0))
         touch = np.abs(found.gap) <= NO_GAP * size
-        share = np.where(touch & ~(run.is_followed[at[near]] & (shares[0] < -PARTS)), shares[1], 0.0)
+        share = np.where(touch & ~(run.is_followed[at[near]] & (shares[0] < -PARTING)), shares[1], 0.0)
         worst = max(worst, float(share.max()))
     return worst
 
