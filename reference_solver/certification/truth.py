@@ -37,7 +37,7 @@ from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
 from reference_solver.model import Array, Model
-from reference_solver.pieces import FIFTH_ORDER
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import smallest_extent
@@ -92,6 +92,8 @@ class Certificate:
         (s,) way that the disturbance moves a body, over its speed [s].
     dt
         Step [s].
+    gap
+        Largest gap that counts as none near the origin [m].
     light
         What the solver says of itself (`Simulation.certificate`).
     pose
@@ -107,6 +109,7 @@ class Certificate:
     horizon: float
     disturbed: Array
     dt: float
+    gap: float
     light: dict[str, Any]
     pose: Array
 
@@ -120,13 +123,14 @@ class Certificate:
         """Return what coordinates of the size ``place`` [m] move a body in any run of the scene (s,) [m].
 
         Gaps and places are known to some units in the last place, anew in every step: that is a speed of as much in a
-        step, and moves bodies as the disturbance does.
+        step, and moves bodies as the disturbance does. Bodies touch at a gap of `GAP`, wherever they are.
         """
-        return np.maximum.accumulate(COORDINATE_UNITS * np.spacing(place) * (1.0 + self.disturbed / self.dt))
+        steps = COORDINATE_UNITS * np.spacing(place) * (1.0 + self.disturbed / self.dt)
+        return np.maximum.accumulate(steps + self.gap * (1.0 + self.growth))
 
 
-#: Units in the last place of a coordinate to which a gap is known: below ten the solver calls it closed (E8).
-COORDINATE_UNITS = 10.0
+#: Gaps below this share of a half width, or these units in the last place of a coordinate, are closed (E8).
+GAP, COORDINATE_UNITS = 1e-12, 10.0
 #: What the end of a slip in space leaves out, as a share of the smallest half width: one below 1e-9 of a contact's
 #: reference speed, which is what loads do in a step, is taken out at once, at whatever time its step has it.
 SLIP_ENDS = 1e-11
@@ -156,10 +160,12 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = np.maximum.accumulate(_error(model, run, record, steps, stride) + round_off)
+    gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
+    error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
         reasons.append("the run at half the step is no numbers")
-    made = (tuple(findings), record.t, error, growth, horizon, moved / size, settings.dt, light, record.pose)
+    made = (tuple(findings), record.t, error, growth, horizon, moved / size, settings.dt, gap, light, record.pose)
     found = Certificate(not reasons, tuple(reasons), *made)
     reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons
@@ -168,6 +174,15 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
             f"beyond {horizon:.3g} s a last-place disturbance has grown {GROWTH:.0g}-fold: only laws hold there"
         )
     return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def _first_chain(record: Record) -> float:
+    """Return when impacts first follow each other in one instant, in which bodies stay as far apart as gaps are [s]."""
+    pieces = record.pieces
+    assert pieces is not None
+    at_once = np.append((pieces.begin[1:] == pieces.begin[:-1]) & (pieces.kind[1:] == IMPACT), False)
+    found = np.flatnonzero((pieces.kind == IMPACT) & (at_once | (pieces.scheme == CHAIN)))
+    return float(pieces.begin[found[0]]) if len(found) else float("inf")
 
 
 def away(model: Model, far: float) -> Change:

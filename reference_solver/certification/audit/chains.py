@@ -41,6 +41,11 @@ def _has_no_end(run: Run, piece: int) -> bool:
         return False
     u = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)[rows]
     yields, e = _yields(run, rows), run.model.restitution[pairs[:, 0], pairs[:, 1]]
+    # What lies across the row, and feels no impulse of it, has no part in it.
+    lies = np.abs(u) <= CLEAR * np.abs(u).max()
+    feels = (np.abs(yields[:, ~lies]) > SAME * np.diag(yields)[:, None]).any(axis=1)
+    own = np.flatnonzero(~lies | feels)
+    rows, pairs, u, yields, e = rows[own], pairs[own], u[own], yields[np.ix_(own, own)], e[own]
     cycle, u = _cycle(u, yields, e, pairs)
     if not cycle:
         return False
@@ -130,5 +135,5 @@ def _contracts(cycle: Groups, u: Array, yields: Array, e: Array, struck: Indices
     basis = basis[:, weight > 1e-12 * weight.max()]
     sizes = np.sort(np.abs(np.linalg.eigvals(basis.T @ speeds[np.ix_(struck, struck)] @ basis)))[::-1]
     factor = np.abs(now[struck]).max() / np.abs(u[struck]).max()
-    own = abs(sizes[0] - factor) <= np.sqrt(SAME) * factor and (len(sizes) == 1 or sizes[1] < (1.0 - SAME) * factor)
-    return bool(own and factor < 1.0 - SAME and np.abs(np.linalg.eigvals(gaps)).max() < factor)
+    stays = sizes[0] <= (1.0 + np.sqrt(SAME)) * factor  # no disturbance outgrows the velocities of the cycle
+    return bool(stays and factor < 1.0 - SAME and np.abs(np.linalg.eigvals(gaps)).max() < factor)

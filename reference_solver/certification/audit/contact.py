@@ -16,8 +16,8 @@ from reference_solver.shapes import Disc, Sphere
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
 #: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part or lie: the
-#: law's own share is a millionth.
-PARTS = 1e-5
+#: law's own share is a millionth. And share of the speeds that meet which is round-off of a solve.
+PARTS, LIES = 1e-5, 1e-9
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
 #: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
@@ -146,7 +146,8 @@ def _laws(run: Run) -> Iterator[float]:
     alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
     fastest = np.zeros(len(pieces))
     np.maximum.at(fastest, owner, -approach)
-    alone = np.where(approach > PARTS * fastest[owner], alone, np.minimum(alone, defect))
+    certain = PARTS * fastest[owner] + LIES * speed + 2.0 * np.minimum(run.still[a], run.still[b])
+    alone = np.where(approach > certain, alone, np.minimum(alone, defect))
     defect = np.where(parts, alone, defect)
     # What is not pressed and is not an impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
