@@ -1,11 +1,11 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
-A contact that parts has no part in an impact; one that drifts, slower than a millionth of the impact, lies. What the
-impact drives together again is struck next, in the same instant: its gap is round-off, and so is the time until it is
-closed. Where one pair of bodies meets and all others that
-touch them part, the order of impacts is forced. Without friction each then changes the normal velocities u by a linear
-map, ``u -> u - (1 + e_j) u_j W_j/W_jj`` with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see
-whether it ends. It does not if the order repeats, with all u a factor below one smaller each time.
+A contact that parts has no part in an impact; one with e = 0 that drifts apart, slower than a millionth of the impact,
+lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is the
+time until it is closed. Where one pair of bodies meets and all others that touch them part, the order of impacts is
+forced. Without friction each then changes the normal velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj``
+with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see whether it ends. It does not if the
+order repeats, with all u a factor below one smaller each time.
 """
 
 from __future__ import annotations
@@ -64,7 +64,9 @@ def open_instant(island: Island) -> None:
                 met = k
         for m in range(members):
             k = lasting.order[m]
-            if lasting.mode[k] == LEAVES and lasting.speed[k, 0] <= DRIFT * fastest:
+            # What does not rebound parts only as it turns, or drifts.
+            drifts = lasting.usual[k, 0] == 0.0 and lasting.speed[k, 0] <= DRIFT * fastest
+            if lasting.mode[k] == LEAVES and drifts:
                 lasting.mode[k] = LIES
             parts += 1 if lasting.mode[k] == LEAVES else 0
         if met < 0 or parts == 0:

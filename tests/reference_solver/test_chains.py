@@ -148,7 +148,7 @@ class Law:
         self.v, self.u = self.solve(struck, self.v, self.u, wanted)
         for c in range(len(self.gap)):
             # What was struck in turn with what is spent is spent as well: speeds of a chain fall together.
-            near = self.gap[c] < NOTHING and abs(self.u[c]) < MUCH_LESS
+            near = slow and self.gap[c] < NOTHING and abs(self.u[c]) < MUCH_LESS
             self.lies[c] = near or (c in struck and abs(self.u[c]) < SPENT)
             self.u[c], self.gap[c] = (ZERO, ZERO) if self.lies[c] else (self.u[c], self.gap[c])
 
