@@ -37,7 +37,7 @@ def refused(model, record):
 
 
 def test_a_disc_whose_floor_sinks_is_struck_alone_and_meets_the_floor_after_that():
-    """It parts from the floor as it is struck, and has no part of it in that impact; then it is faster than the floor."""
+    """It parts from the floor as it is struck, which has no part in that; then it is faster than the floor."""
     model = landing(0.25, 0.25)
     record, judged = run(model)
     assert judged.is_followed.sum() == 1
