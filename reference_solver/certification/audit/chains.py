@@ -27,7 +27,7 @@ Groups = list[Indices]
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield how many chains of impacts are not proven to be without end."""
-    yield "endless", float(sum(not _has_no_end(run, k) for k in np.flatnonzero(run.is_chain)))
+    yield "endless", float(sum(not _has_no_end(run, k) for k in np.flatnonzero(run.is_chain).tolist()))
 
 
 def _has_no_end(run: Run, piece: int) -> bool:
