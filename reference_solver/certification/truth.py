@@ -202,7 +202,8 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
         change = away(model, far)
         moved = Simulation(change.model(model), settings).record(steps, stride).pose
         apart = distance(model, change.pose(found.pose, found.t), moved)
-        allowed = found.error + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
+        # What happens a little sooner or later there X may tell later only.
+        allowed = found.error[within][-1] + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
         beyond = np.flatnonzero(within & ~(apart <= allowed))
         if len(beyond):
             k = int(beyond[0])

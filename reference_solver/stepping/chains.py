@@ -16,7 +16,7 @@ from reference_solver.stepping.clock import BLOWS, HELD, follows_soon
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
-from reference_solver.stepping.noise import DRIFT
+from reference_solver.stepping.noise import DRIFT, NOISE
 from reference_solver.stepping.operations import Island, ending_of, is_free, mark_contact, note_touching, number_of
 from reference_solver.tally import ENDLESS_A, UNORDERED_A
 
@@ -64,8 +64,8 @@ def open_instant(island: Island) -> None:
                 met = k
         for m in range(members):
             k = lasting.order[m]
-            # What does not rebound parts only as it turns, or drifts.
-            drifts = lasting.usual[k, 0] == 0.0 and lasting.speed[k, 0] <= DRIFT * fastest
+            # What does not rebound parts only as it turns, or drifts; what a chain has left of a speed is none.
+            drifts = lasting.speed[k, 0] <= (DRIFT if lasting.usual[k, 0] == 0.0 else NOISE) * fastest
             if lasting.mode[k] == LEAVES and drifts:
                 lasting.mode[k] = LIES
             parts += 1 if lasting.mode[k] == LEAVES else 0
