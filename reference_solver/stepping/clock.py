@@ -26,7 +26,9 @@ ROCKING, ROCKS = 11, 12
 BRIEF, LONGER_BRIEF = 13, 14
 #: What events count that follow each other within a thousandth of a step, where each is dear.
 CHAIN = 15
-CLOCK_SIZE = 16
+#: Impacts of the present instant that have been made.
+BLOWS = 16
+CLOCK_SIZE = 17
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -68,7 +70,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = 0.0
     clock[LONGER_BRIEF] = INSTANT
 
 
@@ -109,6 +111,22 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
     tally[EVENTS_LOCATED] += 1.0
     if clock[HELD] == 0.0 and (clock[SOFT] > clock[PATIENCE] or clock[CHAIN] > LONGEST_CHAIN):
         hold_rest(clock, tally)
+    if clock[EVENTS] > EVENT_BUDGET:
+        tally[EXHAUSTED] += 1.0
+
+
+@kernel
+def follows_soon(clock: Array) -> bool:
+    """Whether the event at hand came within a thousandth of a step of the one before."""
+    return bool(clock[WEIGHT] == HASTE)
+
+
+@kernel
+def count_blow(clock: Array, tally: Array) -> None:
+    """Enter an impact that another one follows at once; too many of them, and the run ends."""
+    clock[BLOWS] += 1.0
+    clock[EVENTS] += 1.0
+    tally[EVENTS_LOCATED] += 1.0
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
 

@@ -197,7 +197,7 @@ def test_hard_impacts_try_no_patience_but_their_budget_ends_the_run():
         assert (clock[SOFT], clock[HELD], tally[EXHAUSTED]) == (0.0, 0.0, 0.0)
     count_event(clock, tally, False, False, 1.0)
     assert tally[EXHAUSTED] == 1.0
-    assert any("events" in reason for reason in reasons(tally, True))
+    assert any("events" in reason for reason in reasons(tally))
 
 
 def test_a_ball_with_little_play_never_leaves_its_room():
