@@ -108,7 +108,7 @@ def _opened(
         # Of a rod that lies flush the nearest point is the other end, or the middle: it tells nothing of this one.
         told = np.linalg.norm(nearest - pieces.point[rows], axis=1) <= SAME * size
         point = 0.5 * (found.point_a + found.point_b)
-        first, last = (_moving(run, i, run.side[k][rows], point, pose[k]) for k, i in enumerate(bodies))
+        first, last = (_moving(run, i, run.side[k][rows], point, pose[k], after=True) for k, i in enumerate(bodies))
         speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
         parting = ((last - first) * found.normal).sum(axis=1) - noise / radius * speed - still
         parting = np.minimum(parting, np.linalg.norm(pieces.impulse[rows], axis=1) / mass[rows]).clip(min=0.0)
@@ -192,7 +192,7 @@ def _at(run: Run, i: int, rows: Indices, pieces: Indices) -> Array:
 
 
 def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array, after: bool) -> Array:
-    """Velocities (s, d) of points of body i before or ``after`` impacts."""
+    """Velocities (s, d) of points of body i before or ``after`` their pieces."""
     own = np.tile(twist_of(run.model.bodies[i]), (len(rows), 1))
     told = run.pieces.twist_after if after else run.pieces.twist_before
     twist = np.where((rows >= 0)[:, None], told[rows], own) if run.free[i] else own
