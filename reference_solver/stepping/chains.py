@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.clock import BLOWS, HELD, follows_soon
+from reference_solver.stepping.clock import BLOWS, HELD, SOON
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
@@ -71,7 +71,7 @@ def open_instant(island: Island) -> None:
             parts += 1 if lasting.mode[k] == LEAVES else 0
         if met < 0 or parts == 0:
             continue
-        if pairs > 1 and (clock[BLOWS] > 0.0 or follows_soon(clock)):
+        if pairs > 1 and clock[SOON] > 0.0:
             name_bodies(island, met, UNORDERED_A)
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:

@@ -26,9 +26,10 @@ ROCKING, ROCKS = 11, 12
 BRIEF, LONGER_BRIEF = 13, 14
 #: What events count that follow each other within a thousandth of a step, where each is dear.
 CHAIN = 15
-#: Impacts of the present instant that have been made.
-BLOWS = 16
-CLOCK_SIZE = 17
+#: Impacts of the present instant that have been made; 1 where the instant came within a thousandth of a step of the
+#: event before.
+BLOWS, SOON = 16, 17
+CLOCK_SIZE = 18
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -70,7 +71,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = clock[SOON] = 0.0
     clock[LONGER_BRIEF] = INSTANT
 
 
@@ -104,6 +105,7 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
     phase costs. Too many events of all kinds, and the run ends.
     """
     clock[WEIGHT] = (CRAWL * price if shortened else HASTE) if hasty else 1.0
+    clock[SOON] = 1.0 if hasty else 0.0
     clock[EVENTS] += 1.0
     clock[SOFT] += clock[WEIGHT]
     if not shortened:
@@ -113,12 +115,6 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
         hold_rest(clock, tally)
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
-
-
-@kernel
-def follows_soon(clock: Array) -> bool:
-    """Whether the event at hand came within a thousandth of a step of the one before."""
-    return bool(clock[WEIGHT] == HASTE)
 
 
 @kernel
