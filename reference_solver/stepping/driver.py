@@ -71,7 +71,7 @@ from reference_solver.stepping.operations import (
 )
 from reference_solver.stepping.phase import NO_PHASE, SHORTENED
 from reference_solver.stepping.vectors import copy_vectors
-from reference_solver.tally import CONTRADICTED_A, EXHAUSTED
+from reference_solver.tally import CONTRADICTED_A, EXHAUSTED, OPENED
 
 
 @spliced_kernel
@@ -152,6 +152,7 @@ def make_sub_step(island: Island) -> bool:
         end_instant(clock, gained, loaded)
     if end < left and (haste or not shortened):
         count_event(clock, tally, haste, shortened, price_of_creeping(island))
+    tally[OPENED] += 1.0  # a phase counts no solve: what overlaps after it did not at the start
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
     return True
 
