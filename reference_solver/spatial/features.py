@@ -107,6 +107,12 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
         if bodies.kind[lasting.body[k, side]] == HALF_SPACE or not goes_off(bodies, manifolds, lasting, c, k, side):
             return True
         if lasting.place[k, RADIUS + 1 - side] > 0.0:
+            tip, i = part(lasting, k, PLACE, 1 - side)[0], lasting.body[k, 1 - side]
+            onward = tip * dot(passing(bodies, manifolds, lasting, c, k, side), axis(bodies.axes, i, 0))
+            for choice in range(CROSSED if onward > 0.0 else NEAREST, NEAREST):  # a capsule slides out over the edge
+                lasting.kind[k, CHOICE] = choice
+                if take_features(bodies, lasting, k, n, choice):
+                    return True
             break
         lasting.kind[k, CHOICE] = ON_B
         if cross_over(bodies, manifolds, lasting, c, k):
@@ -221,25 +227,26 @@ def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: 
 
     What is round rolls on over it: its core, which is above the point of contact by its radius, moves out of the face.
     """
-    radius = lasting.place[k, RADIUS + 1 - side]
-    m, p = c // POINTS, c % POINTS
-    i, other = lasting.body[k, side], lasting.body[k, 1 - side]
-    up = scale(radius * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))
+    i, arms = lasting.body[k, side], manifolds.arm_a if side == 0 else manifolds.arm_b
+    local = times_transposed(bodies.axes, i, row(arms[c // POINTS], c % POINTS, 0))
+    way = times_transposed(bodies.axes, i, passing(bodies, manifolds, lasting, c, k, side))
+    for d in range(3):
+        half, aside = bodies.geometry[i, d], part(lasting, k, DIRECTION, side)[d] == 0.0
+        if aside and half - abs(local[d]) <= AT_EDGE * half and way[d] * local[d] > 0.0:
+            return True
+    return False
+
+
+@inner_kernel
+def passing(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int) -> Vector:
+    """Velocity of the core of the other body at row c, less that of the body on this side [m/s]."""
+    m, p, i, other = c // POINTS, c % POINTS, lasting.body[k, side], lasting.body[k, 1 - side]
+    up = scale(lasting.place[k, RADIUS + 1 - side] * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))
     arm, far = row(manifolds.arm_a[m], p, 0), row(manifolds.arm_b[m], p, 0)
     if side == 1:
         arm, far = far, arm
     at_other = add(row(bodies.twist, other, 0), cross(row(bodies.twist, other, 3), add(far, up)))
-    own = add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), add(arm, up)))
-    local, passing = times_transposed(bodies.axes, i, arm), times_transposed(bodies.axes, i, sub(at_other, own))
-    for d in range(3):
-        half = bodies.geometry[i, d]
-        if (
-            part(lasting, k, DIRECTION, side)[d] == 0.0
-            and half - abs(local[d]) <= AT_EDGE * half
-            and passing[d] * local[d] > 0.0
-        ):
-            return True
-    return False
+    return sub(at_other, add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), add(arm, up))))
 
 
 @inner_kernel

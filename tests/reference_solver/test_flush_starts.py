@@ -75,7 +75,7 @@ def slope(d, kind, narrower):
 
 def books(d, kind, narrower):
     """Two that slide together: the lower is braked harder, so that the upper slides forward on it."""
-    speed = (0.8, 0.6) if d == 3 and kind == "box" else (1.0, 0.0)
+    speed = (0.8, 0.6) if d == 3 and kind == "box" and narrower == 0.0 else (1.0, 0.0)
     upper = layer(d, kind, 0.15 - narrower, 0.02, 1.0, narrower, 0.04, speed)
     bodies = [floor(d), layer(d, "box", 0.15, 0.02, 1.0, 0.0, 0.0, speed), upper]
     return Model(d, bodies, vector(d, 0.0, -G), 0.0, between(0.4, 0.1)), [-0.7 * G, -0.1 * G]
@@ -154,7 +154,10 @@ def test_a_flush_start_is_certified_beyond_its_first_step(d, scene):
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
-    """Widths that differ by less than is seen, or by little more, move bodies by no more than that."""
+    """What is off by less than is seen, or by little more, moves as what is flush.
+
+    In space friction that acts aside of a centre by 1e-7 m turns a body of .15 m by 1e-5 rad/s^2: 1e-10 m in two steps.
+    """
     model, accelerations = scene(d, "box", 0.0)
     for off in (1e-13, 1e-11, 1e-9, 3e-9, 1e-7):
         for sign in (-1.0, 1.0):
@@ -165,7 +168,7 @@ def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
             simulation = Simulation(replace(model, bodies=bodies), Settings.reference(DT))
             simulation.advance(2)
             expected = truth(simulation.model, accelerations, 2 * DT)
-            assert np.abs(simulation.pose - expected).max() <= 2e-12
+            assert np.abs(simulation.pose - expected).max() <= 2e-12 + 1e-3 * off
 
 
 @pytest.mark.parametrize("seed", range(6))
