@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation
-from reference_solver.compilation import from_python
+from reference_solver.compilation import from_python, kernel
 from reference_solver.needs import EVERYTHING
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.state import allocate_bodies
-from reference_solver.stepping import time_of_impact
-from reference_solver.stepping.time_of_impact import first_contact, next_contact_of_held
+from reference_solver.stepping.time_of_impact import (
+    bend_bound,
+    first_contact,
+    introduce,
+    next_contact_of_held,
+    safe_time,
+    separate,
+    stand,
+    watch_all,
+)
 
 DT = 1.0 / 60.0
 #: Samples of a step: a corner that turns 30 rad in it goes 1e-3 of its lever between two.
@@ -104,13 +112,22 @@ def meet(first, second, start, paths, until=DT, begins=(0.0, 0.0), now=0.0):
     return first_contact(on_paths(first, second, start, paths, begins), 0, 1, now, until)
 
 
+@kernel
+def safe_time_at_start(meeting, clearance, acceleration):
+    introduce(meeting, 0, 1)
+    watch_all(meeting)
+    stand(meeting, 0.0)
+    separate(meeting)
+    return safe_time(meeting, clearance, acceleration)
+
+
 @pytest.mark.parametrize("spins", [(0.0, 7.0), (-3.0, 7.0)])
 def test_a_gap_bends_by_what_its_corners_turn(spins):
     """About centres that go straight: by r w^2 of each body, where a corner points at the other body."""
     shapes, paths = (Box((0.8, 0.3)), TRIANGLE), [np.array([[0.1], [0.2], [w]]) for w in spins]
     meeting = on_paths(*shapes, ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0)), paths)
-    from_python(time_of_impact.introduce)(meeting, 0, 1)
-    bend = from_python(time_of_impact.bend_bound)(meeting, 0.0, DT)
+    assert first_contact(meeting, 0, 1, 0.0, DT) == math.inf
+    bend = from_python(bend_bound)(meeting, 0.0, DT)
     assert bend == pytest.approx(sum(reach(s) * w * w for s, w in zip(shapes, spins, strict=True)), rel=1e-12)
 
 
@@ -119,12 +136,9 @@ def test_a_safe_time_is_the_first_zero_of_its_parabola(rate, bend):
     """A disc over a wall: of ``c + r t + b t^2 / 2``."""
     paths = np.zeros((3, 1)), np.array([[3.0], [rate], [0.0]])
     meeting = on_paths(WALL, Disc(0.5), (np.zeros(3), (0.0, 1.2, 0.0)), paths)
-    for act, *more in ((time_of_impact.introduce, 0, 1), (time_of_impact.watch_all,), (time_of_impact.stand, 0.0)):
-        from_python(act)(meeting, *more)
-    from_python(time_of_impact.separate)(meeting)
     roots = np.roots([0.5 * bend, rate, 0.7])
     first = min(root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0)
-    assert from_python(time_of_impact.safe_time)(meeting, 0.7, bend) == pytest.approx(first, rel=1e-14)
+    assert safe_time_at_start(meeting, 0.7, bend) == pytest.approx(first, rel=1e-14)
 
 
 def is_first(t, gaps, exact, times):
