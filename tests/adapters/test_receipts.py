@@ -448,7 +448,7 @@ class Yielding(ToyEngine):
         def softer(dt):
             before = simulation.twists.copy()
             step(dt)
-            simulation.twists[1:] = before[1:] + (simulation.twists[1:] - before[1:]) / (1.0 + friction)
+            simulation.twists[1:] = before[1:] + (simulation.twists[1:] - before[1:]) / (1.0 + 10.0 * friction)
 
         simulation._step = softer if friction > 5.0 else step
         return simulation
