@@ -562,9 +562,9 @@ def test_the_page_of_a_run_that_lacks_an_engine_that_the_last_bench_has_names_bo
     gone = page_source.engines[-1]
     assert any(observation.slot.engine == gone for observation in page_source.bench.observations)
     rows = [row for row in page_source.rows if row["engine"] != gone]
-    source = replace(
-        page_source, rows=rows, observations=[o for o in page_source.observations if o.slot.engine != gone]
-    )
+    observations = [each for each in page_source.observations if each.slot.engine != gone]
+    replays = [(slot, recording) for slot, recording in page_source.replays if slot.engine != gone]
+    source = replace(page_source, rows=rows, observations=observations, replays=replays)
     assert gone not in source.engines and gone in {engine for engine, _ in source.named}
     assert source.named[: len(source.columns)] == list(source.columns)
     page = render(source)

@@ -18,7 +18,7 @@ from adapters.scene import SceneError
 
 #: Largest file that is read [bytes]: some 10 000 bodies, parsed in about a second.
 MOST_BYTES = 2**21
-#: Most bodies: what is ours of a cell of columns takes some 5 ms a body, so that these cost half a minute.
+#: Most bodies: what is ours of a cell of columns takes 2 to 3 ms a body, so that these cost half a minute.
 MOST_BODIES = 10_000
 #: Wrong fields that are named before the rest is counted.
 MOST_ERRORS = 10
