@@ -13,6 +13,13 @@ from reference_solver.certification.fuzz.variants import variants
 from reference_solver.certification.truth import Certificate, certify, distance
 from reference_solver.settings import Settings
 
+#: What a reason without a number of its own says, and its name.
+TOLD = {
+    "comes first hangs on round-off": "order of impacts",
+    "to no limit that is proven": "endless impacts",
+    "it comes out otherwise": "far from the origin",
+}
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -105,6 +112,9 @@ def conditions(certificate: Certificate) -> dict[str, float]:
     ended = [reason for reason in light["reasons"] if reason.endswith("the run ended there")]
     if ended:
         found["run ended"] = float(len(ended))
+    for words, name in TOLD.items():
+        if any(words in reason for reason in certificate.reasons):
+            found[name] = 1.0
     if not found and not certificate.holds:
         found["half the step"] = float("inf")
     return found
