@@ -71,7 +71,6 @@ from reference_solver.stepping.noise import (
     UNSOLVED,
 )
 from reference_solver.stepping.options import Options
-from reference_solver.stepping.phase import passes_by
 from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B
 
@@ -119,7 +118,7 @@ def describe(bodies: Bodies, rows: Rows, c: int) -> None:
 
 @inner_kernel
 def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, dt: float) -> None:
-    """Drop all rows but those that touch (E20), and those that only pass by (E21).
+    """Drop all rows but those that touch (E20).
 
     Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed (E28).
     """
@@ -135,10 +134,6 @@ def keep_touching(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, dt: fl
             may_close = sub.clock[HELD] > 0.0 and rows.real[c, RESTITUTION] == 0.0
             if may_close and rows.real[c, GAP] > reach:
                 may_close = -rows.real[c, APPROACH] <= soft_speed(bodies, rows, c, dt)
-            if rows.real[c, GAP] <= reach and rows.real[c, PN] <= 0.0:
-                closes = rows.real[c, APPROACH] < -still_speed(bodies, rows, c, dt)
-                if closes and passes_by(bodies, rows, sub.lasting, c, gap_noise(bodies, rows, c)):
-                    continue
             if may_close or rows.real[c, GAP] <= reach:
                 copy_row(rows, c, kept)
                 rows.real[kept, FRICTION] = friction(bodies, pairs, rows, kept)

@@ -146,7 +146,8 @@ def name_next(bodies: Bodies, lasting: Lasting, k: int) -> bool:
     while kind[TRIED] < FEATURES:
         kind[TRIED] += 1
         choice = (choice + 1) % FEATURES
-        if take_features(bodies, lasting, k, n, choice):
+        touches = take_features(bodies, lasting, k, n, choice)
+        if touches and (choice != NEAREST or lasting.place[k, RADIUS] + lasting.place[k, RADIUS + 1] > 0.0):
             kind[CHOICE] = choice
             return True
     return False
@@ -171,7 +172,7 @@ def take_features(bodies: Bodies, lasting: Lasting, k: int, n: Vector, choice: i
             and take_line(bodies, lasting, k, 1, n, of_b)
             and cross_lines(bodies, lasting, k, n)
         )
-    if core_a == PLANE or core_b == PLANE or lasting.place[k, RADIUS] + lasting.place[k, RADIUS + 1] == 0.0:
+    if core_a == PLANE or core_b == PLANE:
         return False
     return core_a != LINE or core_b != LINE or cross_lines(bodies, lasting, k, n)
 

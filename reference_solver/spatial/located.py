@@ -93,9 +93,8 @@ def manifolds_of(island: Island) -> Manifolds:
 @inner_kernel
 def find_contacts(island: Island) -> int:
     """Number of manifolds found for the state of the clock; -1 if an array is too small."""
-    sub = island.sub
     found = detect_touching(
-        island.bodies, island.detection, island.room, island.memory, sub.past, island.options, sub.clock, sub.lasting
+        island.bodies, island.detection, island.room, island.memory, island.sub.past, island.options, island.sub.clock
     )
     return found if island.ledger.used[0] + POINTS * found <= len(island.ledger.real) else -1
 

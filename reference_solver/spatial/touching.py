@@ -17,25 +17,12 @@ from reference_solver.spatial.manifolds import (
     sort_points,
 )
 from reference_solver.spatial.narrowphase import collide
-from reference_solver.spatial.operations import Spatial
-from reference_solver.spatial.prepare import set_response, still_speed
-from reference_solver.spatial.state import (
-    CANDIDATES,
-    MANIFOLDS,
-    PAST,
-    POINTS,
-    REMEMBERED,
-    Bodies,
-    Detection,
-    Manifolds,
-    Memory,
-)
+from reference_solver.spatial.prepare import set_response
+from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
-from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import LATE, NEARLY, NO_GAP
 from reference_solver.stepping.options import Options
-from reference_solver.stepping.phase import passes_by
 
 
 @inner_kernel
@@ -47,13 +34,12 @@ def detect_touching(
     past: Memory,
     options: Options,
     clock: Array,
-    lasting: Lasting,
 ) -> int:
     """Fill the manifolds of all points that touch or last, in canonical order; their number, -1 if there is no room.
 
     Where what is left goes at impulse level, gaps with e = 0 that close softly may be closed; at the end of such a
     sub-step those that carried load in it are wanted, and overlaps (E28). ``own``: memory of the sub-step before;
-    ``past``: of the step before; ``clock`` and ``lasting``: of the sub-step.
+    ``past``: of the step before; ``clock``: of the sub-step.
     """
     if not find_candidates(bodies, detection, options):
         return -1
@@ -80,7 +66,7 @@ def detect_touching(
         else:
             may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, key // n, key % n) == 0.0
             late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
-            keep_points(bodies, manifolds, m, memory, known, late, may_close, options.dt, lasting)
+            keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
         if manifolds.points[m] > 0:
             describe(bodies, detection, manifolds, m, options)
             m += 1
@@ -97,32 +83,22 @@ def closed_gap(bodies: Bodies, manifolds: Manifolds, m: int, p: int) -> float:
 
 @inner_kernel
 def keep_points(
-    bodies: Bodies,
-    manifolds: Manifolds,
-    m: int,
-    memory: Memory,
-    known: int,
-    late: float,
-    may_close: bool,
-    dt: float,
-    lasting: Lasting,
+    bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, known: int, late: float, ahead: float
 ) -> None:
-    """Keep the points that touch, and do not only pass by (E21), and those that `memory` knows to carry load.
+    """Keep the points that touch, and those that `memory` knows to carry load: they may close their gap.
 
-    ``late``: time [s] within which what touches may close its gap; where others ``may_close`` theirs they do if their
-    approach is soft in a step of ``dt`` (E28).
+    ``late``: time [s] within which what touches may close its gap; ``ahead``: the step, where others may be closed as
+    well if their approach is soft (E28), else 0.
     """
-    space, kept = Spatial(bodies, bodies.pose, bodies.twist), 0
+    a, b = manifolds.body_a[m], manifolds.body_b[m]
+    kept = 0
     for p in range(manifolds.points[m]):
-        at_a = point_velocity(bodies, manifolds.body_a[m], row(manifolds.arm_a[m], p, 0))
-        at_b = point_velocity(bodies, manifolds.body_b[m], row(manifolds.arm_b[m], p, 0))
-        approach, noise = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a)), gap_noise(bodies, manifolds, m, p)
+        at_a = point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0))
+        at_b = point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0))
+        approach = dot(row(manifolds.frame[m], 2, 0), sub(at_b, at_a))
         lasts = recall_force(manifolds, m, p, memory, known)
-        meets = manifolds.gap[m, p] <= noise + late * abs(approach)
-        if meets and not lasts and approach < -still_speed(bodies, manifolds, m, dt):
-            if passes_by(space, manifolds, lasting, POINTS * m + p, noise):
-                continue
-        if lasts or meets or (may_close and -approach <= soft_speed(bodies, manifolds, m, p, dt)):
+        meets = manifolds.gap[m, p] <= gap_noise(bodies, manifolds, m, p) + late * abs(approach)
+        if lasts or meets or (ahead > 0.0 and -approach <= soft_speed(bodies, manifolds, m, p, ahead)):
             move_point(manifolds, m, p, kept)
             manifolds.lasts[m, kept] = 1 if lasts else 0
             manifolds.meets[m, kept] = 1 if meets else 0

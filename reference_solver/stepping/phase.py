@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from reference_solver.stepping.clean_up import clean_up, give
 from reference_solver.stepping.equalities import (
     CONTRADICTORY,
     force_contacts,
-    row_value,
 )
 from reference_solver.stepping.lasting import (
     BETWEEN,
@@ -47,7 +45,6 @@ from reference_solver.stepping.operations import (
     evaluate,
     feature_limits,
     free_accelerations,
-    hold,
     next_features,
 )
 from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slips, stops_across
@@ -479,21 +476,6 @@ def first_return(lasting: Lasting, left: float) -> float:
         if lasting.parts[k] == HOPS and gain < 0.0:
             first = min(first, -2.0 * lasting.speed[k, 0] / gain)
     return first
-
-
-@inner_kernel
-def passes_by(bodies: Bodies, rows: Any, lasting: Lasting, c: int, noise: float) -> bool:
-    """Whether row c approaches, but loads and its own turning part it again within the noise of its gap [m].
-
-    Its gap falls by ``u^2 / (2 a)`` more, u being the approach and a the rate at which it ends. That is no impact: the
-    speed with which a gap of round-off closes between shapes that curve away from each other is round-off as well.
-    """
-    lasting.size[CONTACTS] = 1
-    hold(bodies, rows, lasting, c, 0)
-    evaluate(bodies, lasting)
-    free_accelerations(bodies, lasting)
-    gain = row_value(lasting, 0, 0, lasting.free) + lasting.gamma[0, 0]
-    return bool(lasting.speed[0, 0] ** 2 <= 2.0 * gain * noise)
 
 
 @inner_kernel
