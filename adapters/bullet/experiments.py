@@ -291,6 +291,19 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("turned", (_NO_DRAG,)),
         )
     ),
+    *(
+        Experiment(
+            "slide-drag-and-switching",
+            "with a wider margin the floor pushes steadily; without drag alone it does not",
+            "default",
+            "slide",
+            metric,
+            {"contactBreakingThreshold": 0.1},
+            idle=(_NO_DRAG,),
+            dt=1.0 / 60.0,
+        )
+        for metric in ("normal[least]", "normal[greatest]", "friction[mean]")
+    ),
 )
 
 EXPERIMENTS += (
