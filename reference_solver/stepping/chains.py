@@ -1,8 +1,8 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
-A contact that parts has no part in an impact; one with e = 0 that drifts apart, slower than a millionth of the impact,
-lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is the
-time until it is closed. Where one pair of bodies meets and all others that touch them part, the order of impacts is
+A pair of bodies that parts has no part in an impact; one with e = 0 that drifts apart, slower than a millionth of the
+impact, lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is
+the time until it is closed. Where one pair of bodies meets and all others that touch them part, the order of impacts is
 forced. Without friction each then changes the normal velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj``
 with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see whether it ends. It does not if the
 order repeats, with all u a factor below one smaller each time.
@@ -47,6 +47,10 @@ def open_instant(island: Island) -> None:
     for k in range(count):
         u, least = lasting.speed[k, 0], lasting.speeds[k]
         lasting.mode[k] = MEETS if u < -least else LEAVES if u > least else LIES
+    for k in range(count):
+        for j in range(count if lasting.mode[k] == LEAVES else 0):
+            if lasting.mode[j] == MEETS and same_pair(lasting, j, k):
+                lasting.mode[k] = LIES  # all points of a pair that meets answer together
         meets += 1 if lasting.mode[k] == MEETS else 0
         parts += 1 if lasting.mode[k] == LEAVES else 0
     if meets == 0 or parts == 0:
@@ -227,6 +231,9 @@ def strike(lasting: Lasting, u: Array, gap: Array, n: int) -> bool:
             first, lasting.asked[i] = i, 1
     if first < 0:
         return False
+    for i in range(n):
+        if u[i] > 0.0 and same_pair(lasting, lasting.order[first], lasting.order[i]):
+            return False  # not linear: its points answer together, and may part
     time = gap[first] / -u[first]
     for i in range(n):
         gap[i] = 0.0 if lasting.turned[i] == 1 else gap[i] + time * u[i]

@@ -91,6 +91,8 @@ def _next(u: Array, pairs: Indices) -> Indices:
     size = np.abs(u).max()
     meets = np.flatnonzero(u < 0.0)
     certain = (np.abs(u) > CLEAR * size).all() and (pairs[meets] == pairs[meets[:1]]).all()
+    # Points of a pair answer together: where one of them parts, the answer is not linear.
+    certain &= len(meets) == (pairs == pairs[meets[:1]]).all(axis=1).sum() if len(meets) else False
     return meets if certain else meets[:0]
 
 

@@ -142,7 +142,10 @@ def _laws(run: Run) -> Iterator[float]:
     held = impact & soft & (rebound > 0.0) & (stopped < defect)
     defect = np.where(held, stopped, defect)
     # What parts as an impact begins has no part in it, but in a chain, and comes closer only to be struck next.
-    parts = impact & (approach > 0.0) & ~(chain & (pressed > 0.0))
+    # All points of a pair that meets answer together.
+    _, pair = np.unique((owner * len(run.free) + a) * len(run.free) + b, return_inverse=True)
+    met = np.bincount(pair, approach < -LIES * speed) > 0.0
+    parts = impact & (approach > 0.0) & ~(chain & (pressed > 0.0)) & ~met[pair]
     alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
     fastest = np.zeros(len(pieces))
     np.maximum.at(fastest, owner, -approach)
