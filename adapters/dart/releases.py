@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from adapters.dart.profiles import SWEEPS
 from adapters.releases import Difference, Distribution, Releases
 
 RELEASES = Releases(
@@ -47,7 +48,7 @@ def refusal(profile: str) -> str | None:
     """Why the installed release has no such profile; None if it has."""
     import dartpy
 
-    if profile in ("pgs", "nsgs", "fbf") and not hasattr(dartpy.constraint, "NsgsFrictionSolver"):
+    if profile in SWEEPS and not hasattr(dartpy.constraint, "NsgsFrictionSolver"):
         return f"profile: {profile} needs solvers that dartpy has from 6.20.0 on"
     return None
 

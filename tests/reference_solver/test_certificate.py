@@ -350,7 +350,7 @@ def test_samples_carry_the_certificates_of_their_steps(dimension):
 def test_the_first_contact_solve_after_a_phase_is_not_at_the_start():
     """A block that turns about its corner opens no contact solve; an overlap in a later one was not there at the start.
 
-    It is told as what it is, whether or not an event was located.
+    The certificate reports it as an overlap of a located run, also where no event was located.
     """
     height = 0.05 * math.sin(0.6) + 0.4 * math.cos(0.6)
     simulation = simulate(2, [floor(2), Body(Box((0.05, 0.4)), 1.0, 0.05, (0.0, height, -0.6))], "reference", 1)

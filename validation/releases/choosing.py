@@ -61,10 +61,10 @@ class Release:
 
 
 def known_releases(engine: str) -> Releases:
-    """What the adapter of an engine says of its releases.
+    """Return the table of releases of an engine.
 
-    Of one that says nothing its package is the only distribution. An adapter of ours then knows the releases that its
-    extra installs; one of another package is asked any release.
+    An engine without a table has one distribution, its package. If its adapter is part of this project, the known
+    releases are those that its extra installs; otherwise all are.
 
     Raises
     ------

@@ -118,9 +118,7 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
     ValueError
         If the record has no pieces.
     """
-    if record.pieces is None:
-        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
-    run = Run(model, record.pieces, dt)
+    run = _run_of(model, record, dt)
     start = np.array([body.pose for body in model.bodies], dtype=float)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return [
@@ -130,18 +128,23 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
         ]
 
 
+def _run_of(model: Model, record: Record, dt: float) -> Run:
+    if record.pieces is None:
+        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
+    return Run(model, record.pieces, dt)
+
+
 def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return when a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile.
 
-    Times (k,) [s]; what is left out there (k,) [m]; and what that goes on by (k,) [m/s] (`left_out_by_series`).
+    Times (k,) [s]; what is left out there (k,) [m]; and what that goes on by (k,) [m/s] (`left_out_by_series`). Raises
+    ValueError if the record has no pieces.
     """
-    if record.pieces is None:
-        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
-    run = Run(model, record.pieces, dt)
+    run = _run_of(model, record, dt)
     ends = contact.ends_of_series(run)
     which, place = np.unique(run.contact_owner[ends], return_inverse=True)
     sums = [np.bincount(place, part[ends], len(which)) for part in contact.left_out_by_series(run, ends)]
-    return record.pieces.begin[which], sums[0], sums[1]
+    return run.pieces.begin[which], sums[0], sums[1]
 
 
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
@@ -155,9 +158,7 @@ def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple
     ValueError
         If the record has no pieces.
     """
-    if record.pieces is None:
-        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
-    run = Run(model, record.pieces, dt)
+    run = _run_of(model, record, dt)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         apart, told = sharing.distances(run, record.t)
     limit, meaning = CHECKS["shared"]

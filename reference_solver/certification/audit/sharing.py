@@ -29,7 +29,8 @@ HELD = 1e-9
 REDUNDANT = 1e-9
 #: Share of unit forces up to which what is left of their sum is round-off: some thousand last places.
 ROUND_OFF = 1e-12
-#: Sides of the polygon that stands for the circle of sticking friction in space: it is 2 % too wide at its corners.
+#: Sides of the polygon that replaces the circle of sticking friction in space; at its corners friction exceeds mu p_n
+#: by 2 %.
 SIDES = 16
 
 
@@ -155,7 +156,7 @@ def _by_root_of_inertia(run: Run, row: Indices, moment: Array) -> Array:
 
 
 def _next_approach(run: Run, approach: Array, leaves: Array) -> Array:
-    """Normal velocity (c,) of each contact as the next piece begins; where that has no such contact, ``leaves``."""
+    """Normal velocity (c,) of each contact as the next piece begins; ``leaves`` if that lacks the contact."""
     pieces, owner, found = run.pieces, run.contact_owner, leaves.copy()
     order = np.lexsort((owner, pieces.feature, pieces.body_b, pieces.body_a))
     one, other = order[:-1], order[1:]

@@ -34,10 +34,9 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
 def _touching(run: Run) -> list[float]:
     """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
 
-    And by how much faster bodies close along a normal than along another that is as good, as a share of their speeds,
-    and what `_opened` says of contacts that last.
-    Of contacts that carry something. Those of the fixed-step law and of the impulse-level scheme may close a gap, and
-    have the levers of another time: they are not asked.
+    Then by how much faster bodies close along a normal than along another that is as good, as a share of the speeds,
+    and how far contacts open within their pieces (`_opened`). Only contacts with an impulse are measured. Those of the
+    fixed-step law and of the impulse-level scheme may close a gap and have levers of another time: they are left out.
     """
     pieces = run.pieces
     worst, doubt, mass = np.zeros(5), unseen(run), reduced_mass(run)
