@@ -272,6 +272,8 @@ class Engine(ABC):
     profiles: Mapping[str, ProfileRule]
     #: What the adapter knows of other releases; None: nothing, its package is the only distribution.
     releases: Releases | None = None
+    #: Settings that a user may set beside a profile's own, by name, with what each must be (`adapters.settings`).
+    kinds: Mapping[str, Callable[[Any], str]] = MappingProxyType({})
     #: Conformance checks that it is known to fail.
     expected: tuple[Expected, ...] = ()
     #: What a run can be written as for the engine alone, by the name of the format (``crosscheck export --to``). The
@@ -305,6 +307,19 @@ class Engine(ABC):
         """Why this engine cannot run ``scene`` in steps of ``dt`` [s], or None: such a cell is UNSUPPORTED."""
         return self.refuses(scene, profile) or self.too_coarse(scene, dt)
 
+    def settable(self) -> Mapping[str, Callable[[Any], str]]:
+        """`kinds` of the release that is installed."""
+        return self.kinds
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:  # noqa: B027  (`build` checks them in any case)
+        """Refuse settings that `build` would refuse, whatever the scene is, before anything runs.
+
+        Raises
+        ------
+        EngineError
+            Naming the setting.
+        """
+
     @abstractmethod
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; ``settings`` holds every setting of the profile by name, ``iterations`` included."""
@@ -332,10 +347,19 @@ class Engine(ABC):
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
 
-        Written out for the material of the scene's first pair and step ``dt`` [s]; empty where an adapter knows no
-        such words.
+        Numbers are those of step ``dt`` [s] and of the scene's materials. Where one is made of the restitution e, the
+        step or gravity, its formula stands in a comment beside it, with ``dt`` and ``g`` and ``e`` for them. Where
+        pairs of different materials need different lines, each material has its own. Empty where an adapter knows no
+        such lines.
         """
         return ""
+
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """What the engine itself calls settings: by our name its own name, and the value or the formula in its words.
+
+        A setting that is not among them has one name for both. An empty name: the setting is told with another one.
+        """
+        return {}
 
     def settings(self, profile: str, needs: Needs, dt: float, iterations: int | None = None) -> list[Setting]:
         """Settings of ``profile``; ``iterations`` replaces the profile's own count.

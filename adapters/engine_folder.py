@@ -10,6 +10,7 @@
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
         experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
         findings/         families.toml and members.csv (`validation.findings`), breaks.toml and breaks.csv
+        unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
         decisive.csv      which settings of its cures matter, as measured (`validation.settings.decisive`)
         cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.settings.cures`)
 
@@ -41,8 +42,9 @@ from adapters.foreign import importable, said_by
 from adapters.law import Deviation, Law, Measure, Prediction
 from adapters.plain import one_line
 from adapters.scene import Scene
+from adapters.unset import Unset
 
-LAWS, EXPERIMENTS, FINDINGS, DECISIVE = "laws", "experiments", "findings", "decisive.csv"
+LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
 CURES = "cures.csv"
 
 
@@ -114,6 +116,13 @@ def belongs_of(engine: str) -> Mapping[str, str]:
     return {name: str(other) for name, other in _mapped(engine, "BELONGS").items()}
 
 
+@cache
+def unset_of(engine: str) -> tuple[Unset, ...]:
+    """What is documented, and can be measured, of ``engine`` with nothing set; none where its folder does not say."""
+    module, _ = _module(engine, UNSET)
+    return tuple(each for each in getattr(module, "UNSET", ()) if isinstance(each, Unset))
+
+
 def problems() -> list[str]:
     """One line for each engine whose laws or experiments cannot be had."""
     found = []
@@ -127,7 +136,7 @@ def problems() -> list[str]:
 def forget() -> None:
     """Look again at what is installed."""
     registry.find.cache_clear()
-    for each in (laws_of, experiments_of, cured_of, candidates_of, belongs_of, _laws, _experiments, _module):
+    for each in (laws_of, experiments_of, cured_of, candidates_of, belongs_of, unset_of, _laws, _experiments, _module):
         each.cache_clear()
 
 

@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adapters.drives import top_speed
+from adapters.near import near_pairs
 from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.shapes import reach
 
@@ -27,20 +29,42 @@ from adapters.shapes import reach
 Meeting = tuple[int, int, Pair]
 #: Engines leave the exact motion, by drag, overlap or what they add to a rebound: so many times as far is looked.
 ROOM = 2.0
-#: Of more free bodies all pairs are taken to meet: these are looked at one by one.
+#: Of more bodies not every pair is looked at, and all are taken to meet.
 MOST_BODIES = 200
 
 
 def representable(scene: Scene, solve: Callable[[Sequence[Meeting]], list[float] | None]) -> list[float] | None:
     """Numbers of bodies that give the materials of all pairs, or else of those that can meet; None if there are none.
 
-    ``solve`` finds them for a list of pairs. All pairs come first: what an engine could hold, it holds as it did.
+    ``solve`` finds them for a list of pairs. All pairs come first: what an engine could hold, it holds as it did. Of
+    many bodies of one material two that are free and two that are not stand for all.
     """
+    if len(scene.bodies) > MOST_BODIES and len(scene.materials()) == 1:
+        free = [body.motion == "free" for body in scene.bodies]
+        chosen = [k for kind in (True, False) for k in [k for k, own in enumerate(free) if own is kind][:2]]
+        told = solve(pairs_among(scene, sorted(chosen)))
+        if told is not None:
+            return [told[chosen[0] if is_free else chosen[-1]] for is_free in free]
     found = solve(list(scene.contact_pairs()))
     if found is not None:
         return found
     pairs = meeting_pairs(scene)
     return solve(pairs) if pairs else [0.0] * len(scene.bodies)
+
+
+def pairs_among(scene: Scene, chosen: Sequence[int]) -> list[Meeting]:
+    """Pairs with a free body among the chosen ones."""
+    pairs = combinations(chosen, 2)
+    names = [body.name for body in scene.bodies]
+    free = [body.motion == "free" for body in scene.bodies]
+    return [(i, j, scene.material(names[i], names[j])) for i, j in pairs if free[i] or free[j]]
+
+
+def told_pairs(scene: Scene) -> list[tuple[int, int]]:
+    """Pairs of which a readback tells the material: all, of many bodies those that can touch at the start."""
+    if len(scene.bodies) > MOST_BODIES:
+        return list(near_pairs(scene, np.array([[body.pose for body in scene.bodies]])))
+    return [(i, j) for i, j, _ in scene.contact_pairs()]
 
 
 def meeting_pairs(scene: Scene) -> list[Meeting]:

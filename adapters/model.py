@@ -134,10 +134,19 @@ def _serve(connection: Connection) -> None:
         found = registry.load(engine).reads[suffix.lower()](text, drop).as_dict()
         answer: dict[str, Any] = {"model": {**found, "settings": [plain(s) for s in found["settings"]]}}
     except SceneError as error:
-        answer = {"refused": str(error)}
+        answer = {"refused": str(error) + ("" if drop else _helped_by_drop(engine, suffix, text))}
     except Exception as error:  # a compiler's own complaints are the reader's to catch; this is something else
         answer = {"failed": f"model: {type(error).__name__}: {error}"}
     connection.send_bytes(json.dumps(answer).encode())
+
+
+def _helped_by_drop(engine: str, suffix: str, text: str) -> str:
+    """That the model can be read without what is refused, where it can: it is tried."""
+    try:
+        left_out = len(registry.load(engine).reads[suffix.lower()](text, True).dropped)
+    except Exception:  # it is refused for another reason as well, which the next call says
+        return ""
+    return f"; --drop leaves it out ({left_out} in all)" if left_out > 1 else "; --drop leaves it out"
 
 
 # ---- what readers have in common -------------------------------------------------------------------------------------

@@ -22,7 +22,8 @@ from adapters.scene import Body, Box, Capsule, Cylinder, Disc, Hull, Polygon, Sc
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
 #: ... or in what it reports.
 REPORTED = (
-    "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "late", "pull", "order",
+    "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "lasting", "uneven", "late",
+    "pull", "order",
 )  # fmt: skip
 SIZED = TOLD + REPORTED
 
@@ -37,8 +38,9 @@ class Planted(Engine):
         or adds is no share of a parameter: ``drift`` moves every body along x by ``size`` times 1 m/s and ``climb``
         upwards, as a correction of places that never ends does, and ``twirl`` turns it by ``size`` times 1 rad/s in
         the plane of x and the vertical; ``tremble`` adds ``size`` times 1 m/s along x with a
-        sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``damping`` takes the
-        share of all speeds away in a second.
+        sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``lasting`` tells a share
+        of the last impulses on where nothing touches any more; ``uneven`` takes a share of the impulses that grows with
+        the place of the body that is pushed; ``damping`` takes the share of all speeds away in a second.
     size
         Share by which it is off, 0.02 for two per cent.
     """
@@ -111,6 +113,8 @@ class _Misread(Simulation):
         #: Places and velocities of the last steps, newest last, as far back as what comes late may have been due.
         self.past: deque[tuple[Array, Array]] = deque(maxlen=math.ceil(self.size / dt) + 1)
         self._keep()
+        #: The last contacts that were read; none before the first.
+        self.told: Contacts | None = None
 
     def advance(self, steps: int) -> None:
         self.steps += steps
@@ -180,6 +184,13 @@ class _Misread(Simulation):
             return replace(found, impulse=self.factor * found.impulse)
         if self.fault == "flicker":
             return replace(found, impulse=(1.0 + self._turn() * self.size) * found.impulse)
+        if self.fault == "uneven":
+            last = max(1, len(self.inner.twist()) - 1)
+            return replace(found, impulse=(1.0 - self.size * found.b / last)[:, None] * found.impulse)
+        if self.fault == "lasting":
+            if len(found.a) == 0 and self.told is not None:
+                return replace(self.told, impulse=self.size * self.told.impulse)
+            self.told = replace(found, impulse=found.impulse.copy())  # what a simulation gives may be its own
         return found
 
     def _turn(self) -> float:

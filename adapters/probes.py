@@ -8,7 +8,8 @@
     slide     friction, friction_impulse    a box slides on a floor; its weight is an impulse as well
     corner    turn                          boxes land on a corner
 
-A probe has the pair values of the scene that is judged and is stepped by the same loop. A reader gives samples of a
+A probe has the pair values of the scene that is judged, its friction where friction is read (`Probe.rubs`), and is
+stepped by the same loop. A reader gives samples of a
 quantity (one per component, body or phase); `adapters.receipts` looks at the one farthest from what is declared.
 """
 
@@ -63,8 +64,9 @@ class Case:
 class Probe:
     """A scene, the quantities it shows, and how they are read from its trajectory.
 
-    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``contacts``: contact
-    impulses are read, of every step.
+    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``rubs``: they have
+    the friction of the judged scene; without, what friction does in an engine cannot pass for a wrong size or sign.
+    ``contacts``: contact impulses are read, of every step.
     """
 
     quantities: tuple[str, ...]
@@ -72,6 +74,7 @@ class Probe:
     read: Callable[[Case, Scene, Trajectory], Samples]
     only_ends: bool = False
     touches: bool = True
+    rubs: bool = False
     contacts: bool = False
 
     def sampling(self, case: Case, scene: Scene) -> Sampling:
@@ -324,9 +327,17 @@ def read_rebound(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 # ---- slide -------------------------------------------------------------------------------------------------------
 
 
+def slide_load(friction: float) -> float:
+    """Gravity of the slide [m/s^2]: less above a friction of 1, so that it brakes by one weight at most.
+
+    Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured.
+    """
+    return GRAVITY / max(1.0, friction)
+
+
 def slide_speed(friction: float) -> float:
     """Speed at which even twice the friction does not stop the box within the window [m/s]; 0.85 is a margin."""
-    return max(SLIDE_SPEED, 2.0 * friction * GRAVITY * SLIDE_TIME / 0.85)
+    return max(SLIDE_SPEED, 2.0 * friction * slide_load(friction) * SLIDE_TIME / 0.85)
 
 
 def slide(case: Case) -> Scene:
@@ -335,7 +346,8 @@ def slide(case: Case) -> Scene:
     height = 0.5 * min(1.0, 0.5 / case.friction) if case.friction > 0.0 else 0.5
     box = _box(case, "box", 1.0, (0.5, 0.5, height), 0.0, height)
     twist = (*_vector(case, speed, 0.0), *((0.0,) if case.dimension == 2 else (0.0, 0.0, 0.0)))
-    return _scene(case, "slide", [_floor(case), replace(box, twist=twist)], SLIDE_TIME, _vector(case, 0.0, -GRAVITY))
+    down = _vector(case, 0.0, -slide_load(case.friction))
+    return _scene(case, "slide", [_floor(case), replace(box, twist=twist)], SLIDE_TIME, down)
 
 
 def read_slide(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
@@ -345,7 +357,7 @@ def read_slide(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
     """
     up, mass = case.dimension - 1, scene.bodies[1].mass
     change = mass * (trajectory.twist[-1, 1] - trajectory.twist[0, 1])
-    normal = change[up] + mass * GRAVITY * trajectory.t[-1]
+    normal = change[up] - mass * scene.gravity[up] * trajectory.t[-1]
     reported = _impulse_on(trajectory, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         friction = float(np.divide(-change[0], normal))
@@ -387,7 +399,7 @@ PROBES = {
     "load": Probe(("mass", "inertia", "turn"), load, read_load, touches=False),
     "landing": Probe(("size", "impulse"), landing, read_landing, contacts=True),
     "flight": Probe(("linear_damping", "angular_damping"), flight, read_flight, only_ends=True, touches=False),
-    "rebound": Probe(("restitution",), rebound, read_rebound, only_ends=True),
-    "slide": Probe(("friction", "friction_impulse", "impulse"), slide, read_slide, contacts=True),
+    "rebound": Probe(("restitution",), rebound, read_rebound, only_ends=True, rubs=True),
+    "slide": Probe(("friction", "friction_impulse", "impulse"), slide, read_slide, rubs=True, contacts=True),
     "corner": Probe(("turn",), corner, read_corner, only_ends=True),
 }

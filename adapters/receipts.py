@@ -11,12 +11,12 @@ Probes run with exactly the settings that the judged scene gets, so that the jud
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from adapters.engine import Declared, Engine, EngineError
+from adapters.engine import Declared, Engine, EngineError, Setting
 from adapters.needs import Needs
 from adapters.probes import (
     GRAVITY,
@@ -28,6 +28,7 @@ from adapters.probes import (
     STEPS,
     Case,
     Samples,
+    slide_load,
     slide_speed,
 )
 from adapters.stepping import posed_for, run
@@ -78,18 +79,24 @@ class Receipt:
 
 
 def receipts(
-    engine: Engine, profile: str, needs: Needs, dt: float, iterations: int | None = None
+    engine: Engine,
+    profile: str,
+    needs: Needs,
+    dt: float,
+    iterations: int | None = None,
+    own: Sequence[Setting] | None = None,
 ) -> tuple[Receipt, ...]:
     """Measure what ``profile`` realises for a scene with ``needs``.
 
-    Each probe is kept per engine, profile, settings, step and dimension, and if it touches, per pair values.
+    With ``own`` settings in the place of the profile's nothing is declared: what is measured stands beside what is
+    asked. Each probe is kept per engine, profile, settings, step and dimension, and if it touches, per pair values.
 
     Raises
     ------
     EngineError
         For an unknown profile, or if the engine fails on a probe that it did not refuse.
     """
-    settings = engine.settings(profile, needs, dt, iterations)
+    settings = engine.settings(profile, needs, dt, iterations) if own is None else own
     values = tuple((setting.name, _frozen(setting.value)) for setting in settings)
     case = Case(
         needs.dimension,
@@ -100,7 +107,7 @@ def receipts(
         engine.facts.epsilon,
     )
     names = tuple(name for name in PROBES if _applies(name, needs))
-    declared = engine.declares(profile, needs, dt)
+    declared = engine.declares(profile, needs, dt) if own is None else {}
     for quantity in declared:
         if quantity not in QUANTITIES:
             raise EngineError(f"declares: {engine.name}/{profile} declares {quantity!r}, no probe measures it")
@@ -141,7 +148,11 @@ def _measured(
     silent: dict[str, tuple[str, bool]] = {}
     for name in names:
         # Bodies that meet nothing do not depend on what a pair does: measured once for all pairs.
-        own = case if PROBES[name].touches else replace(case, restitution=0.0, friction=0.0)
+        probe, own = PROBES[name], case
+        if not probe.rubs:
+            own = replace(own, friction=0.0)
+        if not probe.touches:
+            own = replace(own, restitution=0.0)
         found = _probe(engine, profile, values, own, name)
         if isinstance(found, dict):
             for quantity, numbers in found.items():
@@ -227,7 +238,7 @@ def _starved(quantity: str, told: Declared, case: Case, iterations: int, is_decl
         return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations were asked for: not told")
     if quantity not in ("friction", "friction_impulse"):
         return told
-    stop = slide_speed(case.friction) / (GRAVITY * SLIDE_TIME)
+    stop = slide_speed(case.friction) / (slide_load(case.friction) * SLIDE_TIME)
     band = case.friction / iterations if iterations > 1 else stop
     band += 2.0 * case.dt / SLIDE_TIME * case.friction
     because = f"{told.because}; {iterations} iterations were asked for, and a load may be off by 1/{iterations}"

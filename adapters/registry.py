@@ -169,9 +169,12 @@ def profile_of(name: str, role: Role) -> str | None:
 
 
 def is_ranked(name: str, profile: str) -> bool:
-    """Whether a profile of an engine stands in rankings and counts as a cure (`adapters.engine.UNRANKED`)."""
+    """Whether a profile of an engine stands in rankings and counts as a cure (`adapters.engine.UNRANKED`).
+
+    One that a user has named after settings (``matched+cone=elliptic``) does as the one that they are settings of.
+    """
     told = facts(name)
-    return told is None or told.roles.get(profile) not in UNRANKED
+    return told is None or told.roles.get(profile, told.roles.get(profile.partition("+")[0])) not in UNRANKED
 
 
 def solver() -> str:

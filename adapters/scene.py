@@ -171,7 +171,12 @@ class Scene:
 
     def index(self, name: str) -> int:
         """Position of the body called ``name``."""
-        return [body.name for body in self.bodies].index(name)
+        return self.places[name]
+
+    @cached_property
+    def places(self) -> Mapping[str, int]:
+        """Position of each body by its name."""
+        return {body.name: k for k, body in enumerate(self.bodies)}
 
     def material(self, a: str, b: str) -> Pair:
         """Material of the pair (a, b): the most specific entry wins, the default is smooth and plastic.

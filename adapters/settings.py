@@ -37,10 +37,12 @@ def whole(least: int, most: int) -> Check:
 
 def number(least: float, most: float) -> Check:
     """A finite number of this range."""
+    ends = f"from {least:g} to {most:g}" if math.isfinite(most) else f"of at least {least:g}"
 
     def check(value: Any) -> str:
         told = isinstance(value, int | float) and not isinstance(value, bool) and finite(value)
-        return "" if told and least <= value <= most else f"a number from {least:g} to {most:g}"
+        wanted = f"a number {ends}" if math.isfinite(least) else "a finite number"
+        return "" if told and least <= value <= most else wanted
 
     return check
 
@@ -57,6 +59,47 @@ def word(*words: str) -> Check:
         return "" if isinstance(value, str) and value in words else f"one of {', '.join(words)}"
 
     return check
+
+
+def row(count: int, check: Check) -> Check:
+    """So many values, each of which ``check`` takes."""
+
+    def whole_row(value: Any) -> str:
+        fits = isinstance(value, tuple | list) and len(value) == count and not any(map(check, value))
+        return "" if fits else f"{count} values with commas between them, each {check(None)}"
+
+    return whole_row
+
+
+def words(*known: str) -> Check:
+    """Some of these words."""
+
+    def check(value: Any) -> str:
+        fits = isinstance(value, tuple | list) and len(value) > 0 and all(each in known for each in value)
+        return "" if fits else f"some of {', '.join(known)}, with commas between them"
+
+    return check
+
+
+def one_of(*known: int) -> Check:
+    """One of these whole numbers."""
+
+    def check(value: Any) -> str:
+        fits = isinstance(value, int) and not isinstance(value, bool) and value in known
+        return "" if fits else f"one of {', '.join(map(str, known))}"
+
+    return check
+
+
+def either(check: Check, *others: Any) -> Check:
+    """What ``check`` takes, or one of these values."""
+
+    def wider(value: Any) -> str:
+        named = any(type(value) is type(other) and value == other for other in others)
+        wanted = "" if named else check(value)
+        return f"{wanted}, or {' or '.join(map(text_of, others))}" if wanted else ""
+
+    return wider
 
 
 def checked(engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,3 +133,27 @@ def checked_step(dt: float) -> float:
     if not (math.isfinite(dt) and dt > 0.0):
         raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
     return dt
+
+
+def like(value: Any) -> Check:
+    """Whatever is of the kind of ``value``: of settings of which an adapter states no kind."""
+    if isinstance(value, bool):
+        return flag
+    if isinstance(value, int):
+        return whole(-LARGEST_INT - 1, LARGEST_INT)
+    if isinstance(value, float):
+        return number(-math.inf, math.inf)
+    if isinstance(value, tuple | list):
+        return row(len(value), like(value[0]) if value else flag)
+    if isinstance(value, str):
+        return lambda given: "" if isinstance(given, str) else "a word"
+    return lambda given: ""  # of none nobody knows what else it may be
+
+
+def text_of(value: Any) -> str:
+    """A value as `read` reads it; whole numbers without a fraction."""
+    if isinstance(value, tuple | list):
+        return ",".join(map(text_of, value))
+    if isinstance(value, float):
+        return repr(value).removesuffix(".0")
+    return str(value).lower() if value is None or isinstance(value, bool) else str(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -70,6 +71,23 @@ class ContactRecord:
         sample, impulse = self.between(a, b)
         np.add.at(total, sample, impulse)
         return total
+
+    def impulse_on(self, body: int) -> Array:
+        """Sum of the impulses of all its contacts on one body at each contact sample, (s, d) [N s]."""
+        order, bodies = self._by_body
+        chosen = order[slice(*np.searchsorted(bodies, [body, body + 1]))]
+        row = chosen % len(self.rows.b)
+        sign = np.where(chosen < len(self.rows.b), 1.0, -1.0)  # b stands first below, and a is pushed the other way
+        total = np.zeros((len(self.step), self.rows.impulse.shape[1]))
+        np.add.at(total, np.searchsorted(self.offset, row, side="right") - 1, sign[:, None] * self.rows.impulse[row])
+        return total
+
+    @cached_property
+    def _by_body(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows in the order of the bodies that they push, each row twice, and those bodies."""
+        both = np.concatenate([self.rows.b, self.rows.a])
+        order = np.argsort(both, kind="stable")
+        return order, both[order]
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,16 @@ tuned cures it". Everything is read off the judged rows at the profiles' own ite
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.cures import decided_by, told_cures
-from reports.findings import REFUSED, severity
+from reports.cures import decided_by, is_standard, search_command, told_cures
+from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
-from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, quantity
-from validation.catalogue import CATALOGUE
+from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
 from validation.metrics import SILENT, WORDS
 from validation.posed import is_file, resolve
 
@@ -98,7 +97,12 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         good = [key for key, group in own.items() if not _failing(group)]
         price = {key: _price(costs or {}, scene, key) for key in good}
         good.sort(key=lambda key: price[key])
-        names = [_named(key, own[key], dimensions[scene], price[key]) for key in good]
+        untold = Counter(
+            (row["engine"], row["profile"])
+            for row in rows
+            if row["scene"] == scene and row["outcome"] == "unsupported" and row["iterations"] is None
+        )
+        names = [_named(key, own[key], dimensions[scene], price[key], untold[key]) for key in good]
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
         near = min(shares, key=lambda key: shares[key], default=None)
         nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
@@ -113,10 +117,12 @@ def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
     return known[0] if known else math.inf
 
 
-def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float) -> str:
-    """``engine/profile (2-D only, 1.2 ms/s)``."""
+def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float, untold: int) -> str:
+    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many rows it tells no number for."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
+    if untold and is_file(rows[0]["scene"]) and own >= wanted:
+        notes.append(f"{plural(untold, 'row')} not told")
     if math.isfinite(price):
         notes.append(f"{1e3 * price:.2g} ms/s")
     return "/".join(key) + (f" ({', '.join(notes)})" if notes else "")
@@ -154,28 +160,37 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
 
 
 def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
-    """Which other profile passes every row, or is the nearest to it; that none is better, if so."""
+    """Which other profile passes every row, or is the nearest to it; that none is better, or that none was run."""
     failed = _failing(own[profile])
-    engine = failed[0]["engine"]
-    others = {name: group for name, group in own.items() if name != profile and is_ranked(engine, name)}
+    if all(mark_of(row) == "invalid" for row in failed):
+        return "nothing is said of the engine, so that there is nothing to cure"
+    row, dimensions = failed[0], sorted({row["dimension"] for row in failed if is_standard(row)})
+    others = {
+        name: group for name, group in own.items()
+        if name != profile and is_ranked(row["engine"], name) and {*map(_case, failed)} <= {*map(_case, group)}
+    }  # fmt: skip
     good = [name for name, group in others.items() if not _failing(group)]
-    row, dimensions = failed[0], sorted({row["dimension"] for row in failed})
     listed = told_cures(row["engine"], row["engine_version"], row["scene"], profile, dimensions)
     if good:
         which = (row["engine"], row["engine_version"], row["scene"], dimensions, profile)
-        by = {name: decided_by(*which, name) for name in good} if not listed else {}
+        by = {name: decided_by(*which, name) for name in good} if dimensions and not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
         return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
-    # A search asks scenes of the catalogue: of a file nothing is promised.
-    searched = row["scene"] in CATALOGUE and not listed
-    unlisted = [f"crosscheck cure {row['engine']} {row['scene']} searches for settings"] if searched else []
+    unlisted = [] if listed else [f"{search_command(row)} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
-    if best is None or share[best] >= len(_failing(own[profile])) / len(own[profile]):
+    if best is None:
+        return "; ".join(["no other profile was run in this case", *listed, *unlisted])
+    if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])
     nearer = f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
     return "; ".join([nearer, *listed, *unlisted])
+
+
+def _case(row: Plain) -> tuple[Any, ...]:
+    """What was asked of a row, but for the profile: a row of another step says nothing of this one."""
+    return row["dimension"], str(row["params"]), row["dt"], row["metric"]
 
 
 # ---- in words ----
@@ -197,7 +212,7 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
-    lost = [row for row in failing if row["value"] is None]
+    lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"{len(lost)} of {len(rows)} rows have no answer ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
     kinds: dict[str, list[Plain]] = defaultdict(list)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters import registry
 from adapters.engine_folder import belongs_of
+from adapters.scene import SceneError
 from reports.wording import number, params_text
-from validation.cells import Observation, Slot
+from validation.cells import Observation, Slot, format_dt
 from validation.cells import settings_of as settings_in
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
-from validation.settings.cures import Cure, cures_of
-from validation.settings.decisive import ALONE, COMPLETES, NEEDED, decisive
+from validation.settings.cures import Cure, asked_of, cures_of
+from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, changes_of, decisive
 from validation.settings.switching import switched
 
 #: What a setting's part in a cure is called.
@@ -35,14 +38,6 @@ class Change:
     after: str
     because: str
     role: str = ""
-
-
-def settings_of(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, profile: str
-) -> list[Mapping[str, Any]]:
-    """Settings of a profile on a scene, as its representative cell (else its first one) got them."""
-    cell = shown_cell(observations, scene, dimension, engine, profile)
-    return list(cell.settings) if cell else []
 
 
 def shown_cell(
@@ -69,21 +64,49 @@ def shown_cell(
 
 
 def changes(
-    observations: Sequence[Observation], scene: str, dimension: int, engine: str, before: str, after: str
+    observations: Sequence[Observation],
+    scene: str,
+    dimension: int,
+    engine: str,
+    before: str,
+    after: str,
+    params: Mapping[str, float] | None = None,
 ) -> list[Change]:
-    """Settings that profile ``after`` sets otherwise than ``before``, on this scene."""
-    old = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, before)}
-    new = {s["name"]: s for s in settings_of(observations, scene, dimension, engine, after)}
+    """Settings that profile ``after`` sets otherwise than ``before``, in the engine's own words.
+
+    They are those of the cell of ``params``, see `shown_cell`.
+    """
+    cells = [shown_cell(observations, scene, dimension, engine, profile, params) for profile in (before, after)]
+    old, new = ({s["name"]: s for s in cell.settings} if cell else {} for cell in cells)
     measured = decisive(engine, scene, dimension, before, after)
     roles = {part.setting: ROLES[part.decides] for part in measured.parts} if measured else {}
     belongs = belongs_of(engine)
+    was, now = (_in_words(cell) if cell else {} for cell in cells)
     found = []
     for name, setting in new.items():
-        if name not in old or old[name]["value"] != setting["value"]:
-            was = setting_text(old[name]["value"]) if name in old else "as shipped"
+        if name in now and (name not in old or old[name]["value"] != setting["value"]):
             role = roles.get(name) or (f"belongs to {belongs[name]}" if measured and name in belongs else "")
-            found.append(Change(name, was, setting_text(setting["value"]), setting["because"], role))
+            word, value = now[name]
+            found.append(Change(word, was.get(name, ("", "as shipped"))[1], value, setting["because"], role))
     return found
+
+
+def _in_words(cell: Observation) -> dict[str, tuple[str, str]]:
+    """Settings of a cell, by name: what the engine itself calls them, and their values as text."""
+    settings = {s["name"]: s["value"] for s in cell.settings}
+    return in_words(cell.slot, settings)
+
+
+def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """What the engine of a slot calls settings, by our name: its own name, and the value or formula as text.
+
+    Without those that it tells with another one; see `adapters.engine.Engine.words`.
+    """
+    loaded = registry.adapter(slot.engine)
+    made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    words = loaded.words(settings, made, slot.dt) if loaded else {}
+    told = {name: words.get(name, (name, value)) for name, value in settings.items()}
+    return {name: (word, setting_text(value)) for name, (word, value) in told.items() if word}
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
@@ -92,10 +115,26 @@ def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int],
     What was measured in one dimension is said with it where rows of another fail as well.
     """
     measured = {d: decisive(engine, scene, d, before, after) for d in dimensions}
-    texts = {d: m.text for d, m in measured.items() if m is not None and m.version == version}
+    texts = {d: _decided(m) for d, m in measured.items() if m is not None and m.version == version}
     if len(texts) == len(dimensions) and len(set(texts.values())) == 1:
         return texts[dimensions[0]]
     return ", ".join(f"{text} ({d}-D)" for d, text in texts.items())
+
+
+def _decided(measured: Decisive) -> str:
+    """`Decisive.text` in the engine's own words."""
+    slot = Slot(measured.scene, (), measured.dimension, measured.engine, measured.better, QUICK_DT)
+    words = in_words(slot, _settings(slot))
+    return re.sub(r"\w+", lambda name: words.get(name[0], (name[0], ""))[0], measured.text)
+
+
+def _settings(slot: Slot) -> dict[str, Any]:
+    """Settings of a slot by name; none of an engine that is not ours."""
+    loaded = registry.adapter(slot.engine)
+    if loaded is None:
+        return {}
+    made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return {s.name: s.value for s in settings_in(loaded, slot, made)}
 
 
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
@@ -109,20 +148,89 @@ def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: 
 
 
 def told_cure(row: Mapping[str, Any]) -> str:
-    """What was measured to mend the check of one row, or that it is not among what the scene's cure mends."""
-    cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
-    if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
-        return ""
+    """What was measured to mend the check of one row, or that it is not among what was searched or is mended.
+
+    A cure is told of the cells, at the step, of which it was searched; of another case where it can be searched.
+    """
+    cure = _listed(row)
+    if cure is None:
+        return f"not searched for in this case: {search_command(row)}" if _can_be_searched(row) else ""
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
-    told = row["metric"] == cure.metric and _minimal(row) == _minimal({**row, "params": cure.params})
-    if not cure.helps or told or row["metric"].partition("[")[0] in kinds:
+    if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
     return f"none is known of this check; of {', '.join(kinds)} in this scene: {cure_text(cure)}"
 
 
-def _minimal(row: Mapping[str, Any]) -> object:
-    """Parameters of a row, as what differs from its scene's defaults."""
-    return resolve(row["scene"]).minimal(row.get("params", {}))
+def cure_of(row: Mapping[str, Any]) -> Cure | None:
+    """The listed cure that mends the check of a row in its own case, with its values there; None if none does."""
+    cure = _listed(row)
+    if cure is None or not cure.helps or not _is_mended(cure, row):
+        return None
+    params = dict(_minimal(row))
+    if params == dict(cure.params):
+        return cure
+    here = replace(cure, params=params)
+    if not cure.profile:
+        return here
+    wanted = changes_of(_slot(here, {}), cure.profile)
+    return replace(here, changes={name: wanted[name] for name in cure.changes if name in wanted})
+
+
+def _can_be_searched(row: Mapping[str, Any]) -> bool:
+    """Whether a row is of the profile that `search` starts from, in a cell that ran at its own iterations."""
+    brought = resolve(row["scene"]).brings.get(row["engine"])
+    start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")
+    ran = row.get("outcome") not in ("unsupported", "not_installed") and row.get("iterations") is None
+    return ran and row["profile"] == start
+
+
+def _listed(row: Mapping[str, Any]) -> Cure | None:
+    """The listed cure that was searched in a row's own case, on its release."""
+    cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
+    if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
+        return None
+    asked = dict(_minimal(row)) in [dict(cell) for cell in cure.cells]
+    return cure if asked and row.get("dt", cure.dt) == cure.dt and row.get("iterations") is None else None
+
+
+def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
+    kinds = cure.mends or (cure.metric.partition("[")[0],)
+    told = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
+    return told or row["metric"].partition("[")[0] in kinds
+
+
+def is_standard(row: Mapping[str, Any]) -> bool:
+    """Whether a row's case is among those that a search of its scene asks by itself."""
+    if is_file(row["scene"]) or row.get("dt", QUICK_DT) != QUICK_DT or row.get("iterations") is not None:
+        return False
+    return dict(_minimal(row)) in asked_of(row["scene"], row["dimension"])
+
+
+def search_command(row: Mapping[str, Any]) -> str:
+    """Command that searches what mends a row's case."""
+    words = ["crosscheck", "cure", row["engine"], row["scene"]]
+    return shlex.join(words if is_standard(row) else [*words, *_case(row)])
+
+
+def _case(row: Mapping[str, Any]) -> list[str]:
+    """Options that ask for a row's case."""
+    words = [word for name, value in _minimal(row) for word in ("--param", f"{name}={value:.12g}")]
+    brought = resolve(row["scene"]).brings.get(row["engine"])
+    if row.get("dt", QUICK_DT) != (brought.dt if brought else QUICK_DT):
+        words += ["--dt", format_dt(row["dt"])]
+    return words if is_file(row["scene"]) else [*words, "--dim", str(row["dimension"])]
+
+
+def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
+    """Parameters of a row, as what differs from its scene's defaults; as they are where the scene of today has not all.
+
+    A row may be of a run of before a parameter had another name or range.
+    """
+    params = row["slot"]["params"] if "slot" in row else row.get("params", {})
+    try:
+        return resolve(row["scene"]).minimal(params)
+    except SceneError:
+        return tuple(sorted(params.items()))
 
 
 def cure_text(cure: Cure, where: str = "") -> str:
@@ -130,7 +238,7 @@ def cure_text(cure: Cure, where: str = "") -> str:
     where = where or f"{cure.dimension}-D"
     if not cure.helps:
         return f"{where}: none of {cure.tried} changes of its settings that were tried helps"
-    settings = ", ".join(f"{name}={setting_text(value)}" for name, value in cure.changes.items())
+    settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
     before, after, truth = _told_apart(cure.before, cure.after, cure.truth)
@@ -138,7 +246,11 @@ def cure_text(cure: Cure, where: str = "") -> str:
     numbers = f"{cure.metric}{f' at {at}' if at else ''} {before} -> {after}{unit}{aim}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
     cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
-    return f"{where} by {settings}: {numbers}{left}{cost}"
+    alone = ""
+    if cure.alone:
+        said = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.alone))
+        alone = f"; {said} alone: {number(cure.alone_after, 3)}{unit}"
+    return f"{where} by {settings}: {numbers}{left}{cost}{alone}"
 
 
 def _told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
@@ -150,16 +262,27 @@ def _told_apart(before: float | None, after: float | None, truth: float) -> tupl
     return was, now, number(truth, digits)
 
 
+def changes_in_words(cure: Cure, changes: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Settings that a cure changes (or another of its scene) in the engine's own words, with values as text."""
+    slot = _slot(cure, changes)
+    words = in_words(slot, {**changes, **_settings(slot)})
+    return [words[name] for name in changes if name in words]
+
+
+def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
+    """The cell that a cure is told of, with settings replaced."""
+    params = tuple(sorted(cure.params.items()))
+    return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
+
+
 def cure_paste(cure: Cure) -> str:
     """The settings of a cure as lines of the engine's own language; empty if its adapter knows none."""
     loaded = registry.adapter(cure.engine)
     if loaded is None or not cure.changes:
         return ""
-    params = tuple(sorted(cure.params.items()))
-    slot = Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, QUICK_DT)
-    scene = resolve(cure.scene).scene(cure.dimension, dict(params))
-    settings = {s.name: s.value for s in settings_in(loaded, switched(slot, cure.changes), scene)}
-    return loaded.snippet(settings, list(cure.changes), scene, QUICK_DT)
+    slot = _slot(cure, cure.changes)
+    scene = resolve(cure.scene).scene(cure.dimension, dict(cure.params))
+    return loaded.snippet(_settings(slot), list(cure.changes), scene, slot.dt)
 
 
 def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
@@ -169,7 +292,7 @@ def how_measured(engine: str, scene: str, dimension: int, before: str, after: st
         return "Which of these matters was not measured, setting by setting: they are the profiles' difference."
     cells = "; ".join(params_text(cell) or "defaults" for cell in measured.cells)
     what = f"{', '.join(measured.metrics) or 'all checks'} of {scene} {measured.dimension}-D at {cells}"
-    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {measured.text}."
+    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {_decided(measured)}."
 
 
 def pasteable(
@@ -189,11 +312,34 @@ def pasteable(
     loaded = registry.adapter(engine)
     if cell is None or loaded is None:
         return ""
-    names = [change.name for change in changes(observations, scene, dimension, engine, before, after)]
+    shipped = shown_cell(observations, scene, dimension, engine, before, params)
+    old = {s["name"]: s["value"] for s in shipped.settings} if shipped else {}
     settings = {s["name"]: s["value"] for s in cell.settings}
+    names = [name for name, value in settings.items() if name not in old or old[name] != value]
     scene_of = resolve(cell.slot.scene)
     made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
     return loaded.snippet(settings, names, made, cell.slot.dt)
+
+
+def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str) -> tuple[str, str]:
+    """Lines to paste that mend the check of a row, and what they are; or that there are none to paste.
+
+    The smallest that was searched in the row's own case, else all that the profile ``better`` changes, which passes it:
+    both were run in this very case. Empty for a row that nothing is known to mend.
+    """
+    cure = cure_of(row)
+    if cure is None and not better:
+        return "", ""
+    if cure is not None:
+        paste, what = cure_paste(cure), "the smallest change that was found to mend this check"
+    else:
+        where = (row["scene"], row["dimension"], row["engine"], row["profile"], better)
+        paste, what = pasteable(observations, *where, dict(_minimal(row))), f"all that profile {better} changes"
+    if paste or not better:
+        return paste, f"to paste ({what}):" if paste else ""
+    engine, scene = row["engine"], row["scene"]
+    words = ["crosscheck", "export", scene, *_case(row), "--engine", engine, "--profile", better, "--to", "python"]
+    return "", f"nothing to paste: {engine} has no lines of settings; {shlex.join(words)} writes its calls"
 
 
 def setting_text(value: Any) -> str:

@@ -12,10 +12,10 @@ from typing import Any
 import pandas as pd
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from reports.findings import ALARMING, finding_line, grouped
+from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
-from validation.judging.rows import Row, frame, rows_of
+from validation.judging.rows import Row, frame, is_alarming, rows_of
 from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Store
 
@@ -99,8 +99,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
     out += [f"{markdown(line)}\n" for line in (*unranked(matrix.columns), *leaving(rows))]
     for mark, group in grouped(rows):
         out.append(f"**{LABELS[mark]}**: {plural(len(group), 'row')}")
-        if mark in ALARMING:
-            out += [f"* {markdown(finding_line(row))}" for row in group]
+        out += [f"* {markdown(finding_line(row))}" for row in group if is_alarming(row)]
     return "\n".join(out) + "\n"
 
 
@@ -131,7 +130,7 @@ def _mark_case(case: TestCase, row: Plain) -> None:
         failed = Error(finding_line(row))
         failed.text = row["log"]
         case.result = [failed]
-    elif mark in ALARMING:
+    elif is_alarming(row):
         case.result = [Failure(finding_line(row))]
     elif mark in ("unsupported", "not_installed", "none"):
         case.result = [Skipped(row["reason"])]

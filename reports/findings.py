@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from validation.judging.rows import is_alarming
 from validation.posed import is_file
 
 Plain = Mapping[str, Any]
@@ -32,14 +33,19 @@ def finding_line(row: Plain) -> str:
     if row["iterations"] is not None:
         where = f"{where.strip()} at {row['iterations']} iterations"
     what = said(row, 6)
-    if row["value"] is not None:
+    if has_answer(row):
         what += f" ({row['because']})" + (f"; {row['reason']}" if row["reason"] else "")
     return f"{label}: {where.strip()}: {what} | {reproduce(row['slot'])}"
 
 
+def has_answer(row: Plain) -> bool:
+    """Whether a row has a value that counts: that of an INVALID one says nothing of its engine, its reason does."""
+    return row["value"] is not None and row["outcome"] != "invalid"
+
+
 def said(row: Plain, digits: int = 4) -> str:
-    """What was measured, the truth and the tolerance; or why there is no value."""
-    if row["value"] is None:
+    """What was measured, the truth and the tolerance; or why there is no value that counts."""
+    if not has_answer(row):
         return str(row["reason"])
     truth, tolerance = quantity(row["truth"], row["unit"], digits), number(row["tolerance"], 3)
     return f"{row['metric']} {measured(row, digits)}, truth {truth}, tolerance {tolerance}"
@@ -65,7 +71,8 @@ def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
 class Family:
     """Rows of one engine, profile, scene, kind of metric and standing, the worst first.
 
-    Cells that gave no answer make one family for each reason, of all metrics (``"*"``).
+    Cells that gave no answer make one family for each reason, of all metrics (``"*"``); INVALID ones for each receipt,
+    and for the certificate.
     """
 
     mark: str
@@ -110,6 +117,8 @@ def families(rows: Iterable[Plain]) -> list[Family]:
         members: dict[tuple[str, str, str, str], list[Plain]] = defaultdict(list)
         for row in group:
             kind = row["reason"] if mark in WHOLE else row["metric"].partition("[")[0]
+            if mark == "invalid":  # "receipt size: measured ...": the numbers differ from cell to cell
+                kind = kind.partition(":")[0]
             members[row["engine"], row["profile"], row["scene"], kind].append(row)
         for (engine, profile, scene, kind), own in members.items():
             metric = "*" if mark in WHOLE else kind
@@ -120,14 +129,16 @@ def families(rows: Iterable[Plain]) -> list[Family]:
 def refusals(rows: Sequence[Plain]) -> Iterator[str]:
     """One line per engine and scene that it cannot run, with its reason: no fault of either.
 
-    Of the catalogue's scenes the matrix says enough, unless nothing else is there to be said.
+    An engine that is not installed has one line for all scenes. Of the catalogue's scenes the matrix says enough,
+    unless nothing else is there to be said.
     """
     found: dict[tuple[Any, ...], None] = {}
     nothing = all(row["outcome"] in REFUSED for row in rows)
     for row in rows:
         if row["outcome"] in REFUSED and (nothing or (is_file(row["scene"]) and row["outcome"] == "unsupported")):
-            found[REFUSED[row["outcome"]], row["engine"], row["scene"], row["reason"]] = None
-    return (f"{label}: {engine} {scene}: {reason}" for label, engine, scene, reason in found)
+            scene = "" if row["outcome"] == "not_installed" else f" {row['scene']}"
+            found[REFUSED[row["outcome"]], row["engine"], scene, row["reason"]] = None
+    return (f"{label}: {engine}{scene}: {reason}" for label, engine, scene, reason in found)
 
 
 def severity(row: Plain) -> float:
@@ -139,4 +150,4 @@ def severity(row: Plain) -> float:
 
 def alarms(rows: Sequence[Plain]) -> list[Family]:
     """Families of what makes the command exit with 1."""
-    return [family for family in families(rows) if family.mark in ALARMING]
+    return families([row for row in rows if is_alarming(row)])

@@ -10,9 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from adapters import engine_folder, registry
+from adapters.engine_folder import unset_of
+from adapters.foreign import said_by
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
+from adapters.unset import Unset
 from validation.canonical import SUITES, CanonicalScene, Check, Variation
 from validation.catalogue import CATALOGUE, broken
 from validation.cells import plane_of
@@ -121,6 +124,7 @@ def _describe_scene(name: str) -> dict[str, Any]:
 def _describe_engine(name: str) -> dict[str, Any]:
     found = registry.find(name)
     out: dict[str, Any] = {"kind": "engine", "name": name, "version": found.version}
+    out |= {"unset": [_unset(row, _why_unmeasured(name)) for row in unset_of(name)]}
     if found.engine is None:
         return {**out, "status": "not installed", "reason": found.reason}
     facts = found.engine.facts
@@ -143,8 +147,36 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "quirks": [asdict(quirk) for quirk in facts.quirks],
         "measured": [asdict(fact) | {"standing": fact.standing} for fact in facts_of(name)],
         "known_bad_versions": dict(facts.known_bad_versions),
+        "settable": [{"name": each, "must_be": kind(object())} for each, kind in found.engine.settable().items()],
         "profiles": profiles,
     }
+
+
+def _why_unmeasured(name: str) -> str:
+    """Why nothing is measured of an engine here and now; empty if it can be."""
+    entry, engine = registry.entry(name), registry.find(name).engine
+    if engine is None:
+        return f"{name} is not installed here"
+    if entry is None or not registry.is_ours(entry):
+        return f"{name} is loaded in worker processes only"
+    kernels = engine.kernels()
+    if kernels is not None and not any(kernels.glob("warm-*.json")):
+        return f"its kernels are not compiled yet: crosscheck compile --engine {name}"
+    return ""
+
+
+def _unset(row: Unset, why_not: str) -> dict[str, Any]:
+    """What is documented with nothing set, beside what the bare engine does now; why where nothing is measured."""
+    data: dict[str, Any] = {"what": row.what, "documented": row.documented, "value": row.value, "source": row.source}
+    data |= {"measured": None, "agrees": None, "reason": why_not or "there is no experiment for it"}
+    if why_not or row.measure is None:
+        return data
+    try:
+        measured = float(row.measure())
+    except Exception as error:  # whatever a release makes of the calls
+        return data | {"reason": said_by(error)}
+    agrees = None if row.value is None else measured == row.value or abs(measured - row.value) <= row.within
+    return data | {"measured": measured, "agrees": agrees, "reason": ""}
 
 
 def doctor() -> dict[str, Any]:

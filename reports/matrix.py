@@ -137,14 +137,17 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:
     """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
 
-    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table.
+    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table. A profile
+    with settings of a user's own has a line for each of them where its name leaves no room for a scene.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
     body = list(_body(matrix, scenes, versions))
     words = LABELS if width >= ROOMY else SHORT
     texts = [[_styled(field, words) for field in fields] for _, fields in body]
-    first = max((len(label) for label, _ in body), default=0)
     wide = [max([len(scene), *(len(row[k]) for row in texts if row)]) for k, scene in enumerate(scenes)]
+    most = width - max(wide, default=0) - GAP
+    body = [(label if len(label) <= most else label.replace("+", "\n    +"), fields) for label, fields in body]
+    first = max((len(line) for label, _ in body for line in label.splitlines()), default=0)
     return [_table(scenes, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
 
 
@@ -251,11 +254,14 @@ def legend(short: bool = False) -> str:
     if short:
         return (
             "pass 9: all 9 rows within tolerance. 3/9: 3 of 9 rows FAIL; expl.: as a law of\n"
-            "the engine predicts; known: listed with a reason; NEW, drifted: neither."
+            "the engine predicts; known: listed with a reason; NEW, drifted: neither; FAIL:\n"
+            "of an engine or a file without a list. INVALID: the measurement is broken."
         )
     return (
         "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
-        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | -: cannot be asked of this engine"
+        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | FAIL: off, and nothing is listed of "
+        "this engine or file | INVALID: the measurement is broken, nothing is said of the engine | "
+        "-: cannot be asked of this engine"
     )
 
 

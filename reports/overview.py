@@ -62,7 +62,8 @@ def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
         table.add_row(Text(engine, style="bold"))
         for column in (column for column in matrix.columns if column[0] == engine):
             fields = [matrix.fields.get(((name, 0), column)) for name in families]
-            table.add_row(Text(f"  {column[1]}"), *(_cell(field) for field in fields))
+            name = column[1].replace("+", "\n    +")  # a user's own settings, a line each
+            table.add_row(Text(f"  {name}"), *(_cell(field) for field in fields))
     return table
 
 

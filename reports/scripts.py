@@ -6,6 +6,7 @@ The run is written by the engine's own folder (`adapters.engine.Engine.exports`)
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterator
 
 from adapters.engine import EngineError
@@ -13,7 +14,7 @@ from adapters.plain import lines, one_line
 from adapters.registry import load
 from adapters.scene import SceneError
 from adapters.stepping import posed_for, step_count
-from reports.wording import quantity
+from reports.wording import profile_words, quantity
 from validation.cells import Slot, format_dt, prepare, settings_of
 
 #: Checks that a script names; a column of twenty has hundreds.
@@ -36,7 +37,7 @@ def written(slot: Slot, form: str) -> str:
         known = ", ".join(engine.exports) or "nothing"
         raise SceneError(f"to: {slot.engine} writes {known}, not {one_line(form, 20)}")
     posed = posed_for(engine, prepared.scene)
-    refusal = engine.refuses(posed, slot.profile)
+    refusal = engine.refuses(posed, slot.base)
     if refusal:
         raise EngineError(f"{slot.engine} refuses this scene: {refusal}")
     settings = {setting.name: setting.value for setting in settings_of(engine, slot, prepared.scene)}
@@ -74,6 +75,6 @@ def _head(slot: Slot) -> Iterator[str]:
         yield f"  and {len(checks) - MOST_CHECKS} more: crosscheck describe {canonical.name}"
     params = " ".join(f"--param {name}={value!r}" for name, value in slot.params)
     asked = f"{slot.scene} {params}".strip()
-    cell = f"--dim {slot.dimension} --engine {slot.engine} --profile {slot.profile} --dt {format_dt(slot.dt)}"
+    cell = f"--dim {slot.dimension} --engine {slot.engine} {shlex.join(profile_words(slot))} --dt {format_dt(slot.dt)}"
     count = f" --iterations {slot.iterations}" if slot.iterations is not None else ""
     yield f"Judged by: crosscheck run {asked} {cell}{count}"

@@ -51,7 +51,10 @@ def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
         return names
     jobs = jobs or os.cpu_count() or 1
     expected = clock(warming.estimate(jobs))
-    say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores{_busy()}")
+    if warming.begun:
+        say(console, "kernels are compiled; what these cells call besides is looked for")
+    else:
+        say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores{_busy()}")
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with (
         stage(console, "compiled"),

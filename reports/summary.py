@@ -22,7 +22,7 @@ from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import ROOMY, leaving, legend, matrix_of, sweeps_of, tables_of, unranked, versions_of
-from reports.wording import plural
+from reports.wording import at, plural
 
 Plain = Mapping[str, Any]
 #: Families of alarms that are named one by one; `crosscheck findings --new` names all.
@@ -32,9 +32,17 @@ HEAD = 2
 
 
 def show(
-    rows: Sequence[Plain], console: Console, costs: Costs | None = None, files: Iterable[Path] = (), every: bool = False
+    rows: Sequence[Plain],
+    console: Console,
+    costs: Costs | None = None,
+    files: Iterable[Path] = (),
+    every: bool = False,
+    out: Path | None = None,
 ) -> None:
-    """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene."""
+    """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene.
+
+    ``out`` is where its results lie, which the commands that are named get.
+    """
     matrix = matrix_of(rows)
     tables = tables_of(matrix, versions_of(rows), console.width)
     families = overview.families_of(rows)
@@ -42,8 +50,8 @@ def show(
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
     fits = console.measure(short, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
     if long and fits and not every:
-        _show_families(rows, families, short, console)
-        _where(rows, console, files, {"crosscheck show --all": "matrix and answers of every scene"})
+        _show_families(rows, families, short, console, out)
+        _where(rows, console, files, out, {"crosscheck show --all": "matrix and answers of every scene"})
         return
     for table in tables:
         console.print(table)
@@ -53,14 +61,14 @@ def show(
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
-    _alarms(rows, console)
+    _alarms(rows, console, out)
     _choices(rows, console, costs)
     _answers(rows, console)
-    _where(rows, console, files)
+    _where(rows, console, files, out)
 
 
 def _show_families(
-    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console
+    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console, out: Path | None
 ) -> None:
     """The same by family of scenes."""
     console.print(table)
@@ -71,7 +79,7 @@ def _show_families(
     console.print(_folded(ran, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
-    _alarms(rows, console)
+    _alarms(rows, console, out)
     _heading("Which engine for what: who passes every row, else who fails the fewest", console)
     wide = max(map(len, families))
     for name, line in overview.choices(rows, families):
@@ -97,7 +105,7 @@ def _folded(text: str, console: Console, indent: str = "  ") -> Text:
     return Text(folded)
 
 
-def _alarms(rows: Sequence[Plain], console: Console) -> None:
+def _alarms(rows: Sequence[Plain], console: Console, out: Path | None) -> None:
     found = alarms(rows)
     if not found:
         return
@@ -106,7 +114,8 @@ def _alarms(rows: Sequence[Plain], console: Console) -> None:
     for family in found[:MOST_ALARMS]:
         console.print(_folded(family.line, console))
     if len(found) > MOST_ALARMS:
-        console.print(_folded(f"... {len(found) - MOST_ALARMS} more families: crosscheck findings --new", console))
+        more = f"... {len(found) - MOST_ALARMS} more families: crosscheck findings --new{at(out)}"
+        console.print(_folded(more, console))
 
 
 def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> None:
@@ -138,7 +147,11 @@ def _nothing_wrong(rows: Sequence[Plain]) -> str:
 
 
 def _where(
-    rows: Sequence[Plain], console: Console, files: Iterable[Path], more: Mapping[str, str] = MappingProxyType({})
+    rows: Sequence[Plain],
+    console: Console,
+    files: Iterable[Path],
+    out: Path | None,
+    more: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     found = families(rows)
     failing = sum(len(family.rows) for family in found)
@@ -153,7 +166,8 @@ def _where(
             *commands,
         ]
     for command, what in commands:
-        console.print(Text(f"  {command:<38} {what}"))
+        # A command stays whole: it is to be copied.
+        console.print(Text(f"  {command + at(out):<38} {what}"), soft_wrap=bool(at(out)))
     written = [str(path) for path in files]
     if written:
         console.print(_folded(f"{plural(len(rows), 'row')} written: {', '.join(written)}", console), soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -131,12 +132,20 @@ def _engine(data: Plain, console: Console) -> None:
     console.print(Text(f"{data['name']} {data['version']}{title}, {data['status']}", style="bold"))
     if data["status"] != "installed":
         console.print(Text(data["reason"]))
+        _unset(data, console)
         return
     facts = {name: data[name] for name in ("package", "dimensions", "customary_dt")}
     _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
+    _unset(data, console)
     for profile, scenes in data["profiles"].items():
         _heading(f"Profile {profile}", console)
         _settings(scenes, console)
+    if data["settable"]:
+        _heading("What can be set (--set NAME=VALUE)", console)
+        table = grid("setting", "must be")
+        for setting in data["settable"]:
+            table.add_row(setting["name"], Text(setting["must_be"]))
+        console.print(table)
     _heading("Habits, and what the adapter does about them", console)
     table = grid("habit", "what we do", "source")
     table.columns[0].no_wrap = False
@@ -154,6 +163,30 @@ def _engine(data: Plain, console: Console) -> None:
         console.print(table)
         if any(fact["chosen"] or fact["because"] for fact in data["measured"]):
             console.print(Text(AFTERWARDS))
+
+
+def _unset(data: Plain, console: Console) -> None:
+    """Print what is documented of an engine with nothing set, beside what was measured of it just now."""
+    rows = data["unset"]
+    if not rows:
+        return
+    _heading("When nothing is set", console)
+    table = grid("", "documented", "measured", "where it is documented")
+    table.columns[0].no_wrap = False
+    for row in rows:
+        table.add_row(*(Text(text) for text in (row["what"], row["documented"], _measured(row), row["source"])))
+    console.print(table)
+    for reason in dict.fromkeys(row["reason"] for row in rows if row["reason"]):
+        console.print(Text(f"-: not measured: {reason}"))
+
+
+def _measured(row: Plain) -> str:
+    """What was measured with nothing set; that it is not what is documented, where it is not."""
+    value = row["measured"]
+    if value is None:
+        return "-"
+    said = "never" if math.isinf(value) else number(0.0 if row["agrees"] and row["value"] == 0.0 else value)
+    return said if row["agrees"] is not False else f"{said}, differs"
 
 
 def _said_of(fact: Plain) -> str:
@@ -244,8 +277,10 @@ def sensitivity(
         "faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:",
         "drift along x, climb upwards, tremble to and fro along x at every step, pull towards the middle of all",
         "bodies; of twirl it is a turn of 0.01 rad/s. 1 % of flicker: impulses 1 % too high and too low in turn;",
-        "of damping: speeds lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last",
-        "body of the scene is 1 % too slow, and those before it less, by their place in the order",
+        "of lasting: 1 % of the last impulses is told on where nothing touches any more; of uneven: impulses on the",
+        "last body of the scene are 1 % too weak, and others less, by their place in the order; of damping: speeds",
+        "lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last body is 1 % too slow,",
+        "and those before it less, by their place in the order",
     ):
         console.print(Text(line))
     _heading("Primary quantities that hang on a parameter and do not see 1 % of it,", console)

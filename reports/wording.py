@@ -6,9 +6,11 @@ import hashlib
 import json
 import shlex
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-from validation.cells import format_dt, parse_dt
+from adapters.settings import text_of
+from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
 from validation.metrics import NEVER as NEVER
 from validation.posed import resolve
 
@@ -58,11 +60,22 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     # Naming any parameter asks for one cell instead of the suite's variations, so one is always named.
     for name, value in (slot["params"] or {p.name: p.default for p in first}).items():
         words += ["--param", f"{name}={value:.17g}" if float(f"{value:.12g}") != value else f"{name}={value:.12g}"]
-    words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], "--profile", slot["profile"]]
+    words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], *profile_words(slot_from_dict(slot))]
     words += ["--dt", format_dt(parse_dt(str(slot["dt"])))]
     if slot["iterations"] is not None:
         words += ["--iterations", str(slot["iterations"])]
     return shlex.join(words)
+
+
+def at(out: Path | None) -> str:
+    """`` --out DIR`` of a command that is to find the same results; empty for the usual folder."""
+    return "" if out is None or out == Path("crosscheck-out") else f" --out {shlex.quote(str(out))}"
+
+
+def profile_words(slot: Slot) -> list[str]:
+    """Words that ask for the profile of a slot, with the settings that replace its own."""
+    sets = [word for name, value in slot.switched for word in ("--set", f"{name}={text_of(value)}")]
+    return ["--profile", slot.base, *sets]
 
 
 def row_id(row: Mapping[str, Any]) -> str:

@@ -146,16 +146,29 @@ def settled(interfaces: int, dt: float, duration: float) -> Bound:
     return Bound(min(interfaces / STILL * dt, duration - WINDOW), because)
 
 
-def carried(dt: float) -> Bound:
-    """Mean load over the last `WINDOW`, relative to the weight that is carried."""
-    because = "bodies slower than v1/100 before and after the last second leave 2 v1/100 of momentum unaccounted"
-    return Bound(2.0 * STILL * dt / WINDOW, because)
+def carried(dt: float, window: float | None = None) -> Bound:
+    """Mean load over ``window`` [s], by default the last `WINDOW`, relative to the weight that is carried."""
+    when = "the last second" if window is None else f"{window:.2g} s"
+    because = f"bodies slower than v1/100 before and after {when} leave 2 v1/100 of momentum unaccounted"
+    return Bound(2.0 * STILL * dt / (window or WINDOW), because)
 
 
 def steady() -> Bound:
-    """Standard deviation of a load from step to step, relative to the weight that is carried."""
+    """Load of any one step, and so its standard deviation from step to step, relative to the weight that is carried."""
     because = "a body slower than v1/100 changes its momentum by at most 2 m v1/100 a step"
     return Bound(2.0 * STILL, because)
+
+
+def load(
+    name: str, dt: float, truth: Mapping[str, float], source: str, window: float | None = None, share: float = 1.0
+) -> list[Check]:
+    """Checks of a load over time (`metrics.over_time`): its mean over ``window`` [s], and the least and the greatest.
+
+    Those that ``truth`` names. ``share``: the weight that is carried over what the load is relative to.
+    """
+    allowed = {"mean": carried(dt, window), "least": steady(), "greatest": steady()}
+    found = [(f"{name}[{by}]", Bound(share * bound.value, bound.because)) for by, bound in allowed.items()]
+    return [bound.check(metric, "1", truth[metric], source) for metric, bound in found if metric in truth]
 
 
 # ---- what bounces ----

@@ -19,6 +19,7 @@ from adapters.engine import Engine, Setting
 from adapters.foreign import checked_settings
 from adapters.isolation import LOG_LINES
 from adapters.needs import needs
+from adapters.own_settings import suffix_of
 from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
@@ -99,7 +100,8 @@ class Slot:
         Units in the last place by which the start height is moved (measures the noise floor), of the numbers that the
         engine computes with.
     switched
-        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.settings.switching`).
+        Settings of the profile that are replaced, by name and sorted: an experiment (`validation.settings.switching`),
+        or a user's own, which the profile is named after (`with_own`).
     """
 
     scene: str
@@ -111,6 +113,25 @@ class Slot:
     iterations: int | None = None
     ulp: int = 0
     switched: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def base(self) -> str:
+        """Profile that the engine knows: the slot's own without the settings that it is named after."""
+        return self.profile.removesuffix(suffix_of(self.switched))
+
+    @property
+    def is_own(self) -> bool:
+        """Whether a user has set settings of it."""
+        return bool(self.switched) and self.profile != self.base
+
+    @property
+    def stock(self) -> Slot:
+        """The same with the profile's own settings."""
+        return replace(self, profile=self.base, switched=())
+
+    def with_own(self, settings: tuple[tuple[str, Any], ...]) -> Slot:
+        """Return the slot with settings of a user's own, as a profile that is named after them."""
+        return replace(self, profile=self.profile + suffix_of(settings), switched=settings)
 
     def key(self) -> str:
         """Sixteen hex digits that identify the slot."""
@@ -319,12 +340,13 @@ def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
         For an unknown profile, or an iteration count that the profile does not have.
     """
     # The bench has scenes of its own, which no catalogue knows; they bring nothing.
-    brought = resolve(slot.scene).brought(slot.engine, slot.profile) if is_known(slot.scene) else None
+    brought = resolve(slot.scene).brought(slot.engine, slot.base) if is_known(slot.scene) else None
     if brought is not None:
         own = list(brought.settings)
     else:
-        own = checked_settings(engine.settings(slot.profile, needs(scene), slot.dt, slot.iterations))
-    switched = {name: Setting(name, value, "switched for an experiment") for name, value in slot.switched}
+        own = checked_settings(engine.settings(slot.base, needs(scene), slot.dt, slot.iterations))
+    because = "set by whoever asked" if slot.is_own else "switched for an experiment"
+    switched = {name: Setting(name, value, because) for name, value in slot.switched}
     kept = [switched.pop(setting.name, setting) for setting in own]
     return [*kept, *switched.values()]
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.engine import Array
+from adapters.near import near_pairs
 from adapters.scene import Scene
 from adapters.shapes import reach as reach
 from adapters.trajectory import Trajectory
@@ -16,6 +19,15 @@ from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
 UNAVAILABLE = "the engine does not report contact impulses"
+#: Said of a force where no step was recorded with its contacts.
+NOT_RECORDED = "contacts were not recorded"
+#: By what a quantity that is known step by step is told; its spread is the standard deviation.
+OVER_TIME: Mapping[str, Callable[[Array], float]] = {
+    "mean": lambda steps: float(np.mean(steps)),
+    "least": lambda steps: float(np.min(steps)),
+    "greatest": lambda steps: float(np.max(steps)),
+    "spread": lambda steps: float(np.std(steps)),
+}
 #: Said of a rebound that is none.
 SILENT = "does not rebound"
 #: Farthest that a planar scene has left its plane on an engine that lives in space [m]; measured as it is sampled.
@@ -64,6 +76,46 @@ def late_impulses(trajectory: Trajectory, a: int, b: int, window: float) -> Arra
     late = trajectory.t[contacts.step] > trajectory.t[-1] - window
     found = contacts.impulse_between(a, b)[late]
     return None if len(found) == 0 or np.isnan(found).any() else found
+
+
+def forces(
+    trajectory: Trajectory, body: int, others: Iterable[int], after: float = -math.inf, until: float = math.inf
+) -> Array:
+    """Force on ``body`` of all its contacts with ``others``, step by step, (s, d) [N].
+
+    That of a step is the impulse of the step over its length: no engine knows more of a force. NaN where the engine
+    does not tell it.
+
+    Parameters
+    ----------
+    others
+        Bodies by index; the body itself is left out.
+    after, until
+        Steps that end within these times [s], the first of them left out; those without contacts recorded are not told.
+    """
+    contacts = trajectory.contacts
+    if contacts is None:
+        return np.zeros((0, trajectory.dimension))
+    chosen = steps_between(trajectory, after, until)
+    total = np.zeros((int(chosen.sum()), trajectory.dimension))
+    for other in others:
+        if other != body:
+            sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
+            total += sign * contacts.impulse_between(other, body)[chosen]
+    return np.asarray(total / trajectory.dt)
+
+
+def steps_between(trajectory: Trajectory, after: float, until: float) -> NDArray[np.bool_]:
+    """Which of the steps with recorded contacts end within (after, until] [s], to half a step; (s,)."""
+    assert trajectory.contacts is not None
+    end, half = trajectory.t[trajectory.contacts.step], 0.5 * trajectory.dt
+    return np.asarray((end > after + half) & (end < until + half))
+
+
+def over_time(name: str, steps: Array, by: Sequence[str] = ("mean", "least", "greatest")) -> dict[str, Measured]:
+    """``name[mean]`` and the like of what is known step by step (s,); without a value where one is not known."""
+    why = NOT_RECORDED if len(steps) == 0 else UNAVAILABLE if np.isnan(steps).any() else ""
+    return {f"{name}[{each}]": (None, why) if why else (OVER_TIME[each](steps), "") for each in by}
 
 
 def largest(values: Iterable[float]) -> float:
@@ -276,7 +328,7 @@ def interface_load(
 def overlaps(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
     """Depth of the overlap of every pair that can meet and does, by body indices; each (s,) [m]."""
     found = {}
-    for i, j, _ in scene.contact_pairs():
+    for i, j in near_pairs(scene, trajectory.pose):
         a, b = scene.bodies[i].shape, scene.bodies[j].shape
         depth = overlap(a, trajectory.pose[:, i], b, trajectory.pose[:, j])
         if depth.any():

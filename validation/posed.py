@@ -126,6 +126,8 @@ def _digest(text: str) -> str:
 def resolve(argument: str) -> CanonicalScene:
     """Return the canonical scene called ``argument``, or made from the file at that path.
 
+    ``NAME@LENGTH`` is a scene of the catalogue with all lengths multiplied (`validation.scenes.sized`).
+
     Raises
     ------
     SceneError
@@ -140,6 +142,11 @@ def resolve(argument: str) -> CanonicalScene:
 
         name = pinned(argument)
         return canonical_from_text(_texts[name], Path(name.rpartition("@")[0]))
+    name, _, length = argument.partition("@")
+    if length and name in CATALOGUE:
+        from validation.scenes.sized import sized
+
+        return sized(CATALOGUE[name], float(length))
     return matching(argument)[0]
 
 

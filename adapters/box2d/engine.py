@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.box2d.profiles import PROFILES, checked
+from adapters.box2d.profiles import KINDS, PROFILES, checked
 from adapters.box2d.script import python
 from adapters.box2d.simulation import Box2DSimulation
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
@@ -81,6 +81,7 @@ class Box2DEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -92,6 +93,10 @@ class Box2DEngine(Engine):
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that single precision cannot hold."""
         return without_a_place(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -14,6 +14,7 @@ import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.ground import reach
+from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 
@@ -167,7 +168,7 @@ class Box2DSimulation(Simulation):
                     "restitution": max(fixtures[i].restitution, fixtures[j].restitution),
                     "friction": math.sqrt(fixtures[i].friction * fixtures[j].friction),
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             }
         return held
 

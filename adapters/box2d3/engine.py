@@ -13,7 +13,7 @@ from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS, checked
+from adapters.box2d3.profiles import KINDS, PROFILES, TUNED_SUBSTEPS, checked
 from adapters.box2d3.releases import RELEASES
 from adapters.box2d3.script import python
 from adapters.box2d3.shipped import SUBSTEPS
@@ -82,6 +82,7 @@ class Box2D3Engine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -97,6 +98,10 @@ class Box2D3Engine(Engine):
         if frictions(scene) is None:
             return "pairs: friction of a pair is the root of a product of two numbers here, this table has none"
         return without_a_place(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -15,6 +15,7 @@ import numpy as np
 from adapters.box2d3.translation import frictions, restitutions
 from adapters.engine import Array, Contacts, Simulation
 from adapters.ground import reach
+from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 _UNKNOWN = (math.nan, math.nan)
@@ -165,7 +166,7 @@ class Box2D3Simulation(Simulation):
                 "restitution": max(float(shapes[i].restitution), float(shapes[j].restitution)),
                 "friction": math.sqrt(float(shapes[i].friction) * float(shapes[j].friction)),
             }
-            for i, j, _ in self.scene.contact_pairs()
+            for i, j in told_pairs(self.scene)
         }
         return held
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
-from adapters.bullet.profiles import BODY, PROFILES, WORLD, law_of
+from adapters.bullet.profiles import BODY, KINDS, PROFILES, WORLD, checked, law_of
 from adapters.bullet.releases import RELEASES
 from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE, WARM_STARTING
@@ -22,12 +22,12 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.meeting import meeting_pairs
 from adapters.needs import Needs
 from adapters.probes import (
-    GRAVITY,
     REBOUND_LEAD,
     REBOUND_RADIUS,
     REBOUND_SPEED,
     REBOUND_TIME,
     SLIDE_TIME,
+    slide_load,
     slide_speed,
 )
 from adapters.receipts import FRICTION_SHARE
@@ -110,6 +110,7 @@ class BulletEngine(Engine):
         quirks=_QUIRKS,
     )
     profiles = PROFILES
+    kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
 
@@ -133,6 +134,10 @@ class BulletEngine(Engine):
                 return f"{coefficient}: bullet multiplies values of bodies, no product gives this table of pairs"
         return None
 
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> BulletSimulation:
         """Make a world in a new DIRECT client.
 
@@ -148,20 +153,25 @@ class BulletEngine(Engine):
         return BulletSimulation(scene, dt, settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: parameters of the world, of how bodies are made, and of each body."""
-        lines = [f"# p: pybullet; fixedTimeStep={dt:.9g}; body: each of your bodies"]
-        world = [f"numSolverIterations={settings[n]}" if n == "iterations" else f"{n}={settings[n]!r}"
-                 for n in names if n in WORLD | {"iterations"}]  # fmt: skip
+        """Python: parameters of the world, of how bodies are made, and of each body; none depends on the step."""
+        lines = []
+        world = [f"{_WORDS.get(n, n)}={settings[n]!r}" for n in names if n in WORLD | {"iterations"}]
         if world:
-            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})")
+            lines.append(f"p.setPhysicsEngineParameter({', '.join(world)})  # of the whole world")
         if "useMaximalCoordinates" in names:
-            lines.append(f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})")
+            lines.append(
+                f"p.createMultiBody(..., useMaximalCoordinates={settings['useMaximalCoordinates']})  # each body"
+            )
         if settings.get("enableSAT") and "enableSAT" in names:
             lines.append("p.loadURDF(..., flags=p.URDF_INITIALIZE_SAT_FEATURES)  # each box and hull")
         body = [f"{n}={settings[n]!r}" for n in names if n in BODY]
         if body:
-            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})")
-        return "\n".join(lines)
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})  # each body")
+        return "\n".join(["# p: pybullet", *lines]) if lines else ""
+
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """Parameters of pybullet."""
+        return {name: (word, settings[name]) for name, word in _WORDS.items() if name in settings}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
@@ -181,6 +191,10 @@ class BulletEngine(Engine):
         return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
 
 
+#: What pybullet calls a setting otherwise than we do.
+_WORDS = {"iterations": "numSolverIterations"}
+
+
 def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str, Declared]:
     """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
 
@@ -191,16 +205,17 @@ def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str
     friction, share = needs.friction, dt / SLIDE_TIME
     because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
     if profile != "default":
-        held = WARM_STARTING * _hopping(law, needs.restitution, dt)
+        held = WARM_STARTING * _hopping(law, friction, needs.restitution, dt)
         if held:
             because = "a box that hops within the slop loads its points in turns: one without a load holds its friction"
             share += 0.5 * held
         more = Declared(friction * (1.0 + share), friction * (share + FRICTION_SHARE), because)
         return {"friction": more, "friction_impulse": more}
-    slowed = drag_share(law, slide_speed(friction), friction * GRAVITY, dt, SLIDE_TIME)
+    slowed = drag_share(law, slide_speed(friction), friction * slide_load(friction), dt, SLIDE_TIME)
     drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
     return {
-        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction, drag),
+        # What is measured is all that slows the box over its load: a step without load counts for the drag as well.
+        "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction * (1.0 + slowed), drag),
         "friction_impulse": Declared(friction, 2.0 * share * friction, because),
     }
 
@@ -209,7 +224,7 @@ def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str
 UNLOADS = 0.25
 
 
-def _hopping(law: ContactLaw, e: float, dt: float) -> float:
+def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
     """Share of the sliding probe's steps in which the box may hop on its floor instead of resting on it.
 
     A box sinks by the slop in a step, ``q g dt^2``, and with restitution leaves by it in the next, for both ends of the
@@ -218,8 +233,9 @@ def _hopping(law: ContactLaw, e: float, dt: float) -> float:
     that is asked for here. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Solved without
     the last step's impulses, without slop or with a higher threshold the friction is exact.
     """
-    hop = 0.5 * GRAVITY * dt
-    if e == 0.0 or law.slop < UNLOADS * GRAVITY * dt**2 or hop <= law.threshold:
+    load = slide_load(friction)
+    hop = 0.5 * load * dt
+    if e == 0.0 or law.slop < UNLOADS * load * dt**2 or hop <= law.threshold:
         return 0.0
     hops = math.inf if e >= 1.0 else math.log(hop / law.threshold) / -math.log(e)
     return min(1.0, 2.0 * hops * dt / SLIDE_TIME)

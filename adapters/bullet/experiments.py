@@ -90,6 +90,8 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stack-sweeps-default", "default", "kinetic_energy", 10),
             ("stack-sweeps-default", "default", "impulse_scatter", 10),
             ("stack-sweeps-default", "default", "interface_impulse[5]", 1),
+            ("stack-sweeps-default", "default", "load[least]", 1),
+            ("stack-sweeps-default", "default", "unbalanced", 1),
             ("stack-sweeps", "one", "drift", None),
             ("stack-sweeps", "one", "penetration", None),
             ("stack-sweeps", "tuned", "drift", 10),
@@ -98,6 +100,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("stack-sweeps", "tuned", "kinetic_energy", 4),
             ("stack-sweeps", "tuned", "impulse_scatter", 1),
             ("stack-sweeps", "tuned", "interface_impulse[5]", 1),
+            ("stack-sweeps", "tuned", "load[least]", 1),
+            ("stack-sweeps", "one", "load[greatest]", 1),
+            ("stack-sweeps", "one", "unbalanced", 1),
         )
     ),
     *(
@@ -125,6 +130,33 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         {"contactProcessingThreshold": 0.0},
         dimension=3,
         idle=(_NO_DRAG,),
+    ),
+    *(
+        Experiment(
+            "bounce-force-ahead",
+            "without speculative contacts nothing pushes in flight; without drag, or solved to the end, it does",
+            "default",
+            "bounce",
+            "force_in_flight",
+            {"contactProcessingThreshold": 0.0},
+            params,
+            dimension=dimension,
+            idle=(_NO_DRAG, {"solverResidualThreshold": 0.0, "iterations": 1000}),
+        )
+        for params, dimension in (({"height": 1.03}, 2), ({"e": 1.0}, 3))
+    ),
+    *(
+        Experiment(
+            "wipe-sweeps",
+            "with 1000 sweeps friction and the stop's force are right in the mean; without push-out they are not",
+            profile,
+            "wipe",
+            metric,
+            {"iterations": 1000},
+            idle=({"contactERP": 0.0},),
+        )
+        for profile in ("tuned", "one")
+        for metric in ("friction[mean]", "stop[mean]")
     ),
     *(
         Experiment(
@@ -236,6 +268,10 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("default", 100.0, "carried"),
             ("tuned", 100.0, "creep"),
             ("tuned", 100.0, "grip"),
+            *((p, 100.0, "unbalanced") for p in ("default", "tuned", "one")),
+            ("default", 100.0, "carried[greatest]"),
+            ("tuned", 100.0, "carried[least]"),
+            ("one", 100.0, "grip[least]"),
         )
     ),
     *(
@@ -254,6 +290,19 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("hop", (_NO_DRAG,)),
             ("turned", (_NO_DRAG,)),
         )
+    ),
+    *(
+        Experiment(
+            "slide-drag-and-switching",
+            "with a wider margin the floor pushes steadily; without drag alone it does not",
+            "default",
+            "slide",
+            metric,
+            {"contactBreakingThreshold": 0.1},
+            idle=(_NO_DRAG,),
+            dt=1.0 / 60.0,
+        )
+        for metric in ("normal[least]", "normal[greatest]", "friction[mean]")
     ),
 )
 

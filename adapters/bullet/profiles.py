@@ -8,6 +8,7 @@ one       rigid-body path, one compromise for every scene
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -16,15 +17,22 @@ from adapters.bullet.contact_law import ContactLaw
 from adapters.bullet.shipped import BREAKING_THRESHOLD, ITERATIONS, SLOP
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.settings import LARGEST_INT, finite
+from adapters.settings import LARGEST_INT, Check, finite, number, whole
 
 WORLD = frozenset(
     {
+        "allowedCcdPenetration",
+        "constraintSolverType",
         "contactBreakingThreshold",
         "contactERP",
         "contactSlop",
         "deterministicOverlappingPairs",
+        "enableConeFriction",
         "enableSAT",
+        "erp",
+        "frictionERP",
+        "globalCFM",
+        "minimumSolverIslandSize",
         "numSubSteps",
         "restitutionVelocityThreshold",
         "solverResidualThreshold",
@@ -34,11 +42,34 @@ WORLD = frozenset(
     }
 )
 BODY = frozenset(
-    {"angularDamping", "contactProcessingThreshold", "linearDamping", "rollingFriction", "spinningFriction"}
+    {
+        "angularDamping",
+        "ccdSweptSphereRadius",
+        "collisionMargin",
+        "contactDamping",
+        "contactProcessingThreshold",
+        "contactStiffness",
+        "linearDamping",
+        "rollingFriction",
+        "spinningFriction",
+    }
 )
 #: Settings that PyBullet takes as an int.
 WHOLE = frozenset(
-    {"deterministicOverlappingPairs", "iterations", "numSubSteps", "useMaximalCoordinates", "useSplitImpulse"}
+    {
+        "constraintSolverType",
+        "deterministicOverlappingPairs",
+        "enableConeFriction",
+        "iterations",
+        "minimumSolverIslandSize",
+        "numSubSteps",
+        "useMaximalCoordinates",
+        "useSplitImpulse",
+    }
+)
+_OTHERS = {"enableSAT": whole(0, 1), "iterations": whole(1, LARGEST_INT), "useMaximalCoordinates": whole(0, 1)}
+KINDS: Mapping[str, Check] = MappingProxyType(
+    {name: whole(0, LARGEST_INT) if name in WHOLE else number(0.0, math.inf) for name in sorted(WORLD | BODY)} | _OTHERS
 )
 
 
@@ -169,6 +200,8 @@ def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
             raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
     if settings.get("enableSAT", 0) not in (0, 1):
         raise EngineError(f"enableSAT: {settings['enableSAT']!r} must be 0 or 1")
+    if len({"contactDamping", "contactStiffness"} & set(settings)) == 1:
+        raise EngineError("contactStiffness: bullet takes it together with contactDamping only")
     iterations = settings.get("iterations", 50)
     if iterations != int(iterations) or iterations < 1:
         raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")

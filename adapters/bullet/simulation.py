@@ -25,7 +25,7 @@ HEAVY = 1e15
 
 
 @cache
-def _pybullet() -> ModuleType:
+def pybullet_here() -> ModuleType:
     """Import the engine; the line that it prints on file descriptor 2 while loading is dropped."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
@@ -43,7 +43,7 @@ class BulletSimulation(Simulation):
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         world, material = checked(settings)
-        self._p = _pybullet()
+        self._p = pybullet_here()
         self._scene, self._dt = scene, dt
         self._world, self._material = world, material
         self._maximal = int(settings.get("useMaximalCoordinates", 0))

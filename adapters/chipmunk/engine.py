@@ -13,13 +13,13 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from adapters.chipmunk.profiles import PROFILES, checked
+from adapters.chipmunk.profiles import KINDS, PROFILES, SLOP_SHARE, START_SHARE, checked
 from adapters.chipmunk.releases import RELEASES, installed_version
 from adapters.chipmunk.script import python
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
-from adapters.needs import Needs
+from adapters.needs import Needs, needs
 from adapters.probes import SLIDE_TIME
 from adapters.receipts import IMPULSE_SHARE
 from adapters.scene import Scene
@@ -79,6 +79,7 @@ class ChipmunkEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
 
@@ -100,6 +101,10 @@ class ChipmunkEngine(Engine):
         """Steps in which a body could pass the ground's polygon."""
         return leaves_ground(scene, dt)
 
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.
 
@@ -119,12 +124,25 @@ class ChipmunkEngine(Engine):
         return ChipmunkSimulation(scene, dt, chosen)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: attributes of the space."""
-        lines = [f"# space: your pymunk.Space, stepped with space.step({dt:.9g})"]
-        lines += [f"space.{name} = {settings[name]!r}" for name in names if name != "start_overlap"]
+        """Python: attributes of the space, and how deep touching bodies start."""
+        needed = needs(scene)
+        told = {"collision_slop": "  # a thousandth of the smallest body"}
+        if settings["collision_slop"] != SLOP_SHARE * needed.smallest_size:
+            told = {}
+        lines = [f"space.{name} = {settings[name]!r}{told.get(name, '')}" for name in names if name != "start_overlap"]
         if "start_overlap" in names and settings["start_overlap"]:
-            lines.append(f"# and let touching bodies start {settings['start_overlap']:.4g} m deep in each other")
-        return "\n".join(lines)
+            lines.append(f"# and let bodies that touch start {settings['start_overlap']:.6g} m deep in each other")
+            formula = self.words(settings, scene, dt)["start_overlap"][1]
+            if isinstance(formula, str):
+                lines[-1] += f": for dt = {dt:.9g} and g = {needed.pull:.9g}, for others {formula}"
+        return "\n".join(["# space: your pymunk.Space", *lines]) if lines else ""
+
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """Chipmunk has no setting for where bodies start."""
+        deep = settings["start_overlap"]
+        is_share = deep > 0.0 and deep == START_SHARE * (needs(scene).pull * dt * dt)
+        said = f"{START_SHARE:g}*g*dt^2" if is_share else deep
+        return {"start_overlap": ("overlap of touching bodies at the start [m]", said)}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Single contacts and constant forces are exact here; totals of impulses are not where e = 1 and friction meet.

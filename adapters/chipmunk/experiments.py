@@ -67,11 +67,15 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             ("default", "drift", None),
             ("default", "interface_impulse[5]", 1),
             ("default", "impulse_scatter", 1),
+            ("default", "load[least]", 1),
+            ("default", "unbalanced", 1),
             ("tuned", "settle_time", 4),
             ("tuned", "kinetic_energy", 4),
             ("tuned", "drift", 4),
             ("tuned", "interface_impulse[5]", 1),
             ("tuned", "impulse_scatter", 1),
+            ("tuned", "load[greatest]", 1),
+            ("tuned", "unbalanced", 1),
         )
     ),
     *(

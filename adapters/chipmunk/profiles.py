@@ -14,8 +14,26 @@ from typing import Any
 from adapters.chipmunk.shipped import COLLISION_BIAS, COLLISION_PERSISTENCE, COLLISION_SLOP, ITERATIONS
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.settings import finite
+from adapters.settings import LARGEST_INT, Check, finite, number, whole
 
+#: What a setting may be. Those of `UNSET` are Chipmunk's own as long as nobody sets them.
+KINDS: Mapping[str, Check] = MappingProxyType(
+    {
+        "iterations": whole(1, LARGEST_INT),
+        "collision_slop": number(0.0, math.inf),
+        "collision_bias": number(0.0, 1.0),
+        "collision_persistence": whole(1, LARGEST_INT),
+        "start_overlap": number(0.0, math.inf),
+        "damping": number(0.0, 1.0),
+        "idle_speed_threshold": number(0.0, math.inf),
+        "sleep_time_threshold": number(0.0, math.inf),
+    }
+)
+UNSET = ("damping", "idle_speed_threshold", "sleep_time_threshold")
+#: Overlap that is never pushed out, as a share of the smallest body.
+SLOP_SHARE = 1e-3
+#: How deep touching bodies start, as a share of the way that they fall in a step.
+START_SHARE = 0.3
 SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
 
 
@@ -33,7 +51,7 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for what the scene needs."""
-    slop, resting = 1e-3 * needs.smallest_size, needs.regime == "rest"
+    slop, resting = SLOP_SHARE * needs.smallest_size, needs.regime == "rest"
     heavy = needs.mass_ratio >= 100.0
     return [
         Setting(
@@ -78,8 +96,8 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 
 def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
     """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
-    fall = needs.pull * dt * dt
-    return min(0.5 * slop, 0.3 * fall) if fall > 0.0 else 0.5 * slop
+    fall = START_SHARE * (needs.pull * dt * dt)
+    return min(0.5 * slop, fall) if fall > 0.0 else 0.5 * slop
 
 
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
@@ -88,7 +106,7 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profi
 def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings whose names and numbers the engine can take; a bad number would abort the process."""
     for name in settings:
-        if name not in SETTING_NAMES:
+        if name not in KINDS:
             raise EngineError(f"{name}: chipmunk has no such setting, it has {', '.join(SETTING_NAMES)}")
     for name in SETTING_NAMES:
         if name not in settings:
@@ -103,6 +121,9 @@ def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
         if not number or not 0.0 <= value <= high:
             limit = " and at most 1" if high == 1.0 else ""
             raise EngineError(f"{name}: {value!r} must be a finite number, at least 0{limit}")
+    for name in set(UNSET) & set(settings):
+        if wanted := KINDS[name](settings[name]):
+            raise EngineError(f"{name}: {settings[name]!r} must be {wanted}")
     if settings["start_overlap"] > settings["collision_slop"]:
         raise EngineError("start_overlap: must not exceed collision_slop, it would be pushed out again")
     return dict(settings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.chipmunk.profiles import checked
+from adapters.chipmunk.profiles import UNSET, checked
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import corners, moment
 from adapters.scene import Body, Capsule, Disc, Scene
@@ -20,7 +20,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     built = ChipmunkSimulation(scene, dt, chosen)  # places and materials are those that it has worked out
     lines = [*imports(scene, "import pymunk"), *constants(dt, steps), "", "space = pymunk.Space()"]
     lines.append(f"space.gravity = {literal(scene.gravity)}")
-    lines += [f"space.{name} = {chosen[name]!r}" for name in _SPACE]
+    lines += [f"space.{name} = {chosen[name]!r}" for name in (*_SPACE, *UNSET) if name in chosen]
     lines += ["bodies = {}", *(f"# start: {change}" for change in built.initial_change)]
     for asked, body, shape in zip(scene.bodies, built.bodies, built.shapes, strict=True):
         lines += ["", *_made(scene, asked, body, shape)]

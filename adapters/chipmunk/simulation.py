@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from adapters.chipmunk.profiles import UNSET
 from adapters.chipmunk.releases import point_impulses
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.meeting import told_pairs
 from adapters.scene import Scene
 
 
@@ -33,6 +35,9 @@ class ChipmunkSimulation(Simulation):
         self.space.collision_slop = settings["collision_slop"]
         self.space.collision_bias = settings["collision_bias"]
         self.space.collision_persistence = settings["collision_persistence"]
+        for name in UNSET:
+            if name in settings:
+                setattr(self.space, name, settings[name])
         self.bodies = [made_body(body) for body in scene.bodies]
         self.shapes = [made_shape(scene, a, b, 0.0) for a, b in zip(scene.bodies, self.bodies, strict=True)]
         for asked, shape in zip(scene.bodies, self.shapes, strict=True):
@@ -144,7 +149,7 @@ class ChipmunkSimulation(Simulation):
                     "restitution": self.shapes[i].elasticity * self.shapes[j].elasticity,
                     "friction": self.shapes[i].friction * self.shapes[j].friction,
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             },
         }
 

@@ -13,10 +13,10 @@ from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.dart.profiles import CONES, MOST_BOXES, PROFILES, checked, solved
+from adapters.dart.profiles import CONES, KINDS, MOST_BOXES, PROFILES, checked, solved
 from adapters.dart.releases import RELEASES, refusal
 from adapters.dart.script import python
-from adapters.dart.shipped import MIXING, PUSH_OUT, THRESHOLD, restitution
+from adapters.dart.shipped import MIXING, PUSH_OUT, SMOOTH, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
@@ -76,11 +76,17 @@ class DartEngine(Engine):
                 "declared; laws predict what blows make of it",
                 "ContactConstraint: constraint force mixing, bouncing velocities; measured: 0.8 comes out as 0.799982",
             ),
+            Quirk(
+                f"friction of {SMOOTH:g} and less is taken as none",
+                "declared: what slides that should not reads FAIL",
+                "ContactConstraint, friction coefficient threshold; measured with 6.20.0",
+            ),
             Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 6.20.0"),
         ),
     )
     profiles = PROFILES
     releases = RELEASES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -103,6 +109,10 @@ class DartEngine(Engine):
             return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
         return refusal(profile)
 
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.
 
@@ -118,11 +128,19 @@ class DartEngine(Engine):
         return DartSimulation(scene, dt, chosen)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Restitution under the compliance of contacts, and friction under its own."""
+        """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""
+        smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} is taken as none")
+        told = dict.fromkeys(("friction", "friction_impulse"), smooth) if needs.friction <= SMOOTH else {}
         if needs.regime != "impact":
-            return {}
+            return told
         if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED
-            return {"restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s")}
+            return {
+                **told,
+                "restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s"),
+            }
         value, left = restitution(needs.restitution, REBOUND_SPEED), solved(profile, needs.friction > 0.0)
-        return {"restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change")}
+        return {
+            **told,
+            "restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change"),
+        }

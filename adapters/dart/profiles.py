@@ -39,6 +39,7 @@ TAKEN: Mapping[str, Mapping[str, settings.Check]] = MappingProxyType(
         "fbf": {**_PLAIN, **_SWEPT, **_SECOND},
     }
 )
+KINDS: Mapping[str, settings.Check] = MappingProxyType({**_PLAIN, **_SWEPT, **_SECOND})
 _SOURCE = "dartpy 6.20, dart.constraint"
 
 

@@ -10,6 +10,9 @@ MIXING = 1e-5
 #: velocity threshold, maximal bouncing velocity; measured: 0.2 of 0.499 m/s does not come, of 0.501 m/s it does; 0.8 of
 #: 150 m/s leaves 100 m/s]
 THRESHOLD, FASTEST = 0.1, 100.0
+#: Friction up to which there is none. [`ContactConstraint`, friction coefficient threshold; measured: 0.001 does not
+#: come, 0.00101 does]
+SMOOTH = 1e-3
 #: Largest speed at which an overlap is pushed out, where nothing rebounds [m/s]; measured: 2.0 m/s leave 1e-3 m/s.
 PUSH_OUT = 1e-3
 #: Share of an overlap that a step pushes out, up to that speed. [`ContactConstraint`, error reduction parameter]

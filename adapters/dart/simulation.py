@@ -11,6 +11,7 @@ from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Array, Contacts, Simulation
 from adapters.ground import reach
+from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Names of the detectors' classes.
@@ -175,7 +176,7 @@ class DartSimulation(Simulation):
                     "restitution": self.restitutions[i] * self.restitutions[j],
                     "friction": min(self.frictions[i], self.frictions[j]),
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             },
         }
 

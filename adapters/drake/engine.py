@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.drake.landing import slowest_rebound
-from adapters.drake.profiles import OWN, PROFILES, checked
+from adapters.drake.profiles import KINDS, OWN, PROFILES, checked
 from adapters.drake.script import python
 from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
@@ -106,6 +106,7 @@ class DrakeEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
     reads = MappingProxyType({".sdf": read, ".world": read})
     expected = (
@@ -132,6 +133,10 @@ class DrakeEngine(Engine):
         if profile != PROFILE and frictions(scene) is None:  # a model brings its bodies' own numbers
             return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
         return None if profile == PROFILE else _unsound(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

@@ -19,7 +19,9 @@ from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.combination import MINVAL
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
-from adapters.mujoco.pairs import contact_law, pair_solref, pair_solreffriction
+from adapters.mujoco.options import own_kinds
+from adapters.mujoco.pairs import contact_law
+from adapters.mujoco.pasting import snippet, words
 from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
@@ -28,9 +30,10 @@ from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import GRAVITY, LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
+from adapters.settings import Check
 from adapters.stepping import step_count
 
 #: Phases of a step over which a rebound is declared.
@@ -84,7 +87,8 @@ class MujocoEngine(Engine):
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; forces of "
+                "its contacts that contradict the momentum of what it pushes are not told",
                 f"{DOC}, modeling: mocap bodies",
             ),
             Quirk(
@@ -124,6 +128,14 @@ class MujocoEngine(Engine):
                     return f"{body.name}.inertia: {a:g} + {b:g} < {c:g}, no mass distribution has these moments"
         return None
 
+    def settable(self) -> Mapping[str, Check]:
+        """See `Engine.settable`."""
+        return own_kinds()
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        check_settings(settings)
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.
 
@@ -162,44 +174,12 @@ class MujocoEngine(Engine):
         return declared
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """MJCF: ``<option>``, and the contact parameters on every geom (on a pair where only a pair has them)."""
-        material = next((material for _, _, material in scene.contact_pairs()), None)
-        option = {name: settings[name] for name in _OPTIONS if name in names}
-        contact: dict[str, Any] = {}
-        if material is None:  # nothing meets: what is set of contacts does nothing
-            names = set(names) & set(_OPTIONS)
-        elif {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
-            contact["solref"] = pair_solref(settings, material.restitution, dt)
-        if "solimp" in names:
-            contact["solimp"] = settings["solimp"]
-        if material is not None and "smooth_condim" in names and material.friction == 0.0:
-            contact["condim"] = settings["smooth_condim"]
-        paired = "solreffriction" in names
-        if "margin" in names:
-            contact["margin"] = settings["margin"] * (1.0 if paired else 0.5)  # a pair's is the sum of its geoms'
-        if paired:
-            contact["solreffriction"] = pair_solreffriction(settings, dt)
-        lines = [_element("option", {"timestep": dt, **option})]
-        if contact and paired:
-            lines.append(f"<contact>{_element('pair', {'geom1': 'A', 'geom2': 'B', **contact})}</contact>")
-        elif contact:
-            lines.append(f"<default>{_element('geom', contact)}</default>")
-        return "\n".join(lines)
+        """MJCF: ``<option>``, and the contact parameters of every geom, or of each pair where materials differ."""
+        return snippet(settings, names, scene, dt)
 
-
-#: Settings that are attributes of MJCF's ``<option>``, by the same name.
-_OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
-
-
-def _element(name: str, attributes: Mapping[str, Any]) -> str:
-    """One empty MJCF element; numbers keep all digits that matter to a step."""
-
-    def text(value: Any) -> str:
-        if isinstance(value, tuple | list):
-            return " ".join(text(item) for item in value)
-        return f"{value:.9g}" if isinstance(value, float) else str(value)
-
-    return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, value in attributes.items()) + "/>"
+    def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+        """Attributes of MJCF."""
+        return words(settings, scene, dt)
 
 
 def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
@@ -232,7 +212,7 @@ def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str,
     ratios = []
     for k in (0.0, 1.0, -1.0) if off else (0.0,):
         (forwards, upwards, _) = box.motion(steps, speed + k * off)[-1][1]
-        ratios.append((speed + k * off - forwards) / (upwards + GRAVITY * steps * dt))
+        ratios.append((speed + k * off - forwards) / (upwards - scene.gravity[-1] * steps * dt))
     if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
         return {}  # as asked
     band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)

@@ -159,7 +159,11 @@ EXPERIMENTS: tuple[Experiment, ...] = (
                 {"margin": margin},
                 idle=({"tolerance": 0.0},),
             )
-            for margin, metric in ((1.05, "creep"), (100.0, "creep"), (1.05, "grip"), (1.05, "carried"))
+            for margin, metric in (
+                (1.05, "creep"),
+                (100.0, "creep"),
+                *((1.05, name) for name in ("grip", "carried", "grip[greatest]", "carried[least]", "unbalanced")),
+            )
         ),
         *(
             Experiment(

@@ -41,6 +41,8 @@ def _of_the_first_step() -> tuple[Experiment, ...]:
         ("default", "impulse_scatter", 20.0, None),
         ("default", "interface_impulse[1]", 20.0, None),
         ("default", "drift", 10.0, _SIXTY),
+        ("default", "load[greatest]", 10.0, _SIXTY),
+        ("default", "unbalanced", 10.0, _SIXTY),
         ("tuned", "settle_time", 20.0, None),
         ("tuned", "penetration", 20.0, None),
         ("tuned", "kinetic_energy", 20.0, None),

@@ -14,6 +14,14 @@ _GENTLE: dict[str, Any] = {"solreffriction": (1.0, 1.0)}
 _NONE: dict[str, Any] = {"solreffriction": (1000.0, 1.0)}
 #: And in between: a load that gives way hops with the first and slips with the second.
 _SLOW: dict[str, Any] = {"solreffriction": (2.0, 1.0)}
+_ROUND: dict[str, Any] = {"cone": "elliptic"}
+#: Rigid contacts whose references are nothing but damped, as the loop of the exact laws has them, and that loop, which
+#: takes the coupling of slip and normal away.
+_DAMPED: dict[str, Any] = {
+    "cone": "elliptic", "smooth_condim": 1, "solref": (0.0, -240.0 * RIGID[0]), "solimp": RIGID, "tolerance": 1e-15,
+    "margin": 1.703125e-07,
+}  # fmt: skip
+_LOOP: dict[str, Any] = {"rounds": 100, "agreed": 1e-13, "push_out": 0.1, "push_out_speed": 0.040875}
 
 
 def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
@@ -46,6 +54,82 @@ def on_loads(hold: dict[str, Any]) -> tuple[Experiment, ...]:
                 ("default", hold | _GENTLE, {"tolerance": 0.0}),
                 ("tuned", _GENTLE, {"margin": 0.0}),
             )
+        ),
+        *(
+            Experiment(
+                "slide-slip-lifts",
+                "friction damped so slowly that it does not act lifts nothing; a round cone or solving further does "
+                "not prevent it",
+                profile,
+                "slide",
+                f"normal[{by}]",
+                _ROUND | _NONE,
+                params,
+                dimension,
+                idle=(_ROUND, {"tolerance": 0.0}),
+            )
+            for profile, params, dimension in (
+                ("default", dict[str, float](), 2),
+                ("default", {"heading": 45.0}, 3),
+                ("tuned", dict[str, float](), 2),
+            )
+            for by in ("mean", "least", "greatest")
+        ),
+        *(
+            Experiment(
+                "slide-slip-lifts",
+                "a loop that takes the coupling of slip and normal away makes friction right; the contacts that it "
+                "works with do not, nor a round cone or solving further",
+                "default",
+                "slide",
+                f"friction[{by}]",
+                _DAMPED | _LOOP,
+                params,
+                dimension,
+                idle=(_DAMPED, _ROUND, {"tolerance": 0.0}),
+            )
+            for params, dimension in ((dict[str, float](), 2), ({"heading": 22.5}, 3))
+            for by in ("mean", "least", "greatest")
+        ),
+        *(
+            Experiment(
+                "wipe-slip-lifts",
+                "friction damped so slowly that it stops no slip in a step lifts nothing; a round cone or solving "
+                "further does not prevent it",
+                profile,
+                "wipe",
+                metric,
+                off,
+                idle=(_ROUND, {"tolerance": 0.0}),
+            )
+            for profile, off, metrics in (
+                ("default", _ROUND | _GENTLE, ("moved",)),
+                ("tuned", _NONE, ()),
+            )
+            for metric in (
+                *(f"{force}[{by}]" for force in ("normal", "friction", "stop") for by in ("least", "greatest")),
+                *metrics,
+            )
+        ),
+        Experiment(
+            "wipe-slip-lifts",
+            "the faster the table the higher the hop",
+            "tuned",
+            "wipe",
+            "moved",
+            _GENTLE,
+            {"v": 1.0},
+            idle=({"tolerance": 0.0},),
+        ),
+        Experiment(
+            "wipe-slip-lifts",
+            "solved to round-off the stop tells what acts, in the mean; a round cone does not do it",
+            "default",
+            "wipe",
+            "stop[mean]",
+            {"tolerance": 0.0},
+            {"v": 1.0},
+            idle=(_ROUND,),
         ),
         Experiment(
             "overlap-soft-contact",

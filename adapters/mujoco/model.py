@@ -12,7 +12,7 @@ rebound, since MJCF states none.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,8 @@ def read_tree(
     """
     lines = {e.attributes["name"]: e for e in root.walk() if e.tag in tags and "name" in e.attributes}
     while True:
+        if drop:
+            _without_what_hangs(root, dropped)
         try:
             return _Reading(root, drop, dropped, lines, notes).model()
         except Refused as refused:
@@ -81,10 +83,61 @@ def read_tree(
                 dropped.append(f"{keyframe}: its states are those of all bodies")
 
 
+def _without_what_hangs(root: Element, dropped: list[str]) -> None:
+    """Leave out what hangs on something that was left out: shapes without their mesh, bodies without any mass."""
+    meshes = {e.attributes.get("name") for e in root.walk() if e.tag == "mesh"}
+    for shape in [e for e in root.walk() if _is_shapeless(e, meshes)]:
+        root.without(shape)
+        dropped.append(f"{shape}: its shape was left out")
+    for body in [e for e in root.walk() if e.tag == "body" and _is_hollow(e)]:
+        root.without(body)
+        dropped.append(f"{body}: nothing is left of it that has a mass")
+
+
+def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
+    if element.tag == "collision":
+        return not any(child.children for child in element.children if child.tag == "geometry")
+    mesh = element.attributes.get("mesh")
+    return element.tag == "geom" and ("hfield" in element.attributes or (mesh is not None and mesh not in meshes))
+
+
+def _is_hollow(body: Element) -> bool:
+    """Whether a body can move, and neither states a mass nor has a geom or a body that brings one."""
+    moves = any(child.tag in ("freejoint", "joint") for child in body.children)
+    heavy = any(child.tag in ("inertial", "body", "replicate", "frame") for child in body.children)
+    given = [
+        {child.attributes.get(name, "1") for name in ("mass", "density")}
+        for child in body.children
+        if child.tag == "geom"
+    ]
+    return moves and not heavy and all({"0", "0.0", "0."} & told for told in given)
+
+
 def _shown(root: Element, refused: Refused) -> str:
     """What was refused, where it is no body or geom of the text: an option, or what the compiler made."""
     where = next((str(child) for child in root.children if child.tag == refused.kind.partition("/")[0]), refused.kind)
     return f"{where}: {one_line(refused.name, 60)}"
+
+
+def filled_in(root: Element) -> Iterator[str]:
+    """Numbers that MuJoCo takes where no geom and no default of geoms states one: friction, and density of bodies."""
+    defaults = [e for top in root.children if top.tag == "default" for e in top.walk() if e.tag == "geom"]
+    said = {name for each in defaults for name in each.attributes}
+    owners = [(e, [g for g in e.children if g.tag == "geom"]) for e in root.walk() if e.tag in ("worldbody", "body")]
+    rough = [g for _, geoms in owners for g in geoms if "friction" not in g.attributes]
+    if rough and "friction" not in said:
+        yield f"friction 1 of {_count(rough)} none, MuJoCo's own; of two geoms the larger holds"
+    heavy = [
+        g for owner, geoms in owners for g in geoms
+        if owner.tag == "body" and not any(e.tag == "inertial" for e in owner.children)
+        and not {"mass", "density"} & set(g.attributes)
+    ]  # fmt: skip
+    if heavy and not {"mass", "density"} & said:
+        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's own"
+
+
+def _count(geoms: Sequence[Element]) -> str:
+    return "1 geom that states" if len(geoms) == 1 else f"{len(geoms)} geoms that state"
 
 
 class _Reading:
@@ -136,6 +189,7 @@ class _Reading:
                 "centre: a step of a body that turns ends otherwise by |w|^2 dt^2/2 of the way between them"
             )
         pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
+        self.notes += filled_in(self.root)
         self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)

@@ -1,13 +1,17 @@
-"""``<option>`` of a model as settings of the profile that runs it as MuJoCo would."""
+"""``<option>`` of a model as settings, of the profile that runs it as MuJoCo would and of whoever sets one."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from adapters.engine import Setting
 from adapters.mujoco.refusal import Refused
+from adapters.settings import LARGEST_INT, Check, either, number, one_of, row, whole, word, words
 
 #: Flags that nothing in a scene asks about, or that are said otherwise (gravity).
 SILENT = frozenset(
@@ -18,6 +22,62 @@ SILENT = frozenset(
 CARRIED = frozenset(("eulerdamp", "island", "midphase", "multiccd", "nativeccd", "refsafe", "warmstart"))
 #: Flags that only measure.
 MEASURING = frozenset(("energy", "fwdinv"))
+
+
+#: Options that are no setting: --dt asks for the step, the scene for gravity, and flags have names.
+ASKED_OTHERWISE = frozenset(("timestep", "gravity", "disableflags", "enableflags", "disableactuator"))
+#: Options that are one of an enumeration: its name, and what its members' names begin with.
+ENUMERATED = {
+    "integrator": ("mjtIntegrator", "mjINT_"),
+    "cone": ("mjtCone", "mjCONE_"),
+    "jacobian": ("mjtJacobian", "mjJAC_"),
+    "solver": ("mjtSolver", "mjSOL_"),
+}
+#: Words of theirs that a setting has with other letters than small ones.
+SPELT = {"euler": "Euler", "rk4": "RK4", "pgs": "PGS", "cg": "CG", "newton": "NEWTON"}
+_ANY, _POSITIVE = number(-math.inf, math.inf), number(0.0, math.inf)
+
+
+@cache
+def own_kinds() -> dict[str, Check]:
+    """What can be set with the release that is installed: its options and flags, and how soft contacts are."""
+    import mujoco
+
+    option = mujoco.MjModel.from_xml_string("<mujoco/>").opt
+    kinds: dict[str, Check] = {}
+    for name in dir(option):
+        value = getattr(option, name)
+        if name.startswith("_") or name in ASKED_OTHERWISE:
+            continue
+        if name in ENUMERATED:
+            members = members_of(mujoco, *ENUMERATED[name])
+            kinds[name] = word(*(SPELT.get(each, each) for each in members))
+        elif isinstance(value, np.ndarray):
+            kinds[name] = row(value.size, _ANY)
+        else:
+            kinds[name] = whole(0, LARGEST_INT) if isinstance(value, int) else _POSITIVE
+    disabled = [each for each in members_of(mujoco, "mjtDisableBit", "mjDSBL_") if each in CARRIED]
+    flags = {"disabled": words(*disabled), "enabled": words(*members_of(mujoco, "mjtEnableBit", "mjENBL_"))}
+    softness = {"solref": row(2, _ANY), "solimp": row(5, _POSITIVE), "solreffriction": either(row(2, _ANY), None)}
+    return kinds | flags | softness | {"margin": _POSITIVE, "smooth_condim": one_of(1, 3)}
+
+
+def members_of(mujoco: Any, kind: str, prefix: str) -> dict[str, int]:
+    """Members of an enumeration by their names in small letters; the one that counts them has another prefix."""
+    members = getattr(mujoco, kind).__members__.items()
+    return {name.removeprefix(prefix).lower(): int(value) for name, value in members if name.startswith(prefix)}
+
+
+def set_own(mujoco: Any, option: Any, settings: Mapping[str, Any]) -> None:
+    """Hand over settings that no profile states: options by their names, and flags that are switched on."""
+    for name, value in settings.items():
+        if name == "jacobian":
+            option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{value.upper()}")
+        elif name == "enabled":
+            bits = members_of(mujoco, "mjtEnableBit", "mjENBL_")
+            option.enableflags = sum(bits[flag] for flag in value)
+        else:
+            setattr(option, name, value)
 
 
 def option_settings(mujoco: Any, model: Any) -> list[Setting]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.mujoco.matched import AGREED
-from adapters.mujoco.options import CARRIED
+from adapters.mujoco.options import CARRIED, ENUMERATED, own_kinds
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
 from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, finite
@@ -185,14 +185,19 @@ def check_settings(settings: Mapping[str, Any]) -> None:
     """
     wanted = NAMES if settings.get("solref") == "reflect" else NAMES - ONLY_REFLECT
     wanted = wanted if ONLY_MATCHED & set(settings) else wanted - ONLY_MATCHED
-    for name in sorted((set(settings) - BROUGHT) ^ wanted):
+    own = own_settings(settings)
+    for name in sorted((set(settings) - BROUGHT - set(own)) ^ wanted):
         raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
     for name, words in WORDS.items():
-        if settings[name] not in words:
+        # The release that is installed may have a word that no profile uses.
+        if settings[name] not in words and (name not in ENUMERATED or own_kinds()[name](settings[name])):
             raise EngineError(f"{name}: {settings[name]!r} must be one of {', '.join(map(str, words))}")
     for name, (low, whole) in NUMBERS.items():
         if name in settings:
             _check_number(name, settings[name], low, whole)
+    for name, value in own.items():
+        if said := own_kinds()[name](value):
+            raise EngineError(f"{name}: {value!r} must be {said}")
     _check_brought(settings)
     _check_row("solimp", settings["solimp"], 5)
     if settings["solref"] != "reflect":
@@ -201,6 +206,12 @@ def check_settings(settings: Mapping[str, Any]) -> None:
         _check_solref("solreffriction", settings["solreffriction"])
         if settings["cone"] != "elliptic":
             raise EngineError("solreffriction: acts on elliptic cones only")
+
+
+def own_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that no profile and no model states: options of the release that is installed."""
+    others = set(settings) - NAMES - BROUGHT
+    return {name: settings[name] for name in sorted(others) if name in own_kinds()}
 
 
 def _check_brought(settings: Mapping[str, Any]) -> None:

@@ -108,6 +108,7 @@ class Mjcf:
         self._root = ElementTree.Element("mujoco")
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
         self._contact = ElementTree.Element("contact")
+        self._actuator = ElementTree.Element("actuator")
         self.stat = SimpleNamespace(meaninertia=None)
         self._meshes: list[ElementTree.Element] = []
         self._keys: list[ElementTree.Element] = []
@@ -118,6 +119,18 @@ class Mjcf:
         if not any(given.get("solreffriction", ())):
             given.pop("solreffriction", None)  # MuJoCo's own way of saying: as solref
         ElementTree.SubElement(self._contact, "pair", _text(given))
+
+    def add_load(self, name: str, wrench: tuple[float, ...]) -> None:
+        """Push a free body with a constant force and torque, (6,) world axes [N, N m].
+
+        An actuator without gain whose bias is 1: its gear is what acts. ``jointinparent`` means world axes.
+        """
+        joint = self.worldbody.element.find(f"body[@name='{name}']/freejoint")
+        assert joint is not None
+        joint.set("name", f"{name} joint")
+        law = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine", "biasprm": "1 0 0"}
+        given = {"name": f"{name} load", "jointinparent": f"{name} joint", "gear": _written(wrench), **law}
+        ElementTree.SubElement(self._actuator, "general", given)
 
     def add_key(self, **attributes: Any) -> None:
         """Add a state to start from."""
@@ -136,21 +149,23 @@ class Mjcf:
         ElementTree.SubElement(self._root, "compiler", {"angle": "radian"})
         said = dict(vars(self.option))
         mj = self._mujoco
-        flags = int(said.pop("disableflags", 0))
+        flags, enabled = int(said.pop("disableflags", 0)), int(said.pop("enableflags", 0))
         said["integrator"] = mj.mjtIntegrator(said["integrator"]).name.removeprefix("mjINT_")
-        said["integrator"] = {"EULER": "Euler"}.get(said["integrator"], said["integrator"])
-        if said["integrator"].startswith("IMPLICIT"):
-            said["integrator"] = said["integrator"].lower()
+        said["integrator"] = {"EULER": "Euler", "RK4": "RK4"}.get(said["integrator"], said["integrator"].lower())
         said["cone"] = mj.mjtCone(said["cone"]).name.removeprefix("mjCONE_").lower()
+        if "jacobian" in said:
+            said["jacobian"] = mj.mjtJacobian(said["jacobian"]).name.removeprefix("mjJAC_").lower()
         if "solver" in said:
             solver = mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_")
             said["solver"] = {"NEWTON": "Newton"}.get(solver, solver)
         option = ElementTree.SubElement(self._root, "option", _text(said))
         members = mj.mjtDisableBit.__members__.values()  # one of them is their number
-        bits = [bit for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
-        if bits:
-            names = [bit.name.removeprefix("mjDSBL_").lower() for bit in bits]
-            ElementTree.SubElement(option, "flag", dict.fromkeys(names, "disable"))
+        off = [bit.name for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
+        on = [bit.name for bit in mj.mjtEnableBit.__members__.values() if int(bit) & enabled]
+        if off or on:
+            said = {name.removeprefix("mjDSBL_").lower(): "disable" for name in off}
+            said |= {name.removeprefix("mjENBL_").lower(): "enable" for name in on}
+            ElementTree.SubElement(option, "flag", said)
         if self.stat.meaninertia is not None:
             ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
         if self._meshes:
@@ -159,6 +174,8 @@ class Mjcf:
         self._root.append(self.worldbody.element)
         if len(self._contact):
             self._root.append(self._contact)
+        if len(self._actuator):
+            self._root.append(self._actuator)
         if self._keys:
             ElementTree.SubElement(self._root, "keyframe").extend(self._keys)
         ElementTree.indent(self._root)

@@ -21,13 +21,11 @@ def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> st
     Raises
     ------
     EngineError
-        For an external load, a course or a loop around the solver: a model has no word for them.
+        For a course, a face that moves or a loop around the solver: a model has no word for them.
     """
     if "rounds" in settings:
         raise EngineError("rounds: MJCF has no word for a loop around the solver; python has")
     for body in scene.bodies:
-        if body.motion == "free" and any((*body.force, *body.torque)):
-            raise EngineError(f"{body.name}.force: MJCF has no word for an external load; python has")
         if body.course is not None or any(body.surface_velocity) or is_moved_face(body):
             raise EngineError(f"{body.name}: MJCF has no word for a course, a face that moves or a surface that runs")
     return _model(scene, dt, settings, True)
@@ -41,6 +39,9 @@ def _model(scene: Scene, dt: float, settings: Mapping[str, Any], key: bool) -> s
     Spec(scene, dt, settings, written)
     written.stat.meaninertia = mean_inertia(scene)
     if key:
+        for i, body in enumerate(scene.bodies):
+            if body.is_loaded:
+                written.add_load(f"body{i}", (*body.force, *body.torque))
         qpos, qvel = start(scene, dt)
         written.add_key(name="start", qpos=qpos, qvel=qvel)
     return written.text()

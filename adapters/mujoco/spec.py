@@ -11,7 +11,9 @@ import numpy as np
 from adapters.drives import velocity_over
 from adapters.engine import Array, EngineError
 from adapters.mujoco.moving import is_moved_face
+from adapters.mujoco.options import set_own
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
+from adapters.mujoco.profiles import own_settings
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
@@ -61,8 +63,7 @@ class Spec:
 
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
         self.spec = spec or empty_spec(mujoco)
-        pairs = list(scene.contact_pairs())
-        materials = {(material.restitution, material.friction) for _, _, material in pairs}
+        materials = scene.materials()
         #: Softness of pairs that have one of their own: solref, solimp, solreffriction, margin.
         self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
         one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
@@ -75,7 +76,7 @@ class Spec:
         for index, body in enumerate(scene.bodies):
             self._body(index, body)
         if self.shared is None:
-            for a, b, material in pairs:
+            for a, b, material in scene.contact_pairs():
                 self._pair(a, b, material.restitution, material.friction)
 
     def _options(self) -> None:
@@ -91,6 +92,7 @@ class Spec:
             option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{name.upper()}"))
         if "solver" in settings:
             option.solver = getattr(mj.mjtSolver, f"mjSOL_{settings['solver'].upper()}")
+        set_own(mj, option, own_settings(settings))
 
     def _body(self, index: int, body: Body) -> None:
         world = self.spec.worldbody

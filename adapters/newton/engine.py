@@ -16,7 +16,7 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.means import means
 from adapters.needs import Needs
-from adapters.newton.profiles import PROFILES, TUNED_ITERATIONS, checked
+from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS, checked
 from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
 from adapters.newton.simulation import NewtonSimulation, imported
@@ -94,6 +94,7 @@ class NewtonEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -107,6 +108,10 @@ class NewtonEngine(Engine):
             if means(scene, coefficient) is None:
                 return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
         return without_a_place(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

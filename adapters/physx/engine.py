@@ -16,7 +16,7 @@ from typing import Any, final
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
 from adapters.means import means
 from adapters.needs import Needs
-from adapters.physx.profiles import PROFILES, checked
+from adapters.physx.profiles import KINDS, PROFILES, checked
 from adapters.physx.script import python
 from adapters.physx.shipped import ANGULAR_DAMPING, BOUNCE_THRESHOLD
 from adapters.physx.simulation import PhysxSimulation
@@ -94,6 +94,7 @@ class PhysxEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
     expected = (
         Expected(
@@ -117,6 +118,10 @@ class PhysxEngine(Engine):
             if means(scene, coefficient) is None:
                 return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
         return without_a_place(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

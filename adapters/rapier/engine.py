@@ -15,7 +15,7 @@ from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
-from adapters.rapier.profiles import PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
+from adapters.rapier.profiles import KINDS, PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
 from adapters.rapier.releases import RELEASES
 from adapters.rapier.script import python
 from adapters.rapier.simulation import RapierSimulation
@@ -83,6 +83,7 @@ class RapierEngine(Engine):
     )
     profiles = PROFILES
     releases = RELEASES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -94,6 +95,10 @@ class RapierEngine(Engine):
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that single precision cannot hold."""
         return without_a_place(scene)
+
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        checked(settings)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world.

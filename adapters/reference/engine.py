@@ -23,9 +23,9 @@ import numpy as np
 from adapters.drives import as_moving
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
-from adapters.probes import GRAVITY, SLIDE_TIME, slide_speed
+from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
-from adapters.reference.profiles import PROFILES, SOURCE
+from adapters.reference.profiles import KINDS, PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
@@ -65,6 +65,7 @@ class ReferenceEngine(Engine):
         ),
     )
     profiles = PROFILES
+    kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
@@ -97,6 +98,13 @@ class ReferenceEngine(Engine):
             return None
         return overlap_at_the_start(scene) or too_far_at_the_start(scene)
 
+    def check_settings(self, settings: Mapping[str, Any]) -> None:
+        """See `Engine.check_settings`."""
+        try:
+            _checked(settings, 1.0)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise EngineError(str(error).splitlines()[0]) from None
+
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; see `Engine.build`.
 
@@ -105,16 +113,8 @@ class ReferenceEngine(Engine):
         EngineError
             For a model or a setting that the solver refuses, or a setting it does not have.
         """
-        from reference_solver import Settings
-
-        known = [field.name for field in fields(Settings) if field.name != "dt"]
-        for name, value in settings.items():
-            if name not in known:
-                raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
-            if isinstance(value, int) and value > LARGEST:
-                raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
         try:
-            return ReferenceSimulation(scene, solver_model(scene), Settings(dt=dt, **settings))
+            return ReferenceSimulation(scene, solver_model(scene), _checked(settings, dt))
         except (ValueError, TypeError) as error:
             raise EngineError(str(error).splitlines()[0]) from error
         except OverflowError as error:
@@ -159,8 +159,9 @@ class ReferenceEngine(Engine):
         fixed = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}["residual"] is None
         if not fixed or needs.dimension == 2 or not needs.restitution > 0.0 < needs.friction:
             return {}
-        slowest = slide_speed(needs.friction) - needs.friction * GRAVITY * SLIDE_TIME
-        share = 0.5 * ((1.0 + needs.restitution) * GRAVITY * dt / slowest) ** 2
+        load = slide_load(needs.friction)
+        slowest = slide_speed(needs.friction) - needs.friction * load * SLIDE_TIME
+        share = 0.5 * ((1.0 + needs.restitution) * load * dt / slowest) ** 2
         because = "a box that fixed sweeps let rock slips aside at its corners, by (1 + e) g dt: 1 - cos of friction"
         band = (0.5 * share + FRICTION_SHARE) * needs.friction
         told = Declared((1.0 - 0.5 * share) * needs.friction, band, because)
@@ -176,6 +177,27 @@ class ReferenceEngine(Engine):
         """Python: the solver's settings."""
         changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
         return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
+
+
+def _checked(settings: Mapping[str, Any], dt: float) -> Any:
+    """Settings of the solver for steps of ``dt`` [s].
+
+    Raises
+    ------
+    EngineError
+        For a setting that it does not have, or a whole number that a kernel cannot hold.
+    ValueError, TypeError, OverflowError
+        For a value that it refuses.
+    """
+    from reference_solver import Settings
+
+    known = [field.name for field in fields(Settings) if field.name != "dt"]
+    for name, value in settings.items():
+        if name not in known:
+            raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
+        if isinstance(value, int) and value > LARGEST:
+            raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
+    return Settings(dt=dt, **settings)
 
 
 def _package_version() -> str:

@@ -46,6 +46,9 @@ EXPERIMENTS += tuple(
         ("penetration", 1),
         ("interface_impulse[5]", 1),
         ("impulse_scatter", 1),
+        ("load[least]", 1),
+        ("load[greatest]", 1),
+        ("unbalanced", 1),
     )
 ) + tuple(
     Experiment(
@@ -69,7 +72,7 @@ EXPERIMENTS += tuple(
             1000,
             ("settle_time", "drift", "penetration", "kinetic_energy", "interface_impulse[1]"),
         ),
-        ("pinch-starved", "pinch", {"margin": 100.0}, 3, 1000, ("creep", "turned", "grip", "carried")),
+        ("pinch-starved", "pinch", {"margin": 100.0}, 3, 1000, ("creep", "turned", "grip", "carried", "unbalanced")),
     )
     for metric in metrics
 )

@@ -7,6 +7,7 @@ and where slides end
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from types import MappingProxyType
@@ -14,6 +15,7 @@ from typing import Any
 
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
+from adapters.settings import LARGEST_INT, Check, either, flag, number, whole, word
 
 SOURCE = "reference_solver/README.md"
 #: Why each of the solver's settings has its value; the values themselves are the solver's own.
@@ -60,4 +62,22 @@ def _as_settings(chosen: Any) -> list[Setting]:
     ]
 
 
+#: What a setting may be; the solver's own `Settings` says more of each.
+KINDS: Mapping[str, Check] = MappingProxyType(
+    {
+        "iterations": whole(1, LARGEST_INT),
+        "residual": either(number(0.0, 1.0), None),
+        "max_sweeps": whole(1, LARGEST_INT),
+        "relaxation": either(number(0.0, 2.0), None),
+        "position_correction": word("split", "baumgarte", "none"),
+        "beta": number(0.0, 1.0),
+        "slop": number(0.0, math.inf),
+        "warm_starting": flag,
+        "solver": word("scalar", "block"),
+        "margin": number(0.0, 0.1),
+        "direct": flag,
+        "scheme": word("fixed", "located", "midpoint"),
+        "accuracy": number(1e-12, 1e-4),
+    }
+)
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"classical": classical_profile, "reference": reference_profile})

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts, Recorded, Simulation
+from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 
 
@@ -50,7 +51,13 @@ def solver_model(scene: Scene) -> Any:
 
     n = len(scene.bodies)
     restitution, friction = np.zeros((n, n)), np.zeros((n, n))
-    for i, j, material in scene.contact_pairs():
+    materials = scene.materials()
+    if len(materials) == 1:  # without a look at every pair
+        free = np.array([body.motion == "free" for body in scene.bodies])
+        restitution[:], friction[:] = materials.pop()
+        for table in (restitution, friction):
+            table[np.outer(~free, ~free) | np.eye(n, dtype=bool)] = 0.0
+    for i, j, material in scene.contact_pairs() if materials else ():
         restitution[i, j] = restitution[j, i] = material.restitution
         friction[i, j] = friction[j, i] = material.friction
     return model.Model(
@@ -109,7 +116,7 @@ class ReferenceSimulation(Simulation):
                     "restitution": float(self.model.restitution[i, j]),
                     "friction": float(self.model.friction[i, j]),
                 }
-                for i, j, _ in self.scene.contact_pairs()
+                for i, j in told_pairs(self.scene)
             },
             "left_out": list(self.solver.left_out),
         }

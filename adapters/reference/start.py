@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 
+from adapters.near import near_pairs
 from adapters.scene import HalfSpace, Scene
-from adapters.shapes import reach
 
 
 def too_far_at_the_start(scene: Scene) -> str | None:
@@ -42,14 +40,8 @@ def overlap_at_the_start(scene: Scene) -> str | None:
     from reference_solver.certification.geometry import gap
 
     limit = next(gate.limit for gate in GATES if gate.name == "start_overlap")
-    around = [np.inf if isinstance(body.shape, HalfSpace) else reach(body.shape) for body in scene.bodies]
-    place = np.array([body.pose[: scene.dimension] for body in scene.bodies])
-    for i, j in combinations(range(len(scene.bodies)), 2):
+    for i, j in near_pairs(scene, np.array([[body.pose for body in scene.bodies]])):
         first, second = scene.bodies[i], scene.bodies[j]
-        if "free" not in (first.motion, second.motion):
-            continue
-        if float(np.linalg.norm(place[i] - place[j])) > around[i] + around[j]:
-            continue
         poses = (np.array([first.pose]), np.array([second.pose]))
         depth = -float(np.atleast_1d(gap(first.shape, poses[0], second.shape, poses[1]))[0])
         if depth > limit * 0.5 * min(first.shape.smallest_size, second.shape.smallest_size):

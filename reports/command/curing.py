@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import click
 from rich.console import Console
@@ -14,46 +13,64 @@ from rich.text import Text
 from adapters.engine import EngineError
 from adapters.engine_folder import CURES, folder_of
 from adapters.registry import load, profile_of
+from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
-from reports.command.selection import WORKERS
-from reports.cures import cure_paste, cure_text, setting_text
+from reports.command.selection import WORKERS, fixed, scene_names_of
+from reports.cures import changes_in_words, cure_paste, cure_text
 from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
-from validation.catalogue import matching
-from validation.settings.cures import Changes, Cure, Unsearched, cures_of, search, write
+from validation.cells import parse_dt
+from validation.posed import is_file, resolve
+from validation.settings.cures import Cure, Unsearched, cures_of, search, write
 
 
 @main.command()
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="One case: fix a parameter of the scene.")
+@click.option("--dt", metavar="S", help="Step, such as 1/500; that of a model, else 1/240, by default.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--keep", is_flag=True, help="Write what is found into cures.csv of the engine's folder.")
 @AS_JSON
-def cure(engine: str, scenes: tuple[str, ...], dim: tuple[int, ...], jobs: int, keep: bool, as_json: bool) -> None:
+def cure(
+    engine: str,
+    scenes: tuple[str, ...],
+    param: tuple[str, ...],
+    dt: str | None,
+    dim: tuple[int, ...],
+    jobs: int,
+    keep: bool,
+    as_json: bool,
+) -> None:
     """Search which stock settings of ENGINE mend what it gets wrong as shipped on SCENES (all by default).
 
     Each setting alone, pairs with the best one, other profiles with what can be left out of them: what mends most
     checks and breaks none is shown with error and cost before and after, and as lines to paste. Seconds to a minute a
-    scene. With --keep the table of the engine is kept, which `run`, `show`, `explain` and the report read.
+    scene. A scene's standard cells are asked, in two sizes at two steps. With --param, --dt, or a file (a scene, or a
+    model as its own engine runs it) that case alone is, at its step. With --keep the table of the engine is kept,
+    which `run`, `show`, `explain` and the report read.
     """
     if profile_of(engine, "shipped") is None:
         load(engine)  # says that there is no such engine, if so
         raise EngineError(f"cure: {engine} has no profile as shipped that could be mended")
     version = load(engine).version()
-    names = list(dict.fromkeys(scene.name for pattern in scenes or ("*",) for scene in matching(pattern)))
+    names = scene_names_of(scenes)
+    if keep and (param or dt or any(map(is_file, names))):
+        raise SceneError("keep: the table is of scenes of the catalogue as they stand, not of one case")
+    params, step = fixed(param), parse_dt(dt) if dt else None
     console, progress = terminal(), terminal(stderr=True)
     listed = {key: old for key, old in cures_of(engine).items() if old.version == version}
     found: list[Cure] = []
     for name in names:
-        (canonical,) = matching(name)
-        for dimension in canonical.dimensions:
+        for dimension in resolve(name).dimensions:
             if dim and dimension not in dim:
                 continue
+            case = {} if params is None and is_file(name) else params
             progress.print(f"{engine} {name} {dimension}-D", style="dim", markup=False, highlight=False)
-            result = search(engine, name, dimension, jobs)
+            result = search(engine, name, dimension, jobs, case, step)
             listed.pop((name, dimension), None)
             if isinstance(result, Cure):
                 listed[name, dimension] = result
@@ -95,17 +112,26 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     costs = [duration(cost) if cost else "-" for cost in (found.cost_before, found.cost_after)]
     table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
     console.print(table, highlight=False)
-    for name, value in found.changes.items():
-        console.print(f"  {name} = {setting_text(value)}", markup=False, highlight=False, soft_wrap=True)
+    if found.alone:
+        told = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
+        left = f"{found.metric} {number(found.before, 4)} -> {number(found.alone_after, 4)}"
+        console.print(f"one setting alone: {told}: {left}", markup=False, highlight=False, soft_wrap=True)
+        console.print(Text(cure_paste(replace(found, changes=found.alone))), soft_wrap=True)
+        console.print(
+            f"what mends {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
+        )
+    for name, value in changes_in_words(found, found.changes):
+        console.print(f"  {name} = {value}", markup=False, highlight=False, soft_wrap=True)
     if found.profile:
         console.print(f"  profile {found.profile} has all of it", markup=False, highlight=False)
     if found.others:
-        console.print(f"  or alone: {_alternatives(found.others)}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"  or alone: {_alternatives(found)}", markup=False, highlight=False, soft_wrap=True)
     paste = cure_paste(found)
     if paste:
         console.print("to paste:", style="bold")
         console.print(Text(paste), soft_wrap=True)
 
 
-def _alternatives(others: Sequence[Changes]) -> str:
-    return "; ".join(", ".join(f"{name} = {setting_text(value)}" for name, value in each.items()) for each in others)
+def _alternatives(found: Cure) -> str:
+    told = (changes_in_words(found, each) for each in found.others)
+    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in told)

@@ -9,18 +9,21 @@ from typing import Any
 
 import click
 
-from adapters import registry
+from adapters import own_settings, registry
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import FILE, FOLDER, writable
 from reports.command.files import folder as writable_folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
-from reports.command.selection import parameter
-from validation.cells import MOST_ITERATIONS, Slot, parse_dt
+from reports.command.selection import SET, parameter
+from validation.cells import MOST_ITERATIONS, Slot, parse_dt, settings_of
 from validation.posed import is_file, pinned, resolve
 from validation.records.store import Store
 from validation.running.plan import QUICK_DT
+
+#: Options that choose a cell to write.
+_OF_A_CELL = ("output", "engine", "profile", "param", "set", "dim", "dt", "iterations")
 
 
 @main.command()
@@ -32,6 +35,7 @@ from validation.running.plan import QUICK_DT
 @click.option("--engine", metavar="E", shell_complete=engine_names, help="Engine of the cell.")
 @click.option("--profile", metavar="P", help="Profile of the cell; as shipped by default.")
 @click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
+@SET
 @click.option("--dim", type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
 @click.option("--dt", metavar="S", help="Step, such as 1/240.")
 @click.option("--iterations", type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count.")
@@ -46,7 +50,7 @@ def export(named: tuple[str, ...], as_json: bool, out: Path, **options: Any) -> 
     if (options["target"] is None) == (options["form"] is None):
         raise SceneError("export: say --parquet FOLDER for results, or --to FORMAT for a cell")
     if options["form"] is None:
-        stray = [name for name in ("output", "engine", "profile", "param", "dim", "dt", "iterations") if options[name]]
+        stray = [name for name in _OF_A_CELL if options[name]]
         if stray:
             raise SceneError(f"{stray[0]}: chooses a cell to write, which needs --to")
         _results(named, options["target"], options["every"], as_json, out)
@@ -98,8 +102,12 @@ def _slot(scene: str, options: dict[str, Any]) -> Slot:
     canonical = resolve(name)
     own = [d for d in canonical.dimensions if d in engine.facts.dimensions]
     dimension = options["dim"] or (own or list(canonical.dimensions))[0]
-    profile = options["profile"] or engine.facts.profile("shipped") or next(iter(engine.profiles))
+    brings = canonical.brings.get(options["engine"]) if options["set"] else None
+    shipped = brings.profile if brings else engine.facts.profile("shipped")
+    profile = options["profile"] or shipped or next(iter(engine.profiles))
     params = canonical.minimal(dict(map(parameter, options["param"])))
     brought = canonical.brought(options["engine"], profile)
     dt = parse_dt(options["dt"]) if options["dt"] else brought.dt if brought else QUICK_DT
-    return Slot(name, params, dimension, options["engine"], profile, dt, options["iterations"])
+    slot = Slot(name, params, dimension, options["engine"], profile, dt, options["iterations"])
+    stock = settings_of(engine, slot, canonical.scene(dimension, dict(params)))
+    return slot.with_own(own_settings.own(engine, own_settings.given(options["set"]), stock))

@@ -20,10 +20,10 @@ from reports.command import statuses
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import JOBS, SECONDS, request_from
+from reports.command.selection import JOBS, SECONDS, SET, request_from
 from reports.stages import say
 from reports.terminal import terminal
-from reports.wording import plural
+from reports.wording import plural, profile_words
 from validation.canonical import SUITES
 from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
 from validation.records.store import Store
@@ -42,6 +42,7 @@ def _cells(command: Command) -> Command:
     options = (
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
+        SET,
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
         click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
         click.option(
@@ -217,7 +218,7 @@ def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene:
 def _commands(engine: str, before: str, after: str, slot: Slot, out: Path) -> list[str]:
     """What reproduces the two cells: run both, compare both."""
     name, _, _ = slot.scene.rpartition("@")
-    parts = ["crosscheck", "releases", engine, f"{before},{after}", name or slot.scene, "--profile", slot.profile]
+    parts = ["crosscheck", "releases", engine, f"{before},{after}", name or slot.scene, *profile_words(slot)]
     parts += ["--dim", str(slot.dimension), "--dt", format_dt(slot.dt)]
     if slot.iterations is not None:
         parts += ["--iterations", str(slot.iterations)]

@@ -48,6 +48,7 @@ from validation.workers import TIMEOUT, run_cells
 @CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
 @click.option("--drop", is_flag=True, help="Leave out of a model what has no place in a scene, and say so.")
+@click.option("--strict", is_flag=True, help="Exit with 1 for every FAIL, listed or not, and every INVALID.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
@@ -60,7 +61,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     out of reach, in the same and in a fresh process; exits with 1 if that changes an answer.
 
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
-    if not all of it ran. FAILs of a model, of which nothing is listed, are shown and are no alarm.
+    if not all of it ran. A number that a scene file states and an engine misses is new. Of models, and of engines that
+    have no list of findings, FAIL and INVALID are shown and are no alarm. With --strict any FAIL or INVALID is one.
     """
     console = terminal(stderr=True)
     for name in ("junit", "markdown"):
@@ -103,7 +105,8 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    sys.exit(statuses.verdict(any(row.alarming for row in rows), done.finished and not absent))
+    alarm = any(row.failing if options["strict"] else row.alarming for row in rows)
+    sys.exit(statuses.verdict(alarm, done.finished and not absent))
 
 
 def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
@@ -115,7 +118,7 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
         options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
     if as_json:
         click.echo(exports.as_json(plain))
-    show(plain, console, files=written.values())
+    show(plain, console, files=written.values(), out=out)
 
 
 @main.command("compile")

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import click
 
 from adapters import registry
+from adapters.own_settings import given
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from validation.canonical import SUITES, Suite
 from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.posed import is_file, pinned
-from validation.running.plan import Request
+from validation.running.plan import Request, knowing
 
 
 class _Seconds(click.ParamType):
@@ -47,6 +49,12 @@ MOST_JOBS = 4096
 JOBS = click.IntRange(0, MOST_JOBS)
 #: Where one worker is the rule, and none would mean nothing.
 WORKERS = click.IntRange(1, MOST_JOBS)
+
+
+#: Settings of a user's own.
+SET = click.option(
+    "--set", multiple=True, metavar="NAME=VALUE", help="Set a setting of the engine; shown as a profile of that name."
+)
 
 
 def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
@@ -83,17 +91,18 @@ def parameter(text: str) -> tuple[str, float]:
         raise SceneError(f"param: {name}={value!r} is not a number") from None
 
 
-def _once(texts: Sequence[str]) -> dict[str, float]:
-    """Parameters that are fixed; of two values for one of them neither is what was asked for."""
+def fixed(texts: Sequence[str]) -> dict[str, float] | None:
+    """Parameters that are fixed, None if none is; of two values for one of them neither is what was asked for."""
     found: dict[str, float] = {}
     for name, value in map(parameter, texts):
         if name in found:
             raise SceneError(f"param: {name} is given twice; crosscheck sweep --grid asks several values")
         found[name] = value
-    return found
+    return found or None
 
 
-def _scene_names(arguments: Sequence[str], drop: bool = False) -> list[str]:
+def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
+    """Names of the scenes that are meant: of the catalogue by name or pattern (all by default), and files, pinned."""
     names: list[str] = []
     for argument in arguments or ["*"]:
         names += [pinned(argument, drop)] if is_file(argument) else [scene.name for scene in matching(argument)]
@@ -107,18 +116,20 @@ def request_from(options: dict[str, Any]) -> Request:
     for name in options["engine"]:
         registry.find(name)
     dimensions = list(options["dim"])
-    return Request(
-        scenes=_scene_names(options["scenes"], options.get("drop", False)),
+    request = Request(
+        scenes=scene_names_of(options["scenes"], options.get("drop", False)),
         engines=list(options["engine"]) or registry.usual(),
         profiles=list(options["profile"]),
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
-        params=_once(options["param"]) or None,
+        params=fixed(options["param"]),
         suite=suite,
         ulps=tuple(options["ulp"]) or (0,),
         floors=suite == "full" and not options["ulp"],
+        sets=given(options["set"]),
     )
+    return replace(request, engines=knowing(request)) if request.sets and not options["engine"] else request
 
 
 def _suite(options: dict[str, Any]) -> Suite:
@@ -131,7 +142,7 @@ def _suite(options: dict[str, Any]) -> Suite:
 
 def asked(request: Request, options: dict[str, Any]) -> str:
     """Words that ask for these cells but their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
-    names = ("param", "engine", "profile", "dim", "dt", "iterations", "ulp")
+    names = ("param", "engine", "profile", "set", "dim", "dt", "iterations", "ulp")
     narrowing = [word for name in names for value in options[name] for word in (f"--{name}", str(value))]
     return shlex.join([*request.scenes, *narrowing])
 
@@ -149,6 +160,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             help="Only this engine (repeat for more).",
         ),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
+        SET,
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
         click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
         click.option(

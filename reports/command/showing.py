@@ -14,19 +14,22 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from adapters.own_settings import given, suffix_of
 from adapters.scene import SceneError
 from reports import speed
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
-from reports.cures import Change, changes, how_measured, pasteable, told_cure
-from reports.findings import ALARMING, Family, families, grouped, severity
+from reports.command.selection import SET
+from reports.cures import Change, changes, fix, how_measured, told_cure
+from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.terminal import terminal
 from reports.wording import (
     LABELS,
+    at,
     mark_of,
     measured,
     missing_text,
@@ -39,7 +42,7 @@ from reports.wording import (
 )
 from validation.bench import reading
 from validation.cells import Observation, Slot, checks_of
-from validation.judging.rows import rows_of
+from validation.judging.rows import is_alarming, rows_of
 from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
@@ -126,7 +129,7 @@ def show(run: str, every: bool, as_json: bool, out: Path) -> None:
         click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
-    show_summary(rows, console, costs, every=every)
+    show_summary(rows, console, costs, every=every, out=out)
     kept.say_missing()
     report = out / "report.html"
     if report.is_file():
@@ -183,7 +186,7 @@ def findings(
     # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
-        rows = [row for row in rows if mark_of(row) in ALARMING]
+        rows = [row for row in rows if is_alarming(row)]
     if every:
         chosen = [row for _, group in grouped(rows) for row in group]
         if as_json:
@@ -195,7 +198,7 @@ def findings(
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails")
+    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails", out)
 
 
 def _grid(*headings: str) -> Table:
@@ -205,7 +208,7 @@ def _grid(*headings: str) -> Table:
     return table
 
 
-def _print_families(found: Sequence[Family], console: Console, nothing: str) -> None:
+def _print_families(found: Sequence[Family], console: Console, nothing: str, out: Path | None = None) -> None:
     if not found:
         console.print(nothing)
         return
@@ -221,11 +224,12 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str) -> 
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
-    console.print(Text("crosscheck explain ID says everything about a row; --all lists every row."), style="dim")
+    said = f"crosscheck explain ID{at(out)} says everything about a row; --all lists every row."
+    console.print(Text(said), style="dim")
 
 
 def _worst(row: Plain) -> str:
-    if row["value"] is None:
+    if not has_answer(row):
         return f"{row['dimension']}-D {row['metric']}: {row['reason']}"
     asked = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
     where = " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), asked) if text)
@@ -248,19 +252,21 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
 @main.command()
 @click.argument("row", shell_complete=row_ids)
 @click.option("--run", default="latest", show_default=True, help="Which run.")
+@SET
 @AS_JSON
 @OUT
-def explain(row: str, run: str, as_json: bool, out: Path) -> None:
+def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) -> None:
     """Say everything about one ROW: what was asked and measured, the truth, the tolerance and why, what cures it.
 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
-    row there; SCENE may be the path of a scene file.
+    row there; SCENE may be the path of a scene file. With --set the row is that of PROFILE with these settings.
     """
+    row = _with_own(row, set)
     kept = observed(out, run)
     observations = _where(kept.observations, row)
     rows = judged(kept.run, observations)
     found = find_row(rows, row)
-    better, paste, differing = _cure(rows, observations, found)
+    better, paste, said, differing = _cure(rows, observations, found)
     if as_json:
         plain = [
             {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
@@ -282,7 +288,22 @@ def explain(row: str, run: str, as_json: bool, out: Path) -> None:
             )
         )
         return
-    _print_explanation(found, _beside_the_plane(rows, found), better, paste, differing, terminal())
+    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, terminal())
+
+
+def _with_own(row: str, sets: Sequence[str]) -> str:
+    """The row's name, with the profile that has these settings.
+
+    Raises
+    ------
+    SceneError
+        If ``row`` is an id, which has settings or has none.
+    """
+    engine, slash, rest = row.partition("/")
+    profile, more, where = rest.partition("/")
+    if sets and not (slash and more):
+        raise SceneError(f"set: names a profile; say ENGINE/PROFILE/SCENE in the place of {row!r}")
+    return f"{engine}{slash}{profile}{suffix_of(given(sets))}{more}{where}"
 
 
 def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
@@ -359,19 +380,20 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
     return next(row for row in rows if row_id(row).startswith(name.lower()))
 
 
-def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, list[Change]]:
-    """A profile of the same engine that passes this very row, its settings to paste, and what it changes."""
+def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:
+    """A profile of the same engine that passes this very row, lines to paste and what they are, and what it changes."""
     if mark_of(row) == "pass":
-        return "", "", []
+        return "", "", "", []
     same = ("engine", "scene", "dimension", "params", "dt", "metric")
     good = [
         other["profile"] for other in rows
         if other["physics"] == "pass" and other["iterations"] is None and all(other[n] == row[n] for n in same)
     ]  # fmt: skip
-    if not good or good[0] == row["profile"]:
-        return "", "", []
-    where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], good[0])
-    return good[0], pasteable(*where, row["slot"]["params"]), changes(*where)
+    better = good[0] if good and good[0] != row["profile"] else ""
+    where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], better)
+    params = row["slot"]["params"]
+    paste, said = fix(row, observations, better)
+    return better, paste, said, changes(*where, params) if better else []
 
 
 def skill_text(row: Plain) -> str:
@@ -396,8 +418,15 @@ def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
     return ""
 
 
+def _measured_text(row: Plain) -> str:
+    if row["value"] is None:
+        return f"no value: {row['reason']}"
+    text = f"{row['metric']} = {measured(row, 8)}"
+    return text if has_answer(row) else f"{text}, which does not count: the measurement is broken"
+
+
 def _print_explanation(
-    row: Plain, beside: str, better: str, paste: str, differing: Sequence[Change], console: Console
+    row: Plain, beside: str, better: str, fixed: tuple[str, str], differing: Sequence[Change], console: Console
 ) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
     asked = ", ".join(filter(None, (f"{row['scene']} {row['dimension']}-D", params_text(row["params"]))))
@@ -409,10 +438,7 @@ def _print_explanation(
         ("row", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
         ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
         ("asked", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
-        (
-            "measured",
-            f"{row['metric']} = {measured(row, 8)}" if row["value"] is not None else f"no value: {row['reason']}",
-        ),
+        ("measured", _measured_text(row)),
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
@@ -430,7 +456,8 @@ def _print_explanation(
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
     console.print(table)
-    if paste:
+    paste, said = fixed
+    if said:
         console.print()
-        console.print(Text("to paste:", style="bold"))
+        console.print(Text(said, style="bold"))
         console.print(Text(paste), soft_wrap=True)

@@ -45,7 +45,7 @@ SEEN = 30
 def render(source: Source) -> str:
     """Return the page of ``source`` as HTML text."""
     style = Markup(
-        _text("page.css") + engine_style(source.engines) + symbols(source.columns)
+        _text("page.css") + engine_style(list(dict(source.named))) + symbols(source.named)
     )  # ours: nothing in it comes from a run
     script = Markup("\n".join(_text(name) for name in SCRIPTS))
     wrong = answers(source.rows)
@@ -57,7 +57,7 @@ def render(source: Source) -> str:
         .get_template("page.html.j2")
         .render(
             source=source,
-            places={column: k for k, column in enumerate(source.columns)},
+            places={column: k for k, column in enumerate(source.named)},
             policy=policy(style, script),
             style=style,
             script=script,

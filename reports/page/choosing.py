@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters.registry import is_ranked, profile_of
-from reports.cures import ROLES, Change, changes, how_measured, pasteable
+from reports.cures import ROLES, Change, changes, fix, how_measured
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
@@ -180,6 +180,7 @@ def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
 class Cure:
     """An engine as shipped on one scene, and the profile that does better, with what it changes.
 
+    ``pasted`` says what the lines in ``paste`` are, or why there are none.
     ``like`` is the scene beside which the same changes stand already, where there is one.
     """
 
@@ -195,6 +196,7 @@ class Cure:
     after_text: str
     changes: list[Change]
     paste: str
+    pasted: str
     measured: str
     like: str = ""
 
@@ -235,7 +237,7 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
         scene, dimension, engine, shipped, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
         sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # what matters stands first
-        pasteable(source.observations, scene, dimension, engine, shipped, better),
+        *fix(worst, source.observations, better),
         how_measured(engine, scene, dimension, shipped, better),
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from adapters.registry import is_ranked
 from reports.answers import answers as answers_of
+from reports.findings import has_answer
 from reports.page.source import Source
 from reports.page.verdicts import (
     ALARMS,
@@ -165,7 +166,7 @@ def _row_text(row: Plain) -> str:
     name = f"{row['engine']}/{row['profile']} on {row['scene']} {row['dimension']}-D"
     where = where_text(row)
     head = f"{name}{' with ' + where if where else ''}, {row['metric']}"
-    if row["value"] is None:
+    if not has_answer(row):
         return f"{head}: {row['reason'] or row['outcome']}"
     ratio = ratio_of(row)
     off = f", {times(ratio)} tolerances off" if ratio is not None else ""

@@ -76,6 +76,12 @@ class Source:
         object.__setattr__(self, "lines", tuple(lines))
 
     @property
+    def named(self) -> list[tuple[str, str]]:
+        """Engines and profiles that the page names: those of the rows, then those that only the bench has."""
+        timed = [(o.slot.engine, o.slot.profile) for o in self.bench.observations] if self.bench else []
+        return list(dict.fromkeys([*self.columns, *timed]))
+
+    @property
     def engines(self) -> list[str]:
         """Engines in the order of the rows."""
         return list(dict.fromkeys(engine for engine, _ in self.columns))

@@ -756,3 +756,14 @@ def test_when_a_ball_rests_as_shipped_round_off_decides_in_the_law_as_in_bullet(
     assert min(times) - dt <= found <= max(times) + dt
     steady = {laws._measured(scene, dt, canonical.measure, better, by)["rest_time"][0] for by in moved[::8]}
     assert max(steady) - min(steady) <= dt
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3, 5e-3, -5e-3])
+def test_a_table_that_no_product_gives_is_refused_however_near_one_it_is(off: float) -> None:
+    """Four balls that can all meet have six pairs and four factors: one pair that is off leaves no product."""
+    balls = [ball(0.5 + k, (0.0, 0.0, 3.0), name=f"b{k}") for k in range(4)]
+    pairs = (Pair(friction=0.5, restitution=0.0), Pair("b0", "b3", friction=0.5 + off, restitution=0.0))
+    scene = scene_of(*balls, pairs=pairs, duration=1.0)
+    found = factors(scene, "friction")
+    assert (found is None) == (off != 0.0)
+    assert off or found == pytest.approx([math.sqrt(0.5)] * 4)

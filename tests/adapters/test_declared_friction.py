@@ -10,7 +10,7 @@ pytest.importorskip("mujoco")
 from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.engine import FRICTION_SHARE, MujocoEngine, _friction
 from adapters.needs import Needs
-from adapters.probes import GRAVITY, SLIDE_TIME, Case, slide
+from adapters.probes import SLIDE_TIME, Case, slide
 from adapters.stepping import step_count
 
 DT = 1 / 240
@@ -29,7 +29,7 @@ def ratio(start):
     settings = {each.name: each.value for each in MujocoEngine().settings("tuned", NEEDS, DT)}
     speed = scene.bodies[1].twist[0] + start
     forwards, upwards, _ = BoxOnFace.of(settings, scene, DT).motion(steps, speed)[-1][1]
-    return (speed - forwards) / (upwards + GRAVITY * steps * DT)
+    return (speed - forwards) / (upwards - scene.gravity[-1] * steps * DT)
 
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-4, 1e-2])

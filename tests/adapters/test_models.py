@@ -311,3 +311,61 @@ def test_it_is_read_in_another_process_and_comes_back_whole():
     assert isinstance(found, Model)
     with pytest.raises(SceneError, match="<include>"):
         read("mujoco", ".xml", '<mujoco><include file="x"/></mujoco>', True)
+
+
+BOX_AND_FLOOR = """<mujoco>{default}<worldbody>
+<geom type="plane" size="5 5 .1"{floor}/>
+<body pos="0 0 .5"><freejoint/>{inertial}<geom type="box" size=".5 .5 .5"{box}/></body>
+</worldbody></mujoco>"""
+INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, ["friction 1 of 2 geoms that state none", "density 1000 kg/m^3 of 1 geom that states neither"]),
+        ({"floor": ' friction=".5"', "box": ' friction=".5"'}, ["density 1000 kg/m^3"]),
+        ({"box": ' friction=".5" mass="1"'}, ["friction 1 of 1 geom that states none"]),
+        ({"default": '<default><geom friction=".3" density="10"/></default>'}, []),
+        ({"inertial": INERTIAL, "box": ' friction=".5"', "floor": ' friction=".5"'}, []),
+    ],
+)
+def test_friction_and_density_that_a_model_leaves_to_mujoco_are_said(given, said):
+    text = BOX_AND_FLOOR.format(**{"default": "", "floor": "", "inertial": "", "box": ""} | given)
+    notes = [note for note in reading.read(text, False).notes if note.startswith(("friction", "density"))]
+    assert len(notes) == len(said)
+    assert all(note.startswith(begin) for note, begin in zip(notes, said, strict=True))
+
+
+PLANE = '<geom type="plane" size="5 5 .1" friction="1"/>'
+OTHERS = [
+    '<freejoint/><geom type="mesh" mesh="gone" friction="1"/>',
+    '<freejoint/><geom type="hfield" hfield="gone"/>',
+    '<freejoint/><geom type="box" size=".1 .1 .1" mass="0"/>',
+    '<freejoint/><geom type="ellipsoid" size=".1 .2 .3"/>',
+]
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
+    """The mesh lies in a file that is not read: its geom goes with it, and the body that had nothing else."""
+    text = (
+        f'<mujoco><asset><mesh name="gone" file="a.stl"/></asset><worldbody>{PLANE}<body name="ball" pos="0 0 1">'
+        f'<freejoint/><geom type="sphere" size=".1" density="1"/></body><body name="part" pos="1 0 1">{other}</body>'
+        "</worldbody></mujoco>"
+    )
+    found = reading.read(text, True)
+    assert [body.name for body in found.scene.bodies if body.motion == "free"] == ["ball"]
+    assert any("'part'" in line for line in found.dropped)
+
+
+def test_a_refusal_names_drop_where_it_helps_and_nowhere_else():
+    text = f'<mujoco><worldbody>{PLANE}<body><freejoint/><geom size=".1" density="1"/></body></worldbody>{{}}</mujoco>'
+    with pytest.raises(SceneError, match=r"; --drop leaves it out$"):
+        read("mujoco", ".xml", text.format("<tendon/>"), False)
+    with pytest.raises(SceneError, match=r"; --drop leaves it out \(2 in all\)$"):
+        read("mujoco", ".xml", text.format('<tendon/><equality><weld body1="a"/></equality>'), False)
+    for drop in (False, True):  # nothing is left that moves
+        with pytest.raises(SceneError) as caught:
+            read("mujoco", ".xml", f"<mujoco><worldbody>{PLANE}</worldbody></mujoco>", drop)
+        assert "--drop" not in str(caught.value)

@@ -11,6 +11,7 @@ from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
 from adapters.receipts import QUANTITIES, _receipt, _starved, receipts
+from adapters.registry import find
 
 DT = 1 / 60
 IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
@@ -433,7 +434,55 @@ def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(toy_class)
     receipts(engine, "default", IMPACT, DT)
     builds.clear()
     receipts(engine, "default", replace(IMPACT, friction=0.25), DT)
-    assert builds == ["probe_landing", "probe_rebound", "probe_slide", "probe_corner"]
+    assert builds == ["probe_rebound", "probe_slide"]
+
+
+class Yielding(ToyEngine):
+    """An engine whose contacts give way the more, the larger their friction: a property of it, not of its adapter."""
+
+    def build(self, scene, dt, settings):
+        simulation = super().build(scene, dt, settings)
+        friction = max(pair.friction for pair in scene.pairs)
+        step = simulation._step
+
+        def softer(dt):
+            before = simulation.twists.copy()
+            step(dt)
+            simulation.twists[1:] = before[1:] + (simulation.twists[1:] - before[1:]) / (1.0 + 10.0 * friction)
+
+        simulation._step = softer if friction > 5.0 else step
+        return simulation
+
+
+def test_contacts_that_friction_softens_are_no_wrong_size():
+    slips = by_quantity(receipts(Yielding(), "default", replace(REST, friction=8.0), DT))
+    for quantity in ("size", "turn", "mass", "gravity", "step"):
+        assert slips[quantity].holds
+
+
+@pytest.mark.parametrize("friction", [0.01, 0.3, 1.0, 8.0, 40.0])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_box_slides_through_its_window_no_faster_than_a_friction_of_one_asks(friction, dimension):
+    scene = PROBES["slide"].make(Case(dimension, 0.0, friction, DT, 1))
+    speed, down = scene.bodies[1].twist[0], -scene.gravity[dimension - 1]
+    assert 3.0 <= speed <= 11.6  # 2 * 9.81 m/s^2 * 0.5 s / 0.85
+    assert speed - 2.0 * friction * down * 0.5 > 0.0
+
+
+STOCK = (("bullet", "default"), ("bullet", "tuned"), ("mujoco", "default"), ("mujoco", "tuned"), ("dart", "default"))
+
+
+@pytest.mark.parametrize(("engine", "profile"), STOCK)
+@pytest.mark.parametrize("friction", [0.001, 0.01, 8.0, 25.0])
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 60])
+def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, profile, friction, dt):
+    found = find(engine)
+    if found.engine is None:
+        pytest.skip(found.reason)
+    if friction > 10.0 and engine == "bullet":
+        pytest.skip("bullet refuses it")
+    asked = replace(REST, dimension=3, friction=friction)
+    assert [slip.quantity for slip in receipts(found.engine, profile, asked, dt) if not slip.holds] == []
 
 
 def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):

@@ -1,10 +1,12 @@
 """Cures to paste are what they claim: pasted into a plain model of the engine they change what they should."""
 
 import pytest
+from bare import pasted_mjcf, run, valued
 
 from adapters import registry
 from adapters.needs import needs
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
+from validation.posed import resolve
 
 DT = 1.0 / 240.0
 
@@ -55,7 +57,7 @@ def test_mjcf_of_a_scene_in_which_nothing_meets_has_its_option_alone():
     alone = Scene("alone", 1, 3, scene.bodies[1:], (), (0.0, 0.0, 0.0), 1.0, {})
     settings, names = changed(registry.load("mujoco"), scene)
     text = registry.load("mujoco").snippet(settings, [*names, "integrator"], alone, DT)
-    assert text.startswith("<option timestep=") and "integrator=" in text and len(text.splitlines()) == 1
+    assert text.startswith("<option ") and "integrator=" in text and len(text.splitlines()) == 1
 
 
 def test_python_of_chipmunk_runs_and_sets_what_the_profile_has():
@@ -91,3 +93,103 @@ def test_an_adapter_without_such_words_says_nothing():
     from adapters.engine import Engine
 
     assert Engine.snippet(registry.load("chipmunk"), {}, [], drop(2, 0.5), DT) == ""
+
+
+# ---- MuJoCo: materials, steps ----------------------------------------------------------------------------------------
+
+#: A gripper as people have it: a wall, a load of 1 kg, and a pad that is pressed on by 1.05 of what holds it.
+GRIPPER = """
+<mujoco>{head}<worldbody>
+ <geom name="wall" type="box" size=".1 .5 .5" pos="-.35 0 1" friction=".5 .005 .0001"/>
+ <body name="load" pos="0 0 1"><freejoint/>
+  <geom name="load" type="box" size=".25 .25 .25" mass="1" friction=".5 .005 .0001"/></body>
+ <body name="pad" pos=".35 0 1"><joint name="p" type="slide" axis="1 0 0"/>
+  <geom name="pad" type="box" size=".1 .5 .5" mass="4" friction=".5 .005 .0001"/></body>
+</worldbody>{contact}
+<actuator><general joint="p" gainprm="0" biastype="affine" biasprm="-10.3005 0 0"/></actuator></mujoco>
+"""
+
+
+def tuned_paste(scene, dt=DT):
+    """What a user is given who asks for all that the tuned profile changes."""
+    engine = registry.load("mujoco")
+    shipped, tuned = ({s.name: s.value for s in engine.settings(p, needs(scene), dt)} for p in ("default", "tuned"))
+    return engine.snippet(tuned, [name for name, value in tuned.items() if shipped.get(name) != value], scene, dt)
+
+
+@pytest.mark.parametrize("step", [1 / 500, 1 / 240, 1 / 333])
+def test_a_pasted_grip_holds_since_each_pair_keeps_its_friction(step):
+    """The smooth floor of the scene comes first: its lines must not be those of the pairs that grip."""
+    mujoco = pytest.importorskip("mujoco")
+    scene = resolve("pinch").scene(3, {"margin": 1.05})
+    elements = pasted_mjcf(tuned_paste(scene))
+    option = dict(elements[0].attrib) | {"timestep": repr(step)}
+    (line,) = [one for one in elements[1] if one.get("friction").startswith("0.5 ")]
+    valued(line, dt=step, g=9.81, e=0.0)
+    lines = ""
+    for finger in ("wall", "pad"):
+        words = line.attrib | {"geom1": finger, "geom2": "load"}
+        lines += "<pair " + " ".join(f'{name}="{value}"' for name, value in words.items()) + "/>"
+    head = "<option " + " ".join(f'{name}="{value}"' for name, value in option.items()) + "/>"
+    model = mujoco.MjModel.from_xml_string(GRIPPER.format(head=head, contact=f"<contact>{lines}</contact>"))
+    data, heights = mujoco.MjData(model), []
+    while data.time < 2.0:
+        mujoco.mj_step(model, data)
+        heights.append(data.body("load").xpos[2])
+    # It creeps at (1 - d)/(d b n impratio) g (`adapters.mujoco.profiles`), below 1e-6 m/s; without friction it falls.
+    assert abs(heights[-1] - heights[len(heights) // 2]) < 1e-5
+
+
+@pytest.mark.parametrize("scene", ["pinch", "wedge", "pair_matrix", "ladder", "arch", "scales", "domino"])
+def test_each_material_of_a_scene_has_a_line_with_its_own_friction(scene):
+    """MuJoCo's explicit pairs take nothing from their geoms: one that states no friction has a friction of 1."""
+    pytest.importorskip("mujoco")
+    made = resolve(scene).scene(2, {})
+    text = tuned_paste(made)
+    lines = [one for element in pasted_mjcf(text) for one in element if one.tag == "pair"]
+    for restitution, friction in made.materials():
+        own = [one for one in lines if f"e = {restitution:g}, friction {friction:g}:" in one.get("said")]
+        (line,) = own
+        assert float(line.get("friction").split()[0]) == pytest.approx(friction, rel=1e-8)
+        assert (line.get("condim") == "1") == (friction == 0.0)
+
+
+@pytest.mark.parametrize("e", [0.3, 0.8, 1.0])
+@pytest.mark.parametrize(("size", "step"), [(1.0, 1 / 500), (0.1, 1 / 500), (1.0, 1 / 90)])
+def test_a_pasted_rebound_holds_at_any_step_by_the_formula_beside_it_and_at_its_own_by_its_number(e, size, step):
+    pytest.importorskip("mujoco")
+    scene = drop(3, e, -9.81)
+    paste = tuned_paste(scene)
+    assert f"the numbers are for e = {e:g}, dt = {DT:.9g} s;" in paste and "for others with e > 0: " in paste
+    found = run("mujoco", scene, paste, size, 1.0, step)
+    up = found.twist[:, 1, 2]
+    k = int((up > 0.0).argmax())
+    # Newton's law between the samples around the blow, to what gravity adds in the two steps of it.
+    assert up[k] == pytest.approx(-e * up[k - 2], abs=2.0 * 9.81 * found.dt)
+    # As if the numbers were those of any step.
+    wrong = run("mujoco", scene, paste.replace("for others", ""), size, 1.0, step)
+    assert abs(wrong.twist[k, 1, 2] - up[k]) > 0.1
+
+
+def test_a_default_says_whom_it_touches_and_numbers_without_a_formula_are_for_any_step():
+    pytest.importorskip("mujoco")
+    engine, scene = registry.load("mujoco"), drop(3, 0.8)
+    settings, names = changed(engine, scene)
+    text = engine.snippet(settings, names, scene, DT)
+    assert "every geom of the model that has no value of its own" in text and "takes all friction from them" in text
+    assert "timestep=" in text and "timestep=" not in engine.snippet(settings, ["solimp", "cone"], scene, DT)
+    assert engine.snippet(settings, [], scene, DT) == ""
+    for element in pasted_mjcf(text)[1]:
+        assert element.get("solref") == "0 -432" and element.get("condim") == "1"
+
+
+def test_a_start_overlap_of_chipmunk_has_its_formula():
+    pytest.importorskip("pymunk")
+    scene = drop(2, 0.0, -9.81)
+    engine = registry.load("chipmunk")
+    settings, names = changed(engine, scene)
+    text = engine.snippet(settings, names, scene, DT)
+    assert "start 5.10937e-05 m deep" in text and text.endswith(
+        "dt = 0.00416666667 and g = 9.81, for others 0.3*g*dt^2"
+    )
+    assert engine.words(settings | {"start_overlap": 1e-5}, scene, DT)["start_overlap"][1] == 1e-5

@@ -17,8 +17,8 @@ import pytest
 
 from adapters.conformance.worlds import one_by_one
 from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Recorded, Scheme, Setting, Simulation
-from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
-from adapters.stepping import _alike, advances, posed_for, run, step_count
+from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import _alike, advances, posed_for, run, start_overlap, step_count
 from adapters.trajectory import ContactRecord, Sampling, load_trajectory
 
 
@@ -597,3 +597,51 @@ def test_settings_take_an_iteration_count_only_where_there_is_one() -> None:
     toy.profiles = {"free": lambda needs, dt: [Setting("slop", 0.1, "a toy")]}
     with pytest.raises(EngineError, match=r"^iterations: "):
         toy.settings("free", None, 0.1, 7)  # type: ignore[arg-type]
+
+
+# ---- what a scene at rest without loads can explain ----
+
+
+def two_cubes(depth, dimension=3, gap_of_place=0.071, duration=0.1):
+    """Two boxes of 71 mm at rest without loads, one ``depth`` deep in the other."""
+    turn = (0.0,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
+    inertia = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)
+    places = (
+        [(0.0, 0.0), (0.0, gap_of_place - depth)] if dimension == 2 else [(0.0,) * 3, (0.0, gap_of_place - depth, 0.0)]
+    )
+    boxes = (Body(f"b{k}", Box((0.0355,) * dimension), 1.0, inertia, (*x, *turn)) for k, x in enumerate(places))
+    return Scene("cubes", 1, dimension, tuple(boxes), (), (0.0,) * dimension, duration)
+
+
+def parting_at(speed):
+    def spoil(flight):
+        flight._twist[1, 1] = speed
+
+    return spoil
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("depth", [4.9e-5, 1e-3, 0.02])
+@pytest.mark.parametrize("speed", [1e-3, 0.2, 5.0])
+def test_a_scene_at_rest_without_loads_has_an_answer_where_bodies_part_too_fast(dimension, depth, speed):
+    found = run(Toy({dimension}, parting_at(speed)), two_cubes(depth, dimension), 1 / 240, {})
+    assert found.finish == "completed" and found.twist[-1, 1, 1] == speed
+
+
+def test_what_is_no_answer_stays_none_and_a_long_run_is_granted_its_overlap_over_a_step():
+    """A step that undoes 20 mm makes 4.8 m/s; a thousand times that is no answer, nor anything where none overlap."""
+    fast = 1e3 * 0.02 * 240.0
+    scene = two_cubes(0.02, duration=100.0)
+    assert run(Toy({3}, parting_at(0.9 * fast)), scene, 1 / 240, {}, Sampling(24000)).finish == "completed"
+    diverged = run(Toy({3}, parting_at(1.1 * fast)), scene, 1 / 240, {}, Sampling(24000))
+    assert diverged.finish == "diverged" and "nothing in the scene explains it" in diverged.reason
+    apart = run(Toy({3}, parting_at(0.9 * fast)), two_cubes(-0.02, duration=100.0), 1 / 240, {}, Sampling(24000))
+    assert apart.finish == "diverged"
+
+
+def test_the_overlap_at_the_start_is_that_of_its_deepest_pair_and_of_shapes_that_are_not_measured_a_bound():
+    assert start_overlap(two_cubes(0.01)) == {(0, 1): pytest.approx(0.01)}
+    assert start_overlap(two_cubes(-0.01)) == {}
+    lying = replace(two_cubes(0.0).bodies[1], name="c", shape=Cylinder(0.03, 0.04))
+    scene = replace(two_cubes(-0.01), bodies=(two_cubes(-0.01).bodies[0], lying))
+    assert start_overlap(scene)[0, 1] == pytest.approx(0.05 - 0.0355, abs=1e-3)

@@ -51,7 +51,8 @@ def searched(monkeypatch):
     """Searches that were asked for; they find what is kept, and nothing in space."""
     asked = []
 
-    def search(engine, scene, dimension, jobs):
+    def search(engine, scene, dimension, jobs, params, dt):
+        assert params is None and dt is None
         asked.append((engine, scene, dimension, jobs))
         return KEPT.get((scene, dimension)) or Unsearched(asked=True, reason="nothing of it fails")
 
@@ -62,7 +63,7 @@ def searched(monkeypatch):
 def test_cures_are_searched_scene_by_scene_and_dimension_by_dimension_and_told_as_data(searched):
     names = list(dict.fromkeys(scene for scene, _ in KEPT))
     status, out, err = said("cure", "chipmunk", *names, "--json", "--jobs", "3")
-    wanted = [("chipmunk", scene, d, 3) for scene in names for d in curing.matching(scene)[0].dimensions]
+    wanted = [("chipmunk", scene, d, 3) for scene in names for d in curing.resolve(scene).dimensions]
     assert (status, searched) == (0, wanted)
     assert err == [f"{engine} {scene} {dimension}-D" for engine, scene, dimension, _ in wanted]
     own = [KEPT[scene, d] for _, scene, d, _ in wanted if (scene, d) in KEPT]

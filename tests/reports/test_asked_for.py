@@ -42,13 +42,17 @@ def test_an_engine_is_described_with_its_habits_and_versions_that_are_bad():
         "name": "toy", "version": "1.2", "title": "Toy", "status": "installed", "package": "toy", "dimensions": [2],
         "customary_dt": "1/60", "scheme": {"order": "velocity first"}, "profiles": {},
         "quirks": [{"what": "sinks", "what_we_do": "nothing", "source": "its manual"}],
-        "known_bad_versions": {"1.1": "it forgets contacts"}, "measured": [],
+        "known_bad_versions": {"1.1": "it forgets contacts"}, "measured": [], "unset": [],
+        "settable": [{"name": "sweeps", "must_be": "a whole number from 1 to 9"}],
     }  # fmt: skip
     text = shown(data)
+    assert "--set NAME=VALUE" in text and "sweeps" in text and "a whole number from 1 to 9" in text
+    assert "When nothing is set" not in text
     assert "toy 1.2: Toy, installed" in text and "velocity first" in text
     assert "version 1.1 is known to be bad: it forgets contacts" in text
     assert all(word in text for word in ("sinks", "nothing", "its manual"))
-    assert shown({"name": "toy", "version": "", "status": "not installed", "reason": "no wheel"}).count("no wheel") == 1
+    missing = {"name": "toy", "version": "", "status": "not installed", "reason": "no wheel", "unset": []}
+    assert shown(missing).count("no wheel") == 1
 
 
 def test_a_bench_is_written_as_one_json_and_a_table_each(tmp_path):
@@ -77,6 +81,7 @@ def test_an_engine_that_is_not_installed_is_described_by_why(monkeypatch, as_jso
     if as_json:
         assert json.loads(done.stdout) == {
             "kind": "engine", "name": "toy", "version": "", "status": "not installed", "reason": found.reason,
+            "unset": [],
         }  # fmt: skip
     else:
         assert [line.strip() for line in done.stdout.splitlines()] == ["toy , not installed", found.reason]

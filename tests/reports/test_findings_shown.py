@@ -144,7 +144,7 @@ def test_where_nothing_ran_every_reason_is_said_once():
             refused(scene="stack")]  # fmt: skip
     assert list(refusals(rows)) == [
         "UNSUPPORTED: mujoco incline: it has no boxes",
-        "NOT INSTALLED: bullet incline: pip install it",
+        "NOT INSTALLED: bullet: pip install it",
         "UNSUPPORTED: mujoco stack: it has no boxes",
     ]
 
@@ -153,3 +153,11 @@ def test_a_scene_file_that_an_engine_cannot_run_is_said_beside_what_ran():
     file = "/somewhere/my-scene.toml"
     rows = [row(), refused(scene=file), refused("not_installed", scene=file), refused(), row(scene=file)]
     assert list(refusals(rows)) == [f"UNSUPPORTED: mujoco {file}: it has no boxes"]
+
+
+def test_an_engine_that_is_not_installed_is_said_once_for_all_scenes():
+    rows = [
+        refused("not_installed", "pip install it", engine="drake", scene=scene)
+        for scene in ("incline", "stack", "slide")
+    ]
+    assert list(refusals(rows)) == ["NOT INSTALLED: drake: pip install it"]

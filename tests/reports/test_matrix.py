@@ -1,6 +1,7 @@
 """The matrix as a reader sees it: every field, line, width and colour, and the sweeps beside it."""
 
 import io
+import re
 from collections import Counter
 
 import pytest
@@ -170,12 +171,13 @@ def test_versions_are_those_that_ran():
     assert versions_of([*ROWS, nothing]) == {"flat": "1.0+5f3a", "deep": "1.0+5f3a"}
 
 
-@pytest.mark.parametrize(("short", "lines", "word"), [(False, 1, "FAIL known"), (True, 2, "NEW, drifted")])
+@pytest.mark.parametrize(("short", "lines", "word"), [(False, 1, "FAIL known"), (True, 3, "NEW, drifted")])
 def test_the_legend_explains_the_marks_and_fits_where_it_stands(short, lines, word):
     text = legend(short)
     assert len(text.splitlines()) == lines and word in text
     assert not short or max(map(len, text.splitlines())) <= 80
     assert legend() == legend(False)
+    assert re.search(r"FAIL: ?(off|\n?of an engine)", text) and "INVALID: the measurement is broken" in text
 
 
 def test_a_cell_that_is_missing_counts_among_what_does_not_pass():

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import zlib
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -542,7 +543,7 @@ def cure_of(engine, scene, dimension=2, changed="10", paste="iterations = 30"):
     """A cure with one changed setting."""
     mark = Mark("fail", "")
     return Cure(scene, dimension, engine, "default", "tuned", mark, mark, "drift", "1", "0",
-                [Change("iterations", changed, "30", "fewer leave more")], paste, "")  # fmt: skip
+                [Change("iterations", changed, "30", "fewer leave more")], paste, "to paste:", "")  # fmt: skip
 
 
 def test_equal_cures_are_said_once_and_others_point_at_the_first():
@@ -554,3 +555,19 @@ def test_equal_cures_are_said_once_and_others_point_at_the_first():
         ("chipmunk", "stack", 2, ""), ("chipmunk", "rack", 2, "stack"), ("chipmunk", "pinch", 2, ""),
         ("chipmunk", "arch", 2, ""), ("bullet", "stack", 2, ""),
     ]  # fmt: skip
+
+
+def test_the_page_of_a_run_that_lacks_an_engine_that_the_last_bench_has_names_both(page_source):
+    """The run is of later, of one engine less than the bench of the same folder: the page shows both all the same."""
+    gone = page_source.engines[-1]
+    assert any(observation.slot.engine == gone for observation in page_source.bench.observations)
+    rows = [row for row in page_source.rows if row["engine"] != gone]
+    observations = [each for each in page_source.observations if each.slot.engine != gone]
+    replays = [(slot, recording) for slot, recording in page_source.replays if slot.engine != gone]
+    source = replace(page_source, rows=rows, observations=observations, replays=replays)
+    assert gone not in source.engines and gone in {engine for engine, _ in source.named}
+    assert source.named[: len(source.columns)] == list(source.columns)
+    page = render(source)
+    for k, (engine, profile) in enumerate(source.named):
+        if engine == gone and (engine, profile) in {(o.slot.engine, o.slot.profile) for o in source.bench.observations}:
+            assert f".s{k}::before" in page

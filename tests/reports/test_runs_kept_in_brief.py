@@ -91,3 +91,13 @@ def test_where_nothing_can_be_kept_nothing_is_and_nothing_ends(tmp_path):
     kept.close()
     keep(tmp_path / "nowhere", "run", [], [])
     assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize(("tolerances", "mends"), [(0.5, True), (0.9, True), (1.1, False), (1.9, False)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_moved_start_mends_a_check_that_it_passes_and_none_that_it_misses_by_little(tolerances, mends, side):
+    (row,) = [row for row in rows_of("", [cell()]) if row.metric == "rebound_ratio"]
+    assert row.physics == "fail" and row.tolerance > 0.0
+    moved = cell(replace(SLOT, ulp=3), ratio=row.truth + side * tolerances * row.tolerance)
+    alone, both = (summarise(cells).cells[PANEL][SLOT.key()] for cells in ([cell()], [cell(), moved]))
+    assert both[3] == alone[3] - mends

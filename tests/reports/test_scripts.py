@@ -13,11 +13,14 @@ from click.testing import CliRunner
 
 from adapters import registry
 from adapters.lift import lower_pose, lower_twist
+from adapters.own_settings import given, own
+from adapters.settings import text_of
 from adapters.stepping import posed_for, run, step_count
 from adapters.trajectory import Sampling
 from reports.command import main
 from reports.scripts import written
 from validation.cells import Slot, prepare, settings_of
+from validation.files.scene_files import load_scene
 from validation.posed import pinned
 
 DT = 1.0 / 240.0
@@ -167,6 +170,36 @@ def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
     ends = run(found, scene, DT, settings, Sampling(10**6))
     for state, expected in zip(told(script, scene, tmp_path), (ends.pose[-1], ends.twist[-1]), strict=True):
         assert np.array_equal(state, expected)
+
+
+@pytest.mark.parametrize(("engine", "package", "texts"), [
+    ("mujoco", "mujoco", ["cone=elliptic", "impratio=10", "solref=0.01,1", "jacobian=dense", "solver=cg"]),
+    ("mujoco", "mujoco", ["enabled=override", "o_solref=0.03,1", "o_margin=0.001", "disabled=warmstart,island"]),
+    ("bullet", "pybullet", ["frictionERP=0.1", "contactStiffness=1e5", "contactDamping=10", "linearDamping=0.5"]),
+    ("chipmunk", "pymunk", ["damping=0.5", "collision_slop=0.01", "iterations=3"]),
+])  # fmt: skip
+def test_so_does_one_with_settings_of_a_user_s_own(engine, package, texts, tmp_path):
+    """And no other does: each of them is in the script."""
+    pytest.importorskip(package)
+    plain = slot_of(engine, "oblique", {"e": 0.5}, "default", 2)
+    found, scene = registry.load(engine), prepare(plain).scene
+    slot = plain.with_own(own(found, given(texts), settings_of(found, plain, scene)))
+    assert_same_bits(slot, tmp_path)
+    script = written(slot, "python")
+    assert f"profile {slot.profile}" in script and all(f"--set {text}" in script.lower() for text in given_back(slot))
+    for left in texts:
+        fewer = [text for text in texts if text != left and not {left, text} <= TOGETHER]
+        other = plain.with_own(own(found, given(fewer), settings_of(found, plain, scene)))
+        assert written(other, "python").partition("import")[2] != script.partition("import")[2], left
+
+
+#: Settings of Bullet that it takes together only.
+TOGETHER = {"contactStiffness=1e5", "contactDamping=10"}
+
+
+def given_back(slot):
+    """Settings of a slot as the command that runs it again has them."""
+    return [f"{name}={text_of(value)}".lower() for name, value in slot.switched]
 
 
 #: Another word for settings that are words.
@@ -354,12 +387,30 @@ def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimensio
     assert np.array_equal(pose, ended(slot)[0][moving])
 
 
-def test_mjcf_says_what_it_has_no_word_for(tmp_path):
-    pytest.importorskip("mujoco")
+def test_mjcf_pushes_a_loaded_body_as_its_cell_does(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "loaded.toml"
     path.write_text(LOADED.format(**SPATIAL))
     done = CliRunner().invoke(main, ["export", str(path), "--engine", "mujoco", "--to", "mjcf"])
-    assert done.exit_code == 2 and "box.force: MJCF has no word" in done.output
+    assert done.exit_code == 0, done.output
+    scene = load_scene(path)
+    assert any(body.is_loaded for body in scene.bodies)
+    model = mujoco.MjModel.from_xml_string(done.output)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mujoco.mj_forward(model, data)
+    pushed = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, pushed, model.key("start").id)
+    model.actuator_biasprm[:] = 0.0
+    for i, body in enumerate(scene.bodies):
+        if body.is_loaded:
+            pushed.xfrc_applied[model.body(f"body{i}").id] = (*body.force, *body.torque)
+    mujoco.mj_forward(model, pushed)
+    assert data.qfrc_actuator.any() and np.allclose(data.qacc, pushed.qacc, rtol=1e-12, atol=1e-12)
+
+
+def test_mjcf_says_what_it_has_no_word_for():
+    pytest.importorskip("mujoco")
     done = CliRunner().invoke(main, ["export", "slide", "--engine", "mujoco", "--profile", "matched", "--to", "mjcf"])
     assert done.exit_code == 2 and "rounds: MJCF has no word for a loop around the solver" in done.output
 

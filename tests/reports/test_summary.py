@@ -12,7 +12,7 @@ from rich.console import Console
 
 from reports.answers import answers, choices
 from reports.command import main, showing
-from reports.findings import grouped
+from reports.findings import finding_line, grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity, row_id
@@ -113,17 +113,21 @@ def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
     rows = [row("bounce", 2, "bullet", "default", "known", 0.25, 0.64, e=0.8, height=1.0)]
     (answer,) = answers(rows)
     assert answer.wrong == "rebounds at 0.5 instead of 0.8 (e=0.8 height=1)"
-    assert answer.cure == "no other profile does better; crosscheck cure bullet bounce searches for settings"
+    assert answer.cure == "no other profile was run in this case; crosscheck cure bullet bounce searches for settings"
 
 
-def test_a_number_of_a_scene_file_is_told_by_its_name_and_no_search_is_promised():
-    """`cure` asks scenes of the catalogue; a file has no parameters that a truth could follow."""
+def test_a_number_of_a_scene_file_is_told_by_its_name_and_where_to_search(tmp_path):
+    """A file has no parameters that a truth could follow."""
+    path = tmp_path / "a.toml"
+    path.write_text(FALL)
     names = {"final[ball.y]": (3.78, 4.5), "final[ball.x]": (3.78, 9.0)}
-    rows = [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": "s/a.toml", "metric": metric}
+    rows = [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": str(path), "metric": metric}
             for metric, (value, truth) in names.items()]  # fmt: skip
     (answer,) = answers([each | {"params": {}, "slot": each["slot"] | {"params": {}}} for each in rows])
     assert answer.wrong == "final[ball.x] is 3.78 instead of 9"
-    assert answer.cure == "no other profile does better"
+    assert answer.cure == (
+        f"no other profile was run in this case; crosscheck cure bullet {path} searches for settings"
+    )
 
 
 @pytest.mark.parametrize(
@@ -154,6 +158,38 @@ def test_a_direction_is_told_in_words_and_not_by_a_sign_that_contradicts_them(sc
         [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": scene, "metric": metric}]
     )
     assert answer.wrong == f"{words} (e=0.8 height=1)"
+
+
+#: A scene file in which a ball falls.
+FALL = """
+name = "fall"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 1.0
+[[bodies]]
+name = "ball"
+shape = { type = "disc", radius = 0.5 }
+mass = 1.0
+"""
+
+
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 120])
+def test_a_profile_that_ran_at_another_step_cures_nothing(dt):
+    """A coarser step has wider tolerances: that a profile passes there says nothing of a finer one."""
+    rows = [row("stack", 2, "mujoco", "default", "known", 0.01, 0.0, n=2.0) | {"dt": 1 / 500}]
+    rows += [row("stack", 2, "mujoco", "tuned", "pass", 0.0, 0.0, n=2.0) | {"dt": dt}]
+    (answer,) = answers(rows)
+    search = "crosscheck cure mujoco stack --param n=2 --dt 1/500 --dim 2"
+    assert answer.cure == f"no other profile was run in this case; {search} searches for settings"
+    rows[1]["dt"] = 1 / 500
+    assert answers(rows)[0].cure == "tuned cures it"
+
+
+def test_a_profile_that_ran_another_case_is_not_nearer():
+    rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
+    rows += [row("incline", 2, "bullet", "tuned", "pass", 0.0, 0.0, ratio=0.5)]
+    (answer,) = answers(rows)
+    assert answer.cure.startswith("no other profile was run in this case; ")
 
 
 def test_what_is_nearer_is_no_cure():
@@ -235,6 +271,19 @@ def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
     rows = [row("impact", 3, "chipmunk", "tuned", "unsupported") | REFUSED, row("impact", 3, "bullet", "tuned")]
     text = "\n".join(shown(rows, 100))
     assert "chipmunk is planar" not in text and "Nothing was judged" not in text
+
+
+def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
+    why = "receipt size: measured 0.98, declared 1 +- 0.0035"
+    lost = {"outcome": "invalid", "reason": why, "physics": None}
+    whole = row("impact", 2, "bullet", "tuned", value=1.0, truth=1.0) | lost
+    broken = [whole | {"metric": metric} for metric in ("a", "b[1]", "b[2]")]
+    rows = [*broken, row("impact", 2, "bullet", "one")]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 rows)" in text
+    assert f"bullet/tuned impact: 3 of 3 rows have no answer (INVALID: {why}); nothing is said of the engine" in text
+    assert "truth 1" not in text and "one cures it" not in text
+    assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
 
 
 # ---- a real run ----
@@ -440,3 +489,12 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
 def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):
     (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
     assert answer.wrong == f"{words} (e=1 v=1)"
+
+
+def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp_path):
+    rows = [row("impact", 2, "bullet", "tuned", "new", 0.1)]
+    for out, said in ((Path("crosscheck-out"), ""), (None, ""), (tmp_path / "a b", f" --out '{tmp_path}/a b'")):
+        lines = shown(rows, 200, out=out)
+        for command in ("crosscheck findings", "crosscheck explain ID", "crosscheck report --open"):
+            assert any(line.startswith(f"  {command}{said} ") for line in lines)
+        assert said or not any("--out" in line for line in lines)

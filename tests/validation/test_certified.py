@@ -18,6 +18,17 @@ def test_a_certified_run_is_judged():
     assert observation.outcome is Outcome.OK and observation.certificate["certified"] is True
 
 
+def test_a_bounce_that_records_its_contacts_owes_its_rest_time_to_no_other_step():
+    """What counts as rest is a share of the step: asked of the steps of a finer run it would be half a second off."""
+    found = execute(Slot("bounce", (("e", 0.95),), 2, "reference", "reference", 1 / 240))
+    assert found.outcome is Outcome.OK, found.certificate["reasons"]
+    assert found.certificate["metric_errors"]["rest_time"] <= 1e-3
+    assert (
+        found.metrics["force_in_flight"] == (0.0, "") and found.certificate["metric_errors"]["force_in_flight"] == 0.0
+    )
+    assert {row.physics for row in rows_of("run", [found])} == {"pass"}
+
+
 def profile_with(monkeypatch, **changes):
     """The profile `reference` with other settings than its own."""
     plain = Settings.reference

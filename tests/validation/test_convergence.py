@@ -42,9 +42,9 @@ def test_the_standard_error_covers_the_order_of_noisy_errors():
         ([0.72, 0.70, 0.68, 0.67, 0.66], Limit.ELSEWHERE),
         ([1e-3 / dt for dt in DTS], Limit.NOT),
         ([0.1, 0.9, 0.05, 0.8, 0.2], Limit.NOISY),
-        ([0.1, 0.05], Limit.NOISY),
-        ([0.1, 1e-16], Limit.NOISY),
-        ([], Limit.NOISY),
+        ([0.1, 0.05], Limit.FEW),
+        ([0.1, 1e-16], Limit.FEW),
+        ([], Limit.FEW),
         # A lucky phase at the finest step, and errors that rise on the way, are no convergence.
         ([3.5e-5, 3.2e-4, 2.2e-14], Limit.NOISY),
         ([1e-3, 1e-3, 1e-15], Limit.NOISY),
@@ -141,10 +141,12 @@ def said(errors, dts=None, **options):
 
 
 def test_what_has_too_few_errors_says_so():
-    assert limit_of([], []) == (None, Limit.NOISY, "no step has a measured error")
-    assert limit_of(DTS[:2], [0.1, 0.05]) == (None, Limit.NOISY, "too few steps: 2 of 3")
+    assert limit_of(DTS[:1], [0.0]) == (None, Limit.FEW, "1 of 3")  # one step converges to nothing
+    assert limit_of(DTS[:2], [1e-17, 0.0]) == (None, Limit.FEW, "2 of 3")
+    assert limit_of([], []) == (None, Limit.FEW, "no step has a measured error")
+    assert limit_of(DTS[:2], [0.1, 0.05]) == (None, Limit.FEW, "2 of 3")
     exact = (None, Limit.TRUTH, "exact to round-off at every step")
-    assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:1], [0.25], 0.25) == exact
+    assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:3], [0.25] * 3, 0.25) == exact
 
 
 def test_a_level_is_three_errors_that_hardly_differ_over_a_factor_of_four():
@@ -184,7 +186,7 @@ def test_errors_at_the_floor_carry_no_order():
     fit, limit, because = limit_of(DTS[:5], [0.4, 1e-3, 0.1, 1e-3, 0.025], 1e-3)
     assert (limit, because) == (Limit.TRUTH, "order 1.00 +- 0.00 over 3 steps") and fit.order == pytest.approx(1.0)
     _, limit, because = limit_of(DTS[:4], [1e-3, 0.4, 1e-3, 0.1], 1e-3)
-    assert (limit, because) == (Limit.NOISY, "too few errors above round-off for an order")
+    assert (limit, because) == (Limit.FEW, "too few errors above round-off for an order")
 
 
 def test_a_fall_to_round_off_is_told_with_its_step():

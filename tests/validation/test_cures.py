@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from adapters.engine_folder import CURES, inside
 from adapters.registry import facts, find, names
 from reports.command import main
-from reports.cures import cure_paste, cure_text, decided_by, told_cure, told_cures
+from reports.cures import changes_in_words, cure_of, cure_paste, cure_text, decided_by, fix, told_cure, told_cures
 from validation.cells import Observation, Outcome, Slot
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
@@ -37,7 +37,10 @@ def test_a_table_is_read_back_with_its_tuples(tmp_path):
 def test_a_table_of_before_what_is_mended_was_written_down_is_read_all_the_same(tmp_path):
     path = tmp_path / "cures.csv"
     write([CURE], path)
-    path.write_text("".join(f"{line.rpartition(',')[0]}\n" for line in path.read_text().splitlines()))
+    later = ",mends,dt,alone,alone_after"
+    head, line = path.read_text().splitlines()
+    assert head.endswith(later)
+    path.write_text(f"{head.removesuffix(later)}\n{line.rsplit(',', later.count(','))[0]}\n")
     assert "mends" not in path.read_text() and read(path) == [CURE]
 
 
@@ -85,16 +88,79 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     other = told_cure({**row, "metric": "out_of_plane"})
     assert other == f"none is known of this check; of creep, turned in this scene: {cure_text(CURE)}"
     # What is told is mended in the cell that is told, though the same check fails elsewhere with the cure.
-    listed["pinch", 2] = replace(CURE, mends=("turned",))
+    listed["pinch", 2] = replace(CURE, cells=(*CURE.cells, {"margin": 100.0}), mends=("turned",))
     assert told_cure({**row, "metric": "creep", "params": {"margin": 1.05, "g": 9.81}}) == cure_text(CURE)
     assert "none is known" in told_cure({**row, "metric": "creep", "params": {"margin": 100.0}})
-    assert told_cure({**row, "dimension": 3}) == told_cure({**row, "profile": "tuned"}) == ""
-    assert told_cure({**row, "engine_version": "4.0.2"}) == ""
+    unsearched = "not searched for in this case: crosscheck cure mujoco pinch"
+    assert told_cure({**row, "dimension": 3}) == told_cure({**row, "engine_version": "4.0.2"}) == unsearched
+    assert told_cure({**row, "profile": "tuned"}) == ""
     listed["pinch", 2] = CURE  # a table of before kinds were written down: what it tells is of its own metric
     assert told_cure({**row, "metric": "creep[1]"}) == cure_text(CURE)
     assert "none is known" in told_cure(row)
     listed["pinch", 2] = replace(CURE, left=5, changes={})
     assert told_cure({**row, "metric": "out_of_plane"}).startswith("2-D: none of 45 changes")
+
+
+@pytest.mark.parametrize(
+    ("case", "command"),
+    [
+        ({"params": {"margin": 3.0}}, "crosscheck cure mujoco pinch --param margin=3 --dim 2"),
+        (
+            {"params": {"mu": 5.0, "margin": 1.05}},
+            "crosscheck cure mujoco pinch --param margin=1.05 --param mu=5 --dim 2",
+        ),
+        ({"dt": 1 / 500}, "crosscheck cure mujoco pinch --dt 1/500 --dim 2"),
+        ({"params": {"margin": 100.0}}, "crosscheck cure mujoco pinch"),  # standard, though this table has it not
+    ],
+)
+def test_of_another_case_than_was_searched_no_cure_is_told_but_where_to_search_it(monkeypatch, case, command):
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): replace(CURE, mends=("creep",))})
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
+    row |= {"metric": "creep", "params": {}, "dt": 1 / 240, "iterations": None, "outcome": "ok"}
+    assert told_cure(row) == cure_text(CURE) and cure_of(row).changes == CURE.changes
+    assert told_cure(row | case) == f"not searched for in this case: {command}" and cure_of(row | case) is None
+    assert told_cure(row | case | {"outcome": "not_installed"}) == told_cure(row | case | {"profile": "tuned"}) == ""
+
+
+def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
+    """What a profile chooses by the material is chosen anew: the listed numbers are those of the cell that is told."""
+    listed = {("bounce", 2): replace(
+        CURE, scene="bounce", cells=({}, {"e": 1.0}), metric="apex", params={"e": 1.0}, mends=("apex",),
+        changes={"solref": "reflect", "kappa_elastic": 0.0, "kappa_plastic": 0.1, "smooth_condim": 1}, others=(),
+    )}  # fmt: skip
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "bounce", "dimension": 2, "profile": "default"}
+    row |= {"metric": "apex[1]", "dt": 1 / 240, "iterations": None}
+    for params, damping in (({"e": 1.0}, -480), ({}, -432)):
+        found = cure_of(row | {"params": params})
+        assert f'solref="0 {damping}"' in cure_paste(found) and found.params == params
+
+
+def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_lines_says_so(monkeypatch):
+    listed = {("pinch", 2): replace(CURE, mends=("creep",))}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "<option/>")
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
+    row |= {"metric": "creep", "params": {"margin": 1.05}, "dt": 1 / 240, "iterations": None}
+    paste, said = fix(row, [], "tuned")
+    assert paste == cure_paste(CURE) and "smallest" in said
+    assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("<option/>", "to paste (all that profile tuned changes):")
+    assert fix(row | {"dt": 1 / 500}, [], "") == ("", "")
+    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "")
+    export = (
+        "crosscheck export pinch --param margin=1.05 --dt 1/500 --dim 2 --engine mujoco --profile tuned --to python"
+    )
+    said = f"nothing to paste: mujoco has no lines of settings; {export} writes its calls"
+    assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("", said)
+
+
+def test_no_fix_that_is_printed_has_a_word_that_its_engine_has_not():
+    ours = {"mujoco": "reflect|stick|kappa|smooth_condim", "chipmunk": "start_overlap", "bullet": r"\biterations\b"}
+    for engine, words in ours.items():
+        for cure in cures_of(engine).values():
+            every = (cure.changes, cure.alone, *cure.others)
+            told = [f"{name}={value}" for each in every for name, value in changes_in_words(cure, each)]
+            assert not re.search(words, " ".join([cure_text(cure), cure_paste(cure), *told])), cure
 
 
 def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
@@ -133,8 +199,11 @@ class Toy:
         self.off = off
 
 
-def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
-    """Trials on one cell of which the first checks are off by ``off(settings)`` tolerances, the others by 0."""
+def trials_of(monkeypatch, off, candidates, whole=None, handed=False, elsewhere=None):
+    """Trials on one cell of which the first checks are off by ``off(settings)`` tolerances, the others by 0.
+
+    In other sizes they are off by ``elsewhere(settings)``.
+    """
     slot = Slot("pinch", (), 2, "toy", "default", 1 / 240)
 
     def observe(slots, jobs=1):
@@ -142,7 +211,8 @@ def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
         for asked in slots:
             blank = Observation(asked, "c", 1, "1", Outcome.OK)
             checks = [each.check for each in readings(blank)]
-            by = off(dict(asked.switched) | ({"iterations": asked.iterations} if asked.iterations else {}))
+            says = off if asked.scene == "pinch" else elsewhere
+            by = says(dict(asked.switched) | ({"iterations": asked.iterations} if asked.iterations else {}))
             by = [*by, *[0.0] * (len(checks) - len(by))]
             metrics = {c.metric: (c.truth + k * c.bound, "") for c, k in zip(checks, by, strict=True)}
             found[asked] = replace(blank, metrics=metrics)
@@ -155,7 +225,7 @@ def trials_of(monkeypatch, off, candidates, whole=None, handed=False):
     monkeypatch.setattr(cures, "belongs_of", lambda engine: {})
     monkeypatch.setattr(cures, "has_iterations", lambda engine, slot: False)
     monkeypatch.setattr(cures, "changes_of", lambda slot, name: dict(whole or {}))
-    trials = _Trials([slot], 1)
+    trials = _Trials([slot], 1, elsewhere is not None)
     failing = sum(each.badness > 1.0 for each in trials.start)
     found = _best("toy", trials, [slot], failing)
     return (found, trials) if handed else found
@@ -209,6 +279,35 @@ def test_what_is_told_is_a_check_that_the_cure_mends(monkeypatch):
     assert cures._told(trials, failing, best).check.metric == "turned"
     assert cures._told(trials, failing, None).check.metric == "creep"
     assert cures._mended(trials, failing, best) == ("turned",) and cures._mended(trials, failing, None) == ()
+
+
+def test_what_mends_in_one_size_alone_is_none(monkeypatch):
+    """The same cells in other sizes at another step: what fails as shipped must be mended there as well."""
+
+    def off(s):
+        return (0.5, 0.5) if s.get("a") or s.get("b") else (9.0, 9.0)
+
+    def small(s):
+        return (0.5, 2.0) if s.get("a") else (0.5, 0.5) if s.get("b") else (0.5, 9.0)
+
+    best, singles = trials_of(monkeypatch, off, {"a": (1,), "b": (1,)}, elsewhere=small)
+    assert dict(best.changes[0]) == {"b": 1} and best.failing == 0 and len(singles) == 1
+    best, _ = trials_of(monkeypatch, off, {"a": (1,)}, elsewhere=small)
+    assert best.failing == 1
+
+
+def test_the_single_setting_that_does_most_is_told_beside_a_cure_of_several(monkeypatch):
+    def off(s):
+        first = 0.5 if s.get("a") and s.get("c") else 2.0 if s.get("c") else 900.0
+        return (first, 0.5 if s.get("c") else 9.0)
+
+    (best, _), trials = trials_of(monkeypatch, off, {"a": (1,), "c": (1,)}, handed=True)
+    told = cures._told(trials, trials.start[:2], best)
+    changes, value = cures._alone(trials, told, best)
+    assert dict(best.changes[0]) == {"a": 1, "c": 1} and changes == {"c": 1}
+    assert value == pytest.approx(told.check.truth + 2.0 * told.check.bound)
+    text = cure_text(replace(CURE, alone={"cone": "elliptic"}, alone_after=0.0034))
+    assert text.endswith("; cone=elliptic alone: 0.0034 m/s")
 
 
 def test_a_real_engine_is_cured_by_what_its_sheet_says():
@@ -302,3 +401,70 @@ def test_a_search_asks_with_as_many_processes_as_it_was_given_and_ends_where_the
     cells = len(asked_of("incline", 2))
     assert asked == [(["chipmunk"] * cells, {"incline"}, 3)]
     assert search("chipmunk", "incline", 2) and asked[-1][2] == 1
+
+
+# ---- one case --------------------------------------------------------------------------------------------------------
+
+BOX = """
+name = "a heavy crate that nothing pushes"
+dimension = 3
+gravity = [0.0, 0.0, -9.81]
+duration = 1.5
+[[bodies]]
+name = "ground"
+shape = { type = "half_space", normal = [0.0, 0.0, 1.0] }
+motion = "fixed"
+[[bodies]]
+name = "crate"
+shape = { type = "box", half_extents = [0.4, 0.3, 0.3] }
+mass = 12.0
+pose = [0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0]
+[[pairs]]
+restitution = 0.0
+friction = 7.0
+[[checks]]
+quantity = "crate.z"
+value = 0.3
+tolerance = "g * dt * dt"
+because = "rests"
+"""
+MODEL = """
+<mujoco><option timestep="0.004"/><worldbody><geom name="slab" type="plane" size="3 3 .1" friction="6"/>
+<body name="crate" pos="0 0 .2"><freejoint/><geom type="box" size=".3 .25 .2" mass="3" friction="6"/></body>
+</worldbody></mujoco>
+"""
+
+
+@pytest.mark.parametrize(("name", "text"), [("crate.toml", BOX), ("crate.xml", MODEL)])
+def test_a_file_is_mended_by_the_smallest_change_first(tmp_path, name, text, monkeypatch):
+    """With a friction of 6 or 7 MuJoCo's pyramid lets a box sink by a third of its size: the round cone is enough."""
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(cures, "candidates_of", lambda engine: {"cone": ("elliptic",), "impratio": (10.0,)})
+    monkeypatch.setattr(cures, "_profiles", lambda engine: ["tuned"])
+    monkeypatch.setattr(cures, "clocked", lambda slots: (None, None))
+    (tmp_path / name).write_text(text)
+    found = CliRunner().invoke(main, ["cure", "mujoco", str(tmp_path / name), "--dim", "3"], env={"COLUMNS": "80"})
+    assert found.exit_code == 0, found.output
+    first = re.search(r"^<option .*$", found.stdout, re.MULTILINE)
+    assert first and first[0] == '<option cone="elliptic"/>'
+
+
+def test_one_case_of_a_scene_is_searched_at_its_own_step(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "reports.command.curing.search", lambda *given: asked.append(given) or Unsearched(True, "it rests")
+    )
+    ask = ["cure", "chipmunk", "stack", "--param", "n=3", "--dt", "1/120", "--dim", "2"]
+    assert CliRunner().invoke(main, ask).exit_code == 0
+    assert asked == [("chipmunk", "stack", 2, 1, {"n": 3.0}, 1 / 120)]
+    kept = CliRunner().invoke(main, [*ask, "--keep"])
+    assert kept.exit_code == 2 and "keep: the table is of scenes of the catalogue" in kept.output
+
+
+def test_a_scene_in_other_sizes_is_judged_in_its_own_units():
+    base, small = resolve("bounce"), resolve("bounce@0.3")
+    own, made = base.scene(2, {"e": 0.5}), small.scene(2, {"e": 0.5})
+    assert made.gravity == own.gravity and made.duration == pytest.approx(own.duration * 0.3**0.5)
+    assert made.bodies[1].shape.radius == pytest.approx(0.3 * own.bodies[1].shape.radius)
+    wanted = [(check.metric, check.truth, check.bound) for check in base.checks(own, 0.002 / 0.3**0.5)]
+    assert [(check.metric, check.truth, check.bound) for check in small.checks(made, 0.002)] == wanted

@@ -12,12 +12,15 @@ from adapters.scene import Body, Box, HalfSpace, Scene
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
+from validation.metrics import UNAVAILABLE
 from validation.questions.invariance import (
     MOVES,
     RELATIONS,
     Allowances,
     Change,
+    Refusal,
     _nudged,
+    boosted,
     compare,
     floor,
     judged,
@@ -417,3 +420,43 @@ def test_a_cell_without_an_answer_has_none_in_any_pose_and_one_that_is_lost_in_a
         monkeypatch, lambda relation, *more: "it hung" if relation == "mirrored" else {"spin": (3.0, "")}, ["mirrored"]
     )
     assert change == Change("mirrored", refused="it hung", lost=True)
+
+
+def test_a_force_that_is_not_told_in_a_pose_is_no_break_and_a_value_that_is_lost_for_another_reason_is():
+    floors = dict.fromkeys(BASE, 0.0)
+    told = {"speed": (None, UNAVAILABLE), "count": BASE["count"]}
+    assert judged("mirrored", BASE, told, Allowances(floors)).holds
+    lost = judged("mirrored", BASE, told | {"speed": (None, "never settles")}, Allowances(floors))
+    assert not lost.holds and lost.metric == "speed"
+    # What is told is compared all the same.
+    changed = judged("mirrored", BASE, told | {"count": (BASE["count"][0] + 1.0, "")}, Allowances(floors))
+    assert not changed.holds and changed.metric == "count"
+
+
+def test_a_pose_that_an_engine_refuses_is_no_break_and_one_that_it_fails_at_is():
+    refused = judged("bystander", BASE, Refusal("bodies: more than it takes"), Allowances({}))
+    assert (refused.refused, refused.lost, refused.holds) == ("bodies: more than it takes", False, True)
+    assert judged("bystander", BASE, "it hung", Allowances({})).lost
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_was_carried_along_comes_back_with_its_contacts(dimension):
+    """A contact at one place of the scene, told where it was carried to at its time, is at that place again."""
+    turn, inertia = ((0.0,), 1.0) if dimension == 2 else ((1.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    places = [(0.0,) * dimension, (1.0,) + (0.0,) * (dimension - 1)]
+    bodies = tuple(Body(f"b{k}", Box((0.5,) * dimension), 1.0, inertia, (*x, *turn)) for k, x in enumerate(places))
+    scene = Scene("two", 1, dimension, bodies, (), (0.0,) * dimension, 1.0)
+    posed = boosted(scene)
+    speed = np.array(posed.scene.bodies[0].twist[:dimension])
+    assert speed[0] == size_of(scene) and not speed[1:].any()
+    t = np.array([0.0, 0.25, 0.5, 1.0])
+    pose = np.array([[body.pose for body in bodies]] * len(t))
+    pose[..., :dimension] += t[:, None, None] * speed
+    twist = np.array([[body.twist for body in posed.scene.bodies]] * len(t))
+    point = np.array([0.5] + [0.0] * (dimension - 1))
+    # Two contacts at the second sample, none at the third, one at the last.
+    rows = [(0, 1, tuple(point + t[k] * speed), (1.0,) * dimension, (1.0,) * dimension, 0.0) for k in (1, 1, 3)]
+    record = ContactRecord(np.array([1, 2, 3]), np.array([0, 2, 2, 3]), Contacts.from_rows(rows, dimension))
+    found = posed.back(Trajectory(t, pose, twist, record, 0.25, "completed"))
+    assert found.contacts.rows.point == pytest.approx(np.array([point] * 3), abs=1e-12)
+    assert found.pose[-1, :, :dimension] == pytest.approx(np.array(places), abs=1e-12) and not found.twist.any()

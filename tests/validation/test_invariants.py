@@ -7,6 +7,7 @@ import pytest
 
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import Trajectory
+from validation import metrics
 from validation.files import invariants
 from validation.files.mass_properties import moments, volume
 
@@ -422,3 +423,36 @@ def test_the_work_of_a_load_is_from_the_start_and_of_a_torque_added_up():
     energy = invariants.mechanical_energy(scene, moved(scene, (pose, twist), dt=0.5))
     spins = 0.5 * 0.09 * np.array([1.0, 4.0, 16.0])
     assert energy == pytest.approx(spins + 13.0 * np.array([0.0, 1.0, -1.0]) - 4.0 * np.array([0.0, 0.75, 2.25]))
+
+
+# ---- bodies that start in each other ----
+
+
+def parted(depth, speed, mass=2.0, load=(0.0, -9.81)):
+    """A ball that starts ``depth`` deep in the floor and leaves it at ``speed``, coming to rest on the floor."""
+    scene = over_floor(ball(mass=mass, pose=(0.0, 0.3 - depth, 0.0)), gravity=load, duration=0.1)
+    y = 0.3 - depth * np.array([1.0, 0.5, 0.0, 0.0])
+    pose = np.column_stack([0.0 * y, y, 0.0 * y])
+    twist = np.zeros_like(pose)
+    twist[1, 1] = speed
+    trajectory = moved(scene, (pose, twist))
+    overlaps = metrics.overlaps(scene, trajectory)
+    return invariants.energy_growth(scene, trajectory, overlaps)[0] <= invariants.energy_bound(scene, DT)
+
+
+@pytest.mark.parametrize("depth", [1e-5, 2e-3, 0.05])
+@pytest.mark.parametrize("gravity", [0.0, 9.81, 1e3])
+def test_an_overlap_that_is_undone_in_a_step_or_slower_adds_no_energy_and_an_explosion_does(depth, gravity):
+    """Lifting it out is m g d, and whoever undoes it in a step makes a speed of d/dt of it."""
+    load = (0.0, -gravity)
+    assert parted(depth, 0.0, load=load) and parted(depth, depth / DT, load=load)
+    fall = gravity * DT  # the work of one step is granted to any body
+    assert not parted(depth, 2.0 * depth / DT + 4.0 * fall + math.sqrt(2.0 * gravity * depth), load=load)
+
+
+def test_what_starts_apart_is_granted_nothing():
+    scene = over_floor(ball(pose=(0.0, 0.31, 0.0)), gravity=(0.0, 0.0), duration=0.1)
+    pose, twist = np.tile((0.0, 0.31, 0.0), (3, 1)), np.zeros((3, 3))
+    twist[1:, 1] = 1e-3
+    trajectory = moved(scene, (pose, twist))
+    assert invariants.energy_growth(scene, trajectory, metrics.overlaps(scene, trajectory))[0] == pytest.approx(1e-6)

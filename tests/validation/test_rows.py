@@ -7,11 +7,15 @@ import pytest
 
 from adapters.engine import EngineError
 from adapters.law import Deviation
+from reports.exports import as_junit, as_markdown
+from reports.findings import alarms
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import FindingsError
 from validation.judging import predicting, rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
+from validation.metrics import UNAVAILABLE
+from validation.posed import pinned
 
 #: A box below the edge of the friction cone: one check, its creep.
 SLOT = Slot("incline", (("ratio", 0.99),), 3, "nameless", "soft", 1 / 240, 7)
@@ -247,13 +251,14 @@ def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law
     assert listed.standing == "explained" and predictions_of(listed) == [] and law == []
 
 
-@pytest.mark.parametrize(("promised", "standing"), [("soft", "new"), ("hard", None)])
-def test_of_your_own_model_nothing_is_listed_and_a_promise_holds(monkeypatch, promised, standing):
+@pytest.mark.parametrize(
+    ("outcome", "alarming"), [(Outcome.OK, False), (Outcome.INVALID, False), (Outcome.CRASHED, True)]
+)
+def test_of_your_own_model_nothing_is_listed_and_only_a_cell_that_is_lost_is_an_alarm(monkeypatch, outcome, alarming):
     monkeypatch.setattr(rows, "is_model", lambda scene: scene == "incline")
-    monkeypatch.setattr(rows, "solutions_of", lambda engine: {promised} if engine == "nameless" else set())
-    row = judged(slot=OWN)
-    assert (row.physics, row.standing, row.alarming) == ("fail", standing, standing is not None)
-    assert row.reason.endswith("not listed: your own model")
+    row = judged(slot=OWN, outcome=outcome, reason="so")
+    assert (row.standing, row.alarming, row.failing) == (None, alarming, True)
+    assert outcome is not Outcome.OK or row.reason.endswith("not listed: your own model")
 
 
 def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
@@ -357,3 +362,64 @@ def test_what_laws_have_said_ahead_is_not_asked_again_and_what_they_have_not_is(
     passing = replace(SEEN, metrics={"creep": (CHECK.truth, "")})
     for silent in (passing, replace(SEEN, metrics={}), replace(SEEN, outcome=Outcome.CRASHED)):
         assert rows._predictions(silent, scene, CHECK, {asked: ["ahead"]}) == []
+
+
+# ---- what is not listed, and the exit status ----
+
+FILE_TEXT = """
+name = "ball"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.1
+[[bodies]]
+name = "ball"
+shape = { type = "disc", radius = 0.5 }
+mass = 1.0
+inertia = 0.125
+[[pairs]]
+friction = 0.0
+restitution = 0.0
+[[checks]]
+quantity = "ball.y"
+value = 0.0
+tolerance = 0.01
+"""
+OWN_CHECK, INVARIANT = "final[ball.y]", "energy_growth"
+
+
+def of_a_file(tmp_path, engine, outcome=Outcome.OK, **metrics):
+    """Rows of a scene file by metric, each with the value given, else 0."""
+    path = tmp_path / "ball.toml"
+    path.write_text(FILE_TEXT)
+    slot = Slot(pinned(str(path)), (), 2, engine, "default", 1 / 240)
+    found = {name: (0.0, "") for name in (OWN_CHECK, INVARIANT, "penetration", "deepest_overlap")} | metrics
+    observation = Observation(slot, "c", 1, "1.0", outcome, "said so", metrics=found)
+    return {row.metric: row for row in rows_of("r", [observation])}
+
+
+@pytest.mark.parametrize("engine", ["bullet", "an engine without a list"])
+def test_a_number_that_the_author_of_a_file_states_and_an_engine_misses_is_an_alarm_whoever_it_is(tmp_path, engine):
+    missed = of_a_file(tmp_path, engine, **{OWN_CHECK: (0.5, "")})[OWN_CHECK]
+    assert (missed.physics, missed.standing, missed.alarming) == ("fail", "new", True)
+    met = of_a_file(tmp_path, engine, **{OWN_CHECK: (0.005, "")})[OWN_CHECK]
+    assert met.physics == "pass" and not met.alarming and not met.failing
+
+
+def test_of_an_engine_without_a_list_only_cells_that_are_lost_are_alarms(tmp_path):
+    engine = "an engine without a list"
+    grown = of_a_file(tmp_path, engine, **{INVARIANT: (0.5, "")})[INVARIANT]
+    assert (grown.physics, grown.standing, grown.alarming, grown.failing) == ("fail", None, False, True)
+    for outcome, alarming in ((Outcome.INVALID, False), (Outcome.CRASHED, True), (Outcome.TIMED_OUT, True)):
+        rows = of_a_file(tmp_path, engine, outcome).values()
+        assert {row.alarming for row in rows} == {alarming} and all(row.failing for row in rows)
+    assert all(row.alarming for row in of_a_file(tmp_path, "bullet", Outcome.INVALID).values())
+    plain = [row.as_dict() for row in of_a_file(tmp_path, engine, Outcome.INVALID).values()]
+    assert alarms(plain) == [] and "* INVALID" not in as_markdown(plain) and "<failure" not in as_junit(plain)
+
+
+def test_a_force_that_an_engine_does_not_tell_is_no_failure_of_a_file(tmp_path):
+    told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, UNAVAILABLE)})[OWN_CHECK]
+    assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)
+    assert told.reason == UNAVAILABLE
+    lost = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, "the value is inf, not a finite number")})[OWN_CHECK]
+    assert lost.alarming and lost.outcome == "ok"

@@ -208,10 +208,19 @@ def test_places_angles_velocities_and_forces_are_shown(tmp_path):
         (", normal = [0.0, 1.0]", "", "its normal or by its angle"),
         ("ball.vy", "cube.vy", "checks.0.quantity: 'cube.vy' names no body"),
         ("ball.vy", "ball.vz", "checks.0.quantity: 'vz' is not one of"),
-        ("ball.vy", "floor/ball.vy", "only a force is between two bodies"),
+        ("ball.vy", "floor/ball.vy", "only a force and its like is between two bodies"),
+        ("ball.vy", "ball.overlap_without_force", "an overlap is of two bodies"),
+        ("at = 0.1", 'over = "least"', "checks.0.over: only a force and its like is told over time"),
+        ("at = 0.1", 'over = "median"', "checks.0.over"),
+        ('ball.vy"', 'ball.fy"\nover = "least"', "checks.0.over: at an instant there is one number"),
+        (
+            'ball.vy"\nvalue = -0.981\ntolerance = 1e-3\nat = 0.1',
+            'ball.fy"\nvalue = 1.0\ntolerance = 1e-3\n[[checks]]\n'
+            'quantity = "ball.fy"\nover = "greatest"\nvalue = 2.0\ntolerance = 1e-3',
+            "'ball.fy' is stated 2 times",
+        ),
         ("at = 0.1", "at = 0.9", "checks.0.at: 0.9 s is after the end"),
         ("tolerance = 1e-3", "tolerance = 0.0", "checks.0.tolerance"),
-        ("ball.vy", "ball.fy", "checks.0.at: a force is a mean"),
         ("ball.angle", "ball.vy", "checks.1.at"),
     ],
 )
@@ -330,3 +339,32 @@ def test_a_spatial_scene_has_no_plane_to_leave(tmp_path):
     )
     with pytest.raises(SceneError, match="growth: a spatial scene has no plane"):
         load_stated(path)
+
+
+# ---- numbers of pairs that nobody gives ----
+
+
+def pairs_notes(tmp_path, pairs):
+    """Notes about pairs of a scene of a floor and two balls, with these entries in the place of its own."""
+    other = GOOD[GOOD.index('[[bodies]]\nname = "ball"') : GOOD.index("[[pairs]]")].replace('"ball"', '"top"')
+    path = tmp_path / "scene.toml"
+    path.write_text(GOOD[: GOOD.index("[[pairs]]")] + other.replace("[0.0, 1.0, 0.0]", "[5.0, 3.0, 0.0]") + pairs)
+    return [note for note in load_stated(path).notes if note.startswith("pairs:")]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "said"),
+    [
+        ("", ["pairs: restitution 0 and friction 0 of all pairs, none was given"]),
+        ("[[pairs]]\nrestitution = 0.1\n", ["pairs: friction 0 of all pairs, none was given"]),
+        ("[[pairs]]\nfriction = 0.1\n", ["pairs: restitution 0 of all pairs, none was given"]),
+        ("[[pairs]]\nfriction = 0.0\nrestitution = 0.0\n", []),
+        ('[[pairs]]\na = "floor"\nb = "ball"\nfriction = 0.1\nrestitution = 0.2\n',
+         ["pairs: restitution 0 and friction 0 of pairs that no entry names, none was given"]),
+        ('[[pairs]]\na = "ball"\nfriction = 0.1\nrestitution = 0.2\n'
+         '[[pairs]]\na = "top"\nb = "floor"\nfriction = 0.3\n',
+         ["pairs: restitution 0 of top-floor, none was given"]),
+    ],
+)  # fmt: skip
+def test_friction_and_restitution_that_a_file_leaves_out_are_said(tmp_path, pairs, said):
+    assert pairs_notes(tmp_path, pairs) == said

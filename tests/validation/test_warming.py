@@ -171,3 +171,21 @@ def test_engines_that_compile_nothing_or_are_not_here_have_nothing_to_do(toy, mo
     toy()
     monkeypatch.setattr(Compiling, "kernels", lambda self: None)
     assert len(Warming(PLAN)) == 0 and len(Warming([SLOT])) == 0 and len(Warming([])) == 0
+
+
+@pytest.mark.parametrize(("before", "begun"), [([], False), ([2], True), ([3], False), ([3, 2], True)])
+def test_kernels_that_other_cells_have_compiled_are_said_to_be_there(tmp_path, monkeypatch, before, begun):
+    """A mark beside the kernels says of which dimension they are; new cells of one that is there wait for little."""
+
+    class Compiling(Engine):
+        profiles = MappingProxyType({})
+
+        def kernels(self):
+            return tmp_path
+
+    Compiling.__abstractmethods__ = frozenset()
+    monkeypatch.setattr(warming, "find", lambda name: SimpleNamespace(engine=Compiling()))
+    for dimension in before:
+        (tmp_path / f"warm-{dimension}.json").write_text(f'{{"cpu_seconds": 1.0, "dimension": {dimension}}}')
+    assert Warming([SLOT]).begun is begun
+    assert Warming([SLOT, replace(SLOT, dimension=3)]).begun is (len(before) == 2)

@@ -145,8 +145,10 @@ def test_a_stack_may_do_what_one_step_of_free_fall_adds(dimension, n, mass, g):
         "kinetic_energy": ("J", pytest.approx(n * mass * v1**2 / 2e4, rel=1e-12)),
         "impulse_scatter": ("1", 0.02),
         **{f"interface_impulse[{i}]": ("1", pytest.approx(0.02 * DT)) for i in range(1, n + 1)},
+        **{load: ("1", 0.02) for load in ("load[least]", "load[greatest]", "unbalanced")},
     }
     assert {m: c.truth for m, c in found.items()} == {m: 1.0 if "[" in m else 0.0 for m in found}
+    assert found.pop("unbalanced").source == "equilibrium of forces on each box"
     assert {c.source for m, c in found.items() if "[" not in m} == {"static equilibrium"}
     assert {c.source for m, c in found.items() if "[" in m} == {"weight above the interface"}
 

@@ -63,7 +63,9 @@ class Sweep:
         return tuple(self.dts) or resolve(scene).steps.dts(self.request.suite)
 
     def counts(self, scene: str) -> Sequence[int]:
-        """Iteration counts of a scene beside each profile's own."""
+        """Iteration counts of a scene beside each profile's own; none where the count is a setting of a user's own."""
+        if any(name == "iterations" for name, _ in self.request.sets):
+            return ()
         return tuple(self.iterations) or resolve(scene).steps.counts(self.request.suite)
 
 
@@ -91,7 +93,7 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
                 found.update(dict.fromkeys(slots(wanted)))
                 for count in sweep.counts(scene):
                     found.update(dict.fromkeys(slots(replace(wanted, iterations=[count]))))
-    return [slot for slot in found if _is_benched(sweep.request, slot.engine, slot.profile)]
+    return [slot for slot in found if _is_benched(sweep.request, slot.engine, slot.base)]
 
 
 def _is_benched(request: Request, engine: str, profile: str) -> bool:
@@ -128,15 +130,21 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
         for profile in (getattr(find(name).engine, "profiles", None) or ())
         if _is_benched(request, name, profile)
     ]
+    own = {(o.slot.engine, o.slot.base): o.slot.switched for o in observations}
+    if request.sets:
+        engines = list(own)
     dimensions = tuple(request.dimensions) or (2, 3)
-    units += overhead_units(engines, dimensions)
+    piles = list(overhead_units(engines, dimensions))
     scaled = [(scene, size) for scene in request.scenes if (size := resolve(scene).size)]
     if scaled:
         sizes = SCALING[suite]
         shown = dimensions[:1] if suite == "quick" else dimensions
-        units += size_units(engines, shown, scaled, sizes.counts, sizes.rows)
-        units += iteration_units(engines, shown, sizes.iterations, sizes.iteration_rows)
-    return units
+        piles += size_units(engines, shown, scaled, sizes.counts, sizes.rows)
+        if not any(name == "iterations" for name, _ in request.sets):
+            piles += iteration_units(engines, shown, sizes.iterations, sizes.iteration_rows)
+    if request.sets:
+        piles = [replace(each, slot=each.slot.with_own(own[each.slot.engine, each.slot.profile])) for each in piles]
+    return units + piles
 
 
 def _work_units(members: Sequence[Observation]) -> Iterator[Unit]:

@@ -133,7 +133,7 @@ def runs(slot: Slot) -> bool:
         return False
     if slot.iterations is None:
         return True
-    return any(s.name == "iterations" for s in engine.settings(slot.profile, needs(scene_of(slot)), slot.dt))
+    return any(s.name == "iterations" for s in engine.settings(slot.base, needs(scene_of(slot)), slot.dt))
 
 
 @lru_cache(maxsize=64)

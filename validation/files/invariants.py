@@ -11,7 +11,9 @@ so that neither a long run nor a fast one widens a bound. A body that sinks slow
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -32,7 +34,8 @@ def checks(scene: Scene, dt: float) -> list[Check]:
         0.0,
         energy_bound(scene, dt),
         "a step order shows a conserved energy with half a step of its loads' work (taken off at each sample's own "
-        "speed): left is the work of a load over the step that it starts in, F^2 dt^2/m, and round-off",
+        "speed), and what two bodies that start in each other get for parting is taken off: left is the work of a load "
+        "over the step that it starts in, F^2 dt^2/m, and round-off",
         "contacts only take energy (e <= 1)",
     )
     depth = Check(
@@ -99,16 +102,23 @@ def mechanical_energy(scene: Scene, trajectory: Trajectory) -> Array:
     return energy
 
 
-def energy_growth(scene: Scene, trajectory: Trajectory) -> Measured:
+#: Depth of the overlap of pairs of bodies at each sample, (s,) [m].
+Overlaps = Mapping[tuple[int, int], Array]
+
+
+def energy_growth(scene: Scene, trajectory: Trajectory, overlaps: Overlaps = MappingProxyType({})) -> Measured:
     """Largest growth of the mechanical energy since the start, less half a step of the loads' power [J].
 
     Semi-implicit steps conserve the energy with potentials taken half a step of the present velocity away, and a
     mid-point step the plain one: what is sampled differs by at most ``|L . v| dt/2``, now and at the start. Round-off
     of the energies that are compared is taken off as well, sample by sample.
+
+    An overlap d that a scene starts with is its author's: it is worked off against the load, ``|L| d``, and whoever
+    undoes it in a step moves its bodies at d/dt. So much is granted to each body of a pair of ``overlaps``.
     """
     d = scene.dimension
     energy = mechanical_energy(scene, trajectory)
-    ripple = ROUND_OFF * metrics.kinetic_energy(scene, trajectory)
+    ripple = ROUND_OFF * metrics.kinetic_energy(scene, trajectory) + _parting(scene, trajectory, overlaps)
     for i in metrics.free_bodies(scene):
         body = scene.bodies[i]
         power = np.abs(trajectory.twist[:, i, :d] @ _load(scene, body))
@@ -118,6 +128,17 @@ def energy_growth(scene: Scene, trajectory: Trajectory) -> Measured:
         ripple += ROUND_OFF * math.hypot(*_load(scene, body)) * path
     # Not Python's max: what is no number must stay none, or energies beyond all numbers would read as no growth.
     return float(np.maximum(0.0, energy - energy[0] - ripple).max()), ""
+
+
+def _parting(scene: Scene, trajectory: Trajectory, overlaps: Overlaps) -> float:
+    """What bodies may gain that start in each other: lifted out, and moved at overlap/dt [J]."""
+    gain = 0.0
+    for pair, depth in overlaps.items():
+        for body in (scene.bodies[k] for k in pair):
+            if body.motion == "free":
+                lift = math.hypot(*_load(scene, body)) * depth[0]
+                gain += float(lift + 0.5 * body.mass * (depth[0] / trajectory.dt) ** 2)
+    return gain
 
 
 def energy_bound(scene: Scene, dt: float) -> float:
@@ -140,10 +161,13 @@ def energy_bound(scene: Scene, dt: float) -> float:
 # ---- overlap -------------------------------------------------------------------------------------------------------
 
 
-def deepest(scene: Scene, trajectory: Trajectory) -> tuple[Measured, Measured]:
-    """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m]."""
+def deepest(scene: Scene, trajectory: Trajectory, overlaps: Overlaps | None = None) -> tuple[Measured, Measured]:
+    """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m].
+
+    ``overlaps`` are measured here where they are not handed in.
+    """
     beyond, depth = 0.0, 0.0
-    for (i, j), overlap in metrics.overlaps(scene, trajectory).items():
+    for (i, j), overlap in (metrics.overlaps(scene, trajectory) if overlaps is None else overlaps).items():
         depth = metrics.largest([depth, overlap.max()])
         granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j))
         beyond = metrics.largest([beyond, (overlap - granted).max()])

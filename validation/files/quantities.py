@@ -1,4 +1,4 @@
-"""Quantities of one body that a scene file shows and may state: place, angle, velocity, force of its contacts."""
+"""Quantities that a scene file shows and may state: place, angle and velocity of a body, forces of its contacts."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from adapters.scene import Scene
 from adapters.trajectory import Trajectory
 from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
+from validation.files import forces
 from validation.metrics import UNAVAILABLE
 
 #: Quantities of one body that a check may name, by dimension; forces are those of all its contacts.
@@ -28,6 +29,8 @@ _AXES = "xyz"
 def unit(quantity: str) -> str:
     """Unit of ``ball.vx`` and its like."""
     what = parts_of(quantity)[2]
+    if what in forces.OTHERS[3]:
+        return {"contacts": "1", "overlap_without_force": "m"}.get(what, "N")
     if what == "angle":
         return "rad"
     if what == "omega" or what.startswith("w"):
@@ -40,11 +43,20 @@ def force_window(scene: Scene) -> float:
     return min(WINDOW, 0.5 * scene.duration)
 
 
-def quantity(scene: Scene, trajectory: Trajectory, name: str, at: float | None = None) -> Measured:
-    """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None; forces are means over `force_window`."""
-    partner, body, what = parts_of(name, [member.name for member in scene.bodies])
-    if what.startswith("f"):
+def quantity(
+    scene: Scene, trajectory: Trajectory, name: str, at: float | None = None, over: str | None = None
+) -> Measured:
+    """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None.
+
+    What is known step by step (`forces.is_over_time`) is told by its mean over `force_window`, or by ``over``.
+    """
+    partner, body, what = parts_of(name, scene.places.keys())
+    if what.startswith("f") and at is None and over in (None, "mean"):
         return _force(scene, trajectory, scene.index(body), partner, "fxfyfz".index(what) // 2)
+    if forces.is_over_time(what):
+        other = None if partner is None else scene.index(partner)
+        window = forces.window_of(trajectory, at, force_window(scene))
+        return forces.told(scene, trajectory, scene.index(body), other, what, over or "mean", window)
     values = _history(trajectory, scene.index(body), what)
     return float(np.interp(trajectory.t[-1] if at is None else at, trajectory.t, values)), ""
 
@@ -85,13 +97,13 @@ def _force(scene: Scene, trajectory: Trajectory, body: int, partner: str | None,
     contacts = trajectory.contacts
     if contacts is None or len(contacts.step) == 0:
         return None, "contacts were not recorded"
-    others = range(len(scene.bodies)) if partner is None else [scene.index(partner)]
     late = trajectory.t[contacts.step] > trajectory.t[-1] - force_window(scene) + 0.5 * trajectory.dt
-    total = np.zeros(int(late.sum()))
-    for other in others:
-        if other != body:
-            sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
-            total += sign * contacts.impulse_between(other, body)[late, axis]
+    if partner is None:
+        total = contacts.impulse_on(body)[late, axis]
+    else:
+        other = scene.index(partner)
+        sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
+        total = sign * contacts.impulse_between(other, body)[late, axis]
     if np.isnan(total).any():
         return None, UNAVAILABLE
     return float(total.sum() / (len(total) * trajectory.dt)), ""

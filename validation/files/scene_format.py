@@ -1,8 +1,8 @@
 """Format of a scene file: its fields, and how what a user states becomes a scene.
 
-Types are checked here by pydantic, physics by `adapters.scene.Scene`. Three things are filled in or put right, and each
-is said in a note that goes with the scene: the mass and the moments of inertia of a free body that gives none, and
-the length of a half-space's normal.
+Types are checked here by pydantic, physics by `adapters.scene.Scene`. Four things are filled in or put right, and each
+is said in a note that goes with the scene: the mass and the moments of inertia of a free body that gives none, the
+restitution and friction of pairs that nobody gives, and the length of a half-space's normal.
 """
 
 from __future__ import annotations
@@ -13,15 +13,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator
 
+from adapters.materials import Materials
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
 from adapters.shapes import MOST_VERTICES, check_length
+from validation.files import forces
 from validation.files.centring import centre
 from validation.files.expressions import FUNCTIONS, FormulaError, value_of
 from validation.files.mass_properties import HOW, moments, volume
 from validation.files.quantities import QUANTITIES, parts_of
 from validation.files.scene_text import listed
 from validation.files.stated import Stated, StatedCheck
+from validation.metrics import OVER_TIME
 
 
 class SceneErrors(SceneError):
@@ -157,10 +160,17 @@ class CheckModel(_Strict):
     ----------
     quantity
         ``BODY.QUANTITY`` such as ``ball.y`` [m], ``box.angle`` [rad, turned since the start], ``ball.vx`` [m/s],
-        ``box.omega`` [rad/s], ``box.fy`` [N, mean force of all contacts on the body over the last second, or the last
-        half of a shorter run]; ``floor/box.fy`` is the force of the contacts with ``floor`` alone.
+        ``box.omega`` [rad/s], ``box.fy`` [N, force of all contacts on the body]; ``floor/box.fy`` is the force of the
+        contacts with ``floor`` alone. ``floor/box.contact_fy`` [N] is the force of each single contact,
+        ``floor/box.contacts`` their number, and ``floor/box.overlap_without_force`` [m] how deep the two overlap
+        throughout a step in which they do not push each other. These are known step by step.
     at
-        When [s]; the end if it is missing. Between two samples the quantity is interpolated. Forces have no ``at``.
+        When [s]; the end if it is missing. Between two samples a place, angle or velocity is interpolated. A force is
+        that of the step which the instant lies in, the impulse of the step over its length.
+    over
+        By what a force and its like are told over the last second, or the last half of a shorter run: ``mean``,
+        ``least``, ``greatest`` or ``spread`` (standard deviation from step to step). Without it the value must hold all
+        the time: mean, least and greatest within the tolerance of it, and the spread within the tolerance of 0.
     because
         Where the number comes from; shown with the verdict.
     """
@@ -169,6 +179,7 @@ class CheckModel(_Strict):
     value: Number | str
     tolerance: Annotated[Number, Field(gt=0.0)] | str
     at: Number | None = Field(default=None, ge=0.0)
+    over: Literal["mean", "least", "greatest", "spread"] | None = None
     because: str = "stated in the scene file"
 
 
@@ -232,16 +243,43 @@ def stated(model: SceneModel) -> Stated:
         raise SceneErrors([*wrong, _why(error, "gravity")]) from None
     numbered = [(f"checks.{k}", check) for k, check in enumerate(model.checks)]
     right = [(label, check) for label, check in numbered if _is_right(label, check, scene, wrong)]
-    quantities = [(check.quantity, check.at) for check in model.checks]
-    for quantity, at in dict.fromkeys(quantities):
-        if quantities.count((quantity, at)) > 1:
-            wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at))} times")
+    quantities = [(check.quantity, check.at, over) for check in model.checks for over in _overs(check, scene)]
+    for quantity, at, over in dict.fromkeys(quantities):
+        if quantities.count((quantity, at, over)) > 1:
+            wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at, over))} times")
+    notes += _materials(model, scene)
     names = dict(told(model, scene, wrong))
-    made = [_stated(label, check, scene, names, wrong) for label, check in right]
+    made = [each for label, check in right for each in _stated(label, check, scene, names, wrong)]
     growth = _growth(model, scene, names, wrong)
     if wrong:
         raise SceneErrors(list(dict.fromkeys(wrong)))
-    return Stated(scene, tuple(notes), tuple(check for check in made if check is not None), growth)
+    return Stated(scene, tuple(notes), tuple(made), growth)
+
+
+def _overs(check: CheckModel, scene: Scene) -> tuple[str | None, ...]:
+    """By what the quantity of a check is told: what holds of a force at all times holds of each of these."""
+    _, _, what = parts_of(check.quantity, scene.places.keys())
+    if check.over is not None:
+        return (check.over,)
+    # At one instant a force between two bodies is one number; single contacts may differ.
+    is_many = forces.is_over_time(what) and (check.at is None or what.startswith("contact_"))
+    return tuple(OVER_TIME) if is_many else (None,)
+
+
+def _materials(model: SceneModel, scene: Scene) -> Iterator[str]:
+    """What is filled in of pairs: numbers that an entry leaves out, and pairs that no entry is about."""
+    for pair in model.pairs:
+        left = [name for name in ("restitution", "friction") if name not in pair.model_fields_set]
+        which = "all pairs" if (pair.a, pair.b) == (Pair.a, Pair.b) else f"{pair.a}-{pair.b}"
+        for name in left:
+            yield f"pairs: {name} {getattr(Pair, name):g} of {which}, none was given"
+    if any((pair.a, pair.b) == (Pair.a, Pair.b) for pair in scene.pairs):
+        return
+    untold = Pair(restitution=-1.0, friction=-1.0)  # no scene has such numbers
+    free = {body.name: body.motion == "free" for body in scene.bodies}
+    if (-1.0, -1.0) in Materials((*scene.pairs, untold)).materials(free):
+        which = "pairs that no entry names" if scene.pairs else "all pairs"
+        yield f"pairs: restitution {Pair.restitution:g} and friction {Pair.friction:g} of {which}, none was given"
 
 
 def _growth(model: SceneModel, scene: Scene, names: dict[str, float], wrong: list[str]) -> float:
@@ -293,8 +331,8 @@ def told(model: SceneModel, scene: Scene, wrong: list[str]) -> Iterator[tuple[st
 
 def _stated(
     label: str, check: CheckModel, scene: Scene, names: dict[str, float], wrong: list[str]
-) -> StatedCheck | None:
-    """The check with its value; its tolerance, too, is tried, at a step of 1 s and of a nanosecond."""
+) -> Iterator[StatedCheck]:
+    """The check with its value, for each number it is told by; its tolerance is tried at steps of 1 s and 1 ns."""
     when = scene.duration if check.at is None else check.at
     here = {**names, "t": when}
     field = "value"
@@ -306,9 +344,12 @@ def _stated(
                 raise FormulaError(f"{check.tolerance!r} is not greater than 0 at a step of {dt:g} s")
     except FormulaError as error:
         wrong.append(f"{label}.{field}: {error}")
-        return None
-    formula = isinstance(check.tolerance, str)
-    return StatedCheck(check.quantity, value, check.tolerance, check.at, check.because, here if formula else {})
+        return
+    used = here if isinstance(check.tolerance, str) else {}
+    for over in _overs(check, scene):
+        # What is the same at all times has no spread.
+        own = 0.0 if over == "spread" and check.over is None else value
+        yield StatedCheck(check.quantity, own, check.tolerance, check.at, check.because, used, over)
 
 
 def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
@@ -383,13 +424,18 @@ def _is_right(label: str, check: CheckModel, scene: Scene, wrong: list[str]) -> 
     for name in (name for name in (body, partner) if name is not None):
         if name not in names:
             wrong.append(f"{label}.quantity: {check.quantity!r} names no body of the scene: {', '.join(names)}")
-    if what not in QUANTITIES[scene.dimension]:
-        wrong.append(f"{label}.quantity: {what!r} is not one of {', '.join(QUANTITIES[scene.dimension])}")
-    is_force = what.startswith("f")
-    if partner is not None and not is_force:
-        wrong.append(f"{label}.quantity: {check.quantity!r}: only a force is between two bodies")
-    if is_force and check.at is not None:
-        wrong.append(f"{label}.at: a force is a mean over the end of the run, it has no instant")
+    known = (*QUANTITIES[scene.dimension], *forces.OTHERS[scene.dimension])
+    if what not in known:
+        wrong.append(f"{label}.quantity: {what!r} is not one of {', '.join(known)}")
+    is_over_time = forces.is_over_time(what)
+    if partner is not None and not is_over_time:
+        wrong.append(f"{label}.quantity: {check.quantity!r}: only a force and its like is between two bodies")
+    if partner is None and what == "overlap_without_force":
+        wrong.append(f"{label}.quantity: {check.quantity!r}: an overlap is of two bodies: BODY/BODY.{what}")
+    if check.over is not None and not is_over_time:
+        wrong.append(f"{label}.over: only a force and its like is told over time")
+    elif check.over is not None and check.at is not None and not what.startswith("contact_"):
+        wrong.append(f"{label}.over: at an instant there is one number, without mean, least or greatest")
     if check.at is not None and check.at > scene.duration:
         wrong.append(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
     return len(wrong) == before

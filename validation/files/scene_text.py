@@ -16,10 +16,10 @@ from pydantic import ValidationError
 from adapters.plain import one_line
 from adapters.scene import SceneError
 
-#: Largest file that is read [bytes]: some 5000 bodies, parsed in about a second.
-MOST_BYTES = 2**20
-#: Most bodies: every pair that can meet is measured at every sample, and 1000 bodies have half a million pairs.
-MOST_BODIES = 1000
+#: Largest file that is read [bytes]: some 10 000 bodies, parsed in about a second.
+MOST_BYTES = 2**21
+#: Most bodies: what is ours of a cell of columns takes 2 to 3 ms a body, so that these cost half a minute.
+MOST_BODIES = 10_000
 #: Wrong fields that are named before the rest is counted.
 MOST_ERRORS = 10
 

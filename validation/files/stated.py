@@ -13,17 +13,23 @@ from typing import Any
 
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
+from validation import metrics
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.files import invariants
 from validation.files.expressions import value_of
-from validation.files.quantities import force_window, quantity, shown_quantities, unit
+from validation.files.forces import is_over_time
+from validation.files.quantities import force_window, parts_of, quantity, shown_quantities, unit
+
+#: Source of the numbers that the author of a scene states.
+STATED = "the scene file's [[checks]]"
 
 
 @dataclass(frozen=True)
 class StatedCheck:
     """A number that the author of a scene knows; see `validation.files.scene_format.CheckModel`.
 
-    A tolerance may be a formula in the step `dt`; ``names`` holds what else it may name.
+    A tolerance may be a formula in the step `dt`; ``names`` holds what else it may name. ``over`` is by what a quantity
+    of many steps is told (`validation.metrics.OVER_TIME`); None is its mean.
     """
 
     quantity: str
@@ -32,6 +38,12 @@ class StatedCheck:
     at: float | None
     because: str
     names: Mapping[str, float] = field(default_factory=dict)
+    over: str | None = None
+
+    @property
+    def metric(self) -> str:
+        """Name of the metric that it judges."""
+        return _metric(self.quantity, self.at, self.over)
 
     def bound(self, dt: float) -> float:
         """Tolerance at step ``dt`` [s], in the quantity's unit."""
@@ -78,40 +90,53 @@ def canonical_of(read: Stated, title: str) -> CanonicalScene:
         exact=lambda scene: _exact(read),
         measure=lambda scene, trajectory: _measure(read, trajectory),
         rule=lambda scene, dt, truth: _checks(read, dt),
-        sampling=lambda scene: Sampling(1, scene.duration - force_window(scene)),
+        sampling=lambda scene: Sampling(1, _contacts_from(read)),
         growth=lambda scene: read.growth,
         notes=read.notes,
     )
 
 
+def _contacts_from(read: Stated) -> float:
+    """Time from which contacts are recorded [s]: that of forces at the end, or the first instant stated of one."""
+    names = [body.name for body in read.scene.bodies]
+    over_time = [check for check in read.checks if is_over_time(parts_of(check.quantity, names)[2])]
+    instants = [check.at for check in over_time if check.at is not None]
+    return min([read.scene.duration - force_window(read.scene), *instants])
+
+
 def _exact(read: Stated) -> dict[str, float]:
-    told = {_metric(check.quantity, check.at): check.value for check in read.checks}
-    return {"energy_growth": 0.0, "penetration": 0.0, **told}
+    return {"energy_growth": 0.0, "penetration": 0.0, **{check.metric: check.value for check in read.checks}}
 
 
-def _metric(name: str, at: float | None = None) -> str:
-    """Name of a quantity's metric: ``final[ball.y]``, or ``at[0.25 s][ball.y]``."""
-    return f"final[{name}]" if at is None else f"at[{at:.12g} s][{name}]"
+def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
+    """Name of a quantity's metric: ``final[ball.y]``, ``at[0.25 s][ball.y]``, ``least[floor/ball.fy]``."""
+    when = "final" if at is None else f"at[{at:.12g} s]"
+    if over in (None, "mean"):
+        return f"{when}[{name}]"
+    return f"{over}[{name}]" if at is None else f"{over} {when}[{name}]"
 
 
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
+    overlaps: invariants.Overlaps = {}
     try:
-        beyond, depth = invariants.deepest(read.scene, trajectory)
+        overlaps = metrics.overlaps(read.scene, trajectory)
+        beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
         beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
     measured: dict[str, Measured] = {
-        "energy_growth": invariants.energy_growth(read.scene, trajectory),
+        "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
         "deepest_overlap": depth,
     }
-    shown = [(name, None) for name in shown_quantities(read.scene)]
-    for name, at in [*shown, *((check.quantity, check.at) for check in read.checks)]:
-        measured[_metric(name, at)] = quantity(read.scene, trajectory, name, at)
+    for name in shown_quantities(read.scene):
+        measured[_metric(name)] = quantity(read.scene, trajectory, name)
+    for check in read.checks:
+        measured[check.metric] = quantity(read.scene, trajectory, check.quantity, check.at, check.over)
     return measured
 
 
 def _checks(read: Stated, dt: float) -> list[Check]:
-    told = {_metric(check.quantity, check.at): check for check in read.checks}
+    told = {check.metric: check for check in read.checks}
     final = "shown for comparison between engines: the file states no number for it"
     names = {_metric(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
@@ -120,6 +145,4 @@ def _checks(read: Stated, dt: float) -> list[Check]:
 
 
 def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
-    return Check(
-        metric, unit(check.quantity), check.value, check.bound(dt), check.because, "the scene file's [[checks]]"
-    )
+    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED)

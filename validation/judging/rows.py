@@ -14,7 +14,8 @@ from adapters.engine import EngineError
 from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
-from validation.findings import Findings, FindingsError, Known, known_of, solutions_of
+from validation.files.stated import STATED
+from validation.findings import Findings, FindingsError, Known, known_of
 from validation.findings.files import brought_by_ours, findings_of
 from validation.judging.predicting import Asked, foretold, predictions
 from validation.judging.studies import StudyResult, results, study_of
@@ -27,6 +28,7 @@ from validation.judging.verdicts import (
     judge_divergence,
     judge_physics,
 )
+from validation.metrics import UNAVAILABLE
 from validation.posed import is_file, is_model, resolve
 
 #: Standings and outcomes that make the command exit 1.
@@ -34,6 +36,8 @@ ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
 #: Why a row of a model has no standing.
 OWN_MODEL = "not listed: your own model"
+#: Why a row of a profile with settings of a user's own has none.
+OWN_SETTINGS = "not listed: with settings of your own"
 #: What laws say about rows, asked ahead of the others.
 Ready = Mapping[Asked, list[Prediction]]
 #: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
@@ -82,11 +86,33 @@ class Row:
     @property
     def alarming(self) -> bool:
         """Whether this row makes the command fail."""
-        return self.standing in ALARMING_STANDINGS or self.outcome in ALARMING_OUTCOMES
+        return is_alarming(vars(self))
+
+    @property
+    def failing(self) -> bool:
+        """Whether this row makes a strict command fail: whatever has no PASS and was asked, listed or not."""
+        return self.alarming or self.physics == Physics.FAIL.value or self.outcome in ALARMING_OUTCOMES
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data; its lists and tables are not copied."""
         return dict(vars(self))
+
+
+def is_alarming(row: Mapping[str, Any]) -> bool:
+    """Whether a row, as plain data, makes the command fail.
+
+    Cells that crash, take too long or are missing do so whoever ran them. So do rows that should be listed and are not,
+    and numbers that the author of a scene file states (`_known` gives both their standing). Of models, and of engines
+    without a list, INVALID is as little of an alarm as a FAIL.
+    """
+    if row["outcome"] == Outcome.INVALID.value and not is_listed(row["engine"], row["scene"]):
+        return False
+    return row["standing"] in ALARMING_STANDINGS or row["outcome"] in ALARMING_OUTCOMES
+
+
+def is_listed(engine: str, scene: str) -> bool:
+    """Whether what is wrong with an engine in a scene has a list that it could stand on."""
+    return not is_model(scene) and _findings(engine)[0] is not None
 
 
 def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] = ()) -> list[Row]:
@@ -144,6 +170,9 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
     doubt = _doubt(observation, check)
     if doubt:
         observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
+    if value is None and why == UNAVAILABLE and observation.outcome is Outcome.OK and is_file(observation.slot.scene):
+        # What an engine does not tell is no fault of its motion; in the catalogue it is listed which engines do not.
+        observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = _verdict(observation, scene, check, value, why, ready)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
@@ -164,21 +193,31 @@ def _verdict(
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
-    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene):
+    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene) and not slot.is_own:
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
+    if check.source == STATED:  # its author knows the number: no list excuses an engine
+        return Known(None, True)
+    if slot.is_own:
+        return Known(None, False, "; ".join([OWN_SETTINGS, *_not_as_asked(observation)]))
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
         return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
-    if is_model(slot.scene):  # nothing can be listed of it; a profile that promises a solution keeps its promise
-        return Known(None, slot.profile in solutions_of(slot.engine), OWN_MODEL)
+    if is_model(slot.scene):  # nothing can be listed of it
+        return Known(None, False, OWN_MODEL)
     findings, why_not = _findings(slot.engine)
     if why_not:
         return Known(None, False, why_not)
     return known_of(slot, check.metric, observation.engine_version, findings)
+
+
+def _not_as_asked(observation: Observation) -> list[str]:
+    """What probes measured of settings of a user's own that is not what the scene asks for."""
+    off = [slip for slip in observation.receipts if not slip["holds"] and slip["measured"] is not None]
+    return [f"{s['quantity']} asked {s['asked']:.4g}, measured {s['measured']:.4g}" for s in off]
 
 
 def _findings(engine: str) -> tuple[Findings | None, str]:
@@ -217,10 +256,10 @@ def _certificate(observation: Observation, check: Check) -> str:
 def _is_asked(observation: Observation, check: Check) -> bool:
     """Whether laws are asked about a row: a FAIL of a cell of the catalogue.
 
-    A file that has the name of a scene is another scene. At iterations asked for those laws alone answer that follow
-    an engine's sweeps.
+    A file that has the name of a scene is another scene, and laws know the settings of profiles only. At iterations
+    asked for those laws alone answer that follow an engine's sweeps.
     """
-    if observation.outcome is not Outcome.OK or is_file(observation.slot.scene):
+    if observation.outcome is not Outcome.OK or is_file(observation.slot.scene) or observation.slot.switched:
         return False
     return judge_physics(observation.metrics.get(check.metric, (None, ""))[0], check) is Physics.FAIL
 
@@ -242,6 +281,8 @@ def predictions_of(row: Row) -> list[Prediction]:
     if row.physics != Physics.FAIL.value or len(row.cells) > 1 or is_file(row.scene):
         return []
     slot = slot_from_dict(row.slot)
+    if slot.switched:
+        return []
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     try:
         return predictions(slot, row.engine_version, row.metric, scene)

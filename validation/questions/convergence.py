@@ -45,6 +45,7 @@ class Limit(Enum):
     ELSEWHERE = "converges elsewhere"
     NOT = "does not converge"
     NOISY = "too noisy to say"
+    FEW = "too few steps to say"
 
 
 @dataclass(frozen=True)
@@ -116,11 +117,11 @@ def limit_of(
     must be one that an order of at most `HIGHEST_ORDER` makes: else it may be a lucky phase.
     """
     if not errors:
-        return None, Limit.NOISY, "no step has a measured error"
+        return None, Limit.FEW, "no step has a measured error"
+    if len(errors) < 3:
+        return None, Limit.FEW, f"{len(errors)} of 3"
     if max(errors) <= floor:
         return None, Limit.TRUTH, "exact to round-off at every step"
-    if len(errors) < 3:
-        return None, Limit.NOISY, f"too few steps: {len(errors)} of 3"
     above = [(dt, error) for dt, error in zip(dts, errors, strict=True) if error > floor]
     if errors[-1] <= floor:
         return None, *_round_off_limit(dts, errors, floor)
@@ -128,7 +129,7 @@ def limit_of(
     if max(errors[-3:]) <= LEVEL * min(errors[-3:]) and dts[-3] >= 4.0 * dts[-1] * (1.0 - 1e-9):
         return fit, Limit.ELSEWHERE, f"levels off at an error of {errors[-1]:.2g}"
     if fit is None or len(above) < 3:
-        return fit, Limit.NOISY, "too few errors above round-off for an order"
+        return fit, Limit.FEW, "too few errors above round-off for an order"
     said = f"order {fit.order:.2f} +- {fit.standard_error:.2f}"
     if fit.order - 2.0 * fit.standard_error > 0.0:
         return fit, Limit.TRUTH, f"{said} over {len(above)} steps"

@@ -187,7 +187,7 @@ def run_only(slot: Slot) -> Observation:
     blank = Observation(slot, "", canonical.version, find(slot.engine).version, Outcome.CRASHED)
     try:
         engine = load(slot.engine)
-        refusal = checked_refusal(engine.refusal(posed_for(engine, scene), slot.profile, slot.dt))
+        refusal = checked_refusal(engine.refusal(posed_for(engine, scene), slot.base, slot.dt))
         if refusal:
             return replace(blank, outcome=Outcome.UNSUPPORTED, reason=refusal)
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}

@@ -32,6 +32,7 @@ from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from validation.canonical import CanonicalScene
 from validation.cells import Slot, numbers_of, settings_of
+from validation.metrics import UNAVAILABLE
 from validation.posed import resolve
 from validation.running.apart import Apart
 
@@ -48,6 +49,10 @@ INVISIBLE = 1e-3
 FAR = 1e3
 
 Metrics = Mapping[str, Measured]
+
+
+class Refusal(str):
+    """Why an engine cannot be asked a scene: it says so itself, and has failed at nothing."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,8 @@ class Change:
     refused
         Why the relation cannot be asked here, or what the engine said instead of an answer.
     lost
-        Whether the engine answers the scene itself and not the scene posed otherwise: that is a change, too.
+        Whether the engine answers the scene itself and fails on the scene posed otherwise: that is a change, too. That
+        it refuses it, or does not tell a force there, is none.
     """
 
     relation: str
@@ -363,9 +369,9 @@ def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) 
         return posed
     try:
         engine = load(slot.engine)
-        refusal = checked_refusal(engine.refusal(posed_for(engine, posed.scene), slot.profile, slot.dt))
+        refusal = checked_refusal(engine.refusal(posed_for(engine, posed.scene), slot.base, slot.dt))
         if refusal:
-            return refusal
+            return Refusal(refusal)
         # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
         found = run(engine, _nudged(posed.scene, moves, turns), slot.dt, settings, canonical.sampling(scene))
@@ -524,11 +530,11 @@ class Allowances:
 def judged(relation: str, base: Metrics, answer: Metrics | str, allowances: Allowances) -> Change:
     """The metric that changed most for what it may."""
     if isinstance(answer, str):
-        return Change(relation, refused=answer, lost=True)
+        return Change(relation, refused=answer, lost=not isinstance(answer, Refusal))
     worst = Change(relation)
     for name, (value, _) in base.items():
-        other = answer.get(name, (None, ""))[0]
-        if value is None:
+        other, why = answer.get(name, (None, ""))
+        if value is None or (other is None and why == UNAVAILABLE):
             continue
         allowed = allowances.of(name, value)
         change = math.inf if other is None else abs(other - value)

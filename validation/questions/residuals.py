@@ -148,7 +148,7 @@ def measured(slot: Slot) -> Residuals:
     scene = canonical.scene(slot.dimension, dict(slot.params))
     try:
         engine = load(slot.engine)
-        refusal = checked_refusal(engine.refusal(posed_for(engine, scene), slot.profile, slot.dt))
+        refusal = checked_refusal(engine.refusal(posed_for(engine, scene), slot.base, slot.dt))
         if refusal:
             return Residuals(slot, _nothing(refusal), refused=refusal)
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}

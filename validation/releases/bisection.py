@@ -105,6 +105,9 @@ def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool
         if not rows:
             return Unchanged(f"release {index} cannot be asked: {questions.silent[index]}")
     changes = sorted(_changes(first.values(), last.values()), key=by_seriousness)
+    if not changes and all(row["value"] is None for row in (*first.values(), *last.values())):
+        why = next(iter(last.values()))["reason"]
+        return Unchanged(f"release 0 has no value of {metric}, nor has release {count - 1} : {why}")
     if not changes:
         return Unchanged("")
     key = next(k for k, row in last.items() if row["slot"] == changes[0].slot and row["metric"] == changes[0].metric)

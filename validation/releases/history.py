@@ -118,12 +118,15 @@ def times(store: Store, engine: str, version: str) -> dict[Key, float]:
 
 
 def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapping[Key, float] | None = None) -> Told:
-    """Judge what a release answered; a profile of which a receipt fails there has no verdicts."""
+    """Judge what a release answered; a profile of which a receipt fails there has no verdicts.
+
+    With settings of a user's own nothing is declared that could fail.
+    """
     found = list(found)
     doubts: dict[str, str] = {}
     for observation in found:
         broken = [slip for slip in observation.receipts if not slip["holds"]]
-        if broken and observation.slot.profile not in doubts:
+        if broken and not observation.slot.is_own and observation.slot.profile not in doubts:
             doubts[observation.slot.profile] = f"receipt {broken[0]['quantity']} fails in {observation.slot.scene}"
     rows = tuple(_doubted(row, doubts) for row in rows_of(f"{engine}=={version}", found))
     answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)

@@ -10,7 +10,7 @@ from typing import Any
 
 from adapters.engine import Engine
 from adapters.stepping import run, step_count
-from adapters.trajectory import Trajectory
+from adapters.trajectory import Sampling, Trajectory
 from validation.cells import Prepared, Slot
 
 #: Fewest steps between two ends that both runs share, and how many times as many steps the other run makes: the square
@@ -61,25 +61,34 @@ def _metric_errors(
     canonical, scene = prepared.canonical, prepared.scene
     sampling, steps = canonical.sampling(scene), step_count(scene.duration, slot.dt)
 
-    def finer(steps: int, more: int, stride: int) -> Trajectory:
+    def finer(steps: int, more: int, sampling: Sampling) -> Trajectory:
         """The first ``steps`` steps once more, in ``more`` of them."""
-        own = replace(scene, duration=steps * slot.dt)
-        return run(engine, own, steps / more * slot.dt, settings, replace(sampling, stride=stride))
+        return run(engine, replace(scene, duration=steps * slot.dt), steps / more * slot.dt, settings, sampling)
+
+    def measured(one: Trajectory) -> dict[str, float | None]:
+        return {name: value for name, (value, _) in canonical.measure(scene, one).items()}
 
     def differences(one: Trajectory, other: Trajectory) -> dict[str, float | None]:
-        here, there = canonical.measure(scene, one), canonical.measure(scene, other)
-        return {name: _difference(value, there[name][0]) for name, (value, _) in here.items()}
+        there = measured(other)
+        return {name: _difference(value, there[name]) for name, value in measured(one).items()}
 
-    if sampling.contacts_from is not None:  # impulses are those of a step, and metrics know of which
-        halves = differences(trajectory, finer(steps, 2 * steps, 1))
-        others = differences(trajectory, finer(steps, _coprime(steps), 1))
-    else:  # the same samples: what a metric owes to their spacing is no error of the run
-        halves = differences(trajectory, replace(finer(steps, 2 * steps, 2 * sampling.stride), dt=slot.dt))
-        each, blocks, more = _elsewhere(steps // sampling.stride, sampling.stride)
-        other = finer(blocks * each * sampling.stride, blocks * more, more)
-        others = differences(_told(trajectory, slice(0, blocks * each + 1, each)), replace(other, dt=slot.dt))
+    # The same samples: what a metric owes to their spacing is no error of the run.
+    states = replace(trajectory, contacts=None)
+    apart = Sampling(2 * sampling.stride)
+    each, blocks, more = _elsewhere(steps // sampling.stride, sampling.stride)
+    halves = differences(states, replace(finer(steps, 2 * steps, apart), dt=slot.dt))
+    other = finer(blocks * each * sampling.stride, blocks * more, Sampling(more))
+    others = differences(_told(states, slice(0, blocks * each + 1, each)), replace(other, dt=slot.dt))
     # What samples that far apart do not show is told by the halves alone.
-    return {name: _larger(value, others[name]) for name, value in halves.items()}
+    found = {name: _larger(value, others[name]) for name, value in halves.items()}
+    if trajectory.contacts is None:
+        return found
+    # Impulses are those of a step, and metrics of them know of which: they are asked of every step of each run.
+    here, of_states = measured(trajectory), measured(states)
+    halves = differences(trajectory, finer(steps, 2 * steps, sampling))
+    others = differences(trajectory, finer(steps, _coprime(steps), sampling))
+    of_steps = [name for name in here if here[name] != of_states[name]]
+    return found | {name: _larger(halves[name], others[name]) for name in of_steps}
 
 
 def _elsewhere(samples: int, stride: int) -> tuple[int, int, int]:

@@ -14,6 +14,7 @@ from typing import Any
 from adapters.engine import Engine, EngineError
 from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
+from adapters.own_settings import own
 from adapters.plain import one_line, plain
 from adapters.receipts import Receipt, receipts
 from adapters.registry import find
@@ -62,7 +63,9 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         if found.engine is None:
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
-            refusal = found.engine.refusal(posed_for(found.engine, prepared.scene), slot.profile, slot.dt)
+            refusal = found.engine.refusal(posed_for(found.engine, prepared.scene), slot.base, slot.dt)
+            if refusal is None and slot.is_own:  # another release may not have them
+                own(found.engine, slot.switched, settings_of(found.engine, slot.stock, prepared.scene))
         except EngineError as error:
             refusal = str(error)
         refusal = checked_refusal(refusal)
@@ -88,9 +91,11 @@ def _observe(
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
         # What a profile declares holds for its own settings; an experiment with others is about what they change, and
-        # a model's are its author's.
-        own = prepared.canonical.brought(slot.engine, slot.profile) is None and not slot.switched
-        slips = () if not own else receipts(engine, slot.profile, wanted, slot.dt, slot.iterations)
+        # a model's are its author's. With a user's own nothing is declared: what they make of the engine is told.
+        slips: Sequence[Receipt] = ()
+        if prepared.canonical.brought(slot.engine, slot.base) is None and (slot.is_own or not slot.switched):
+            others = settings if slot.is_own else None
+            slips = receipts(engine, slot.base, wanted, slot.dt, slot.iterations, others)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
         if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
@@ -115,7 +120,7 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
     if trajectory.certificate.get("certified") is False:
         reasons = one_line("; ".join(map(str, trajectory.certificate.get("reasons", ()))))
         return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
-    broken = [slip for slip in slips if not slip.holds]
+    broken = [slip for slip in slips if not slip.holds and not blank.slot.is_own]
     if broken:
         worst = broken[0]
         reason = f"receipt {worst.quantity}: measured {worst.measured:.6g}, declared {worst.declared:.6g}"

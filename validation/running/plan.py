@@ -13,13 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from adapters.engine import NOT_KNOWN, Engine, EngineError
 from adapters.needs import needs
+from adapters.own_settings import kinds_of, near, own
+from adapters.plain import NAME, one_line
 from adapters.registry import facts, find, is_ranked
+from adapters.scene import Scene
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE
-from validation.cells import Slot, check_size
+from validation.cells import Slot, check_size, settings_of
 from validation.posed import pinned, resolve
 
 QUICK_DT = 1.0 / 240.0
@@ -40,6 +44,9 @@ class Request:
         Moves of the start, in units in the last place.
     floors
         Also run the representative cells moved by 1 and 2 units in the last place.
+    sets
+        Settings of a user's own, by name, which every engine must have: of the profile as shipped, or of a model's
+        own, where no profile is named.
     """
 
     scenes: Sequence[str]
@@ -52,6 +59,7 @@ class Request:
     suite: Suite = "quick"
     ulps: Sequence[int] = (0,)
     floors: bool = False
+    sets: Sequence[tuple[str, Any]] = ()
 
 
 def slots(request: Request) -> list[Slot]:
@@ -87,6 +95,8 @@ def _engine_slots(
     profiles = list(engine.profiles) if engine else [_one_profile(name)]
     if engine and name in canonical.brings:
         profiles.append(canonical.brings[name].profile)
+    if request.sets and not request.profiles:
+        profiles = [canonical.brings[name].profile if name in canonical.brings else _one_profile(name)]
     for profile in profiles:
         if request.profiles and profile not in request.profiles:
             continue
@@ -101,13 +111,58 @@ def _engine_slots(
             for dt in (brought.dt,) if brought and not request.dts else _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
                 check_size(scene, dt)
+                sets = _own(request, engine, base, scene)
                 if argument not in CATALOGUE:
                     canonical.checks(scene, dt)  # a scene that cannot be judged is refused before it runs
                 for iterations in _iterations(request, variation, engine, base):
                     if not _stepped(request, replace(base, iterations=iterations)):
                         continue
                     for ulp in (*request.ulps, *_moves(request, canonical, variation, dt, iterations)):
-                        yield replace(base, iterations=iterations, ulp=ulp)
+                        yield replace(base, iterations=iterations, ulp=ulp).with_own(sets)
+
+
+def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> tuple[tuple[str, Any], ...]:
+    """Settings of a user's own, as the engine takes them; as they are where it is not here."""
+    # A request that another process hands over has lists for tuples.
+    sets = tuple((str(name), tuple(value) if isinstance(value, list) else value) for name, value in request.sets)
+    if request.iterations and any(name == "iterations" for name, _ in sets):
+        raise EngineError("set: iterations are asked for by --iterations as well")
+    return sets if engine is None or not sets else own(engine, sets, settings_of(engine, slot, scene))
+
+
+def knowing(request: Request) -> list[str]:
+    """Engines of a request that have all settings which it sets, take their values, and are here.
+
+    Raises
+    ------
+    EngineError
+        If there is none: who has which, what is near it, or why the value cannot be taken.
+    """
+    canonical = resolve(pinned(request.scenes[0]))
+    wanted = needs(canonical.scene(canonical.dimensions[-1]))
+    here = {name: engine for name in request.engines if (engine := find(name).engine) is not None}
+    profiles = {name: engine.settings(_one_profile(name), wanted, QUICK_DT) for name, engine in here.items()}
+    known = {name: set(kinds_of(engine, profiles[name])) for name, engine in here.items()}
+    asked = [name for name, _ in request.sets]
+    found, refused = [], []
+    for name in (name for name, names in known.items() if names.issuperset(asked)):
+        try:
+            own(here[name], request.sets, profiles[name])
+        except EngineError as error:
+            refused.append(error)
+        else:
+            found.append(name)
+    if not found:
+        if refused:
+            raise refused[0]
+        who = {name: [engine for engine, names in known.items() if name in names] for name in asked}
+        lost = next((name for name in asked if not who[name]), None)
+        if lost is not None:
+            close = near(lost, dict.fromkeys(name for names in known.values() for name in sorted(names)))
+            raise EngineError(f"set: no engine that is here has a setting {one_line(lost, NAME)!r}{close}")
+        told = "; ".join(f"{name}: {', '.join(engines)}" for name, engines in who.items())
+        raise EngineError(f"set: no engine has all of these settings ({told}); name one with --engine")
+    return found
 
 
 def _is_asked(request: Request, canonical: CanonicalScene, variation: Variation, engine: str, profile: str) -> bool:
@@ -172,6 +227,8 @@ def _stepped(request: Request, slot: Slot) -> bool:
 
 def _iterations(request: Request, variation: Variation, engine: Engine | None, slot: Slot) -> Iterable[int | None]:
     asked: Sequence[int | None] = tuple(request.iterations) or ((None,) if request.params else variation.iterations)
+    if any(name == "iterations" for name, _ in request.sets):
+        return (None,)
     if engine is None or not has_iterations(engine, slot):
         return (None,)
     return asked
@@ -180,11 +237,11 @@ def _iterations(request: Request, variation: Variation, engine: Engine | None, s
 def has_iterations(engine: Engine, slot: Slot) -> bool:
     """Whether the profile stops at an iteration count that can be replaced; one that fails says so in its cells."""
     canonical = resolve(slot.scene)
-    if canonical.brought(slot.engine, slot.profile) is not None:
+    if canonical.brought(slot.engine, slot.base) is not None:
         return False
     scene = canonical.scene(slot.dimension, dict(slot.params))
     try:
-        settings = engine.settings(slot.profile, needs(scene), slot.dt)
+        settings = engine.settings(slot.base, needs(scene), slot.dt)
     except EngineError:
         return False
     return any(setting.name == "iterations" for setting in settings)

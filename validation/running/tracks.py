@@ -103,7 +103,7 @@ def representatives(slots: Iterable[Slot]) -> set[Slot]:
     for slot in sorted(candidates, key=_distance):
         series = chosen.setdefault((slot.scene, slot.dimension), {})
         first = next(iter(series.values()), slot)
-        brought = resolve(slot.scene).brought(slot.engine, slot.profile)
+        brought = resolve(slot.scene).brought(slot.engine, slot.base)
         own_step = brought is not None and slot.dt == brought.dt  # a model's own step is its own
         if slot.params == first.params and (slot.dt == first.dt or own_step):
             series.setdefault((slot.engine, slot.profile), slot)

@@ -19,6 +19,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from adapters.engine import Engine
 from adapters.isolation import end_with
@@ -57,6 +58,12 @@ class Warming:
                 if not mark.is_file():
                     self._tasks.append((wanted, mark))
 
+    @property
+    def begun(self) -> bool:
+        """Whether all parts have been compiled for other cells: what is left are kernels that those did not call."""
+        return all(any(_dimension(path) == wanted[0]["dimension"] for path in mark.parent.glob("warm-*.json"))
+                   for wanted, mark in self._tasks)  # fmt: skip
+
     def __len__(self) -> int:
         """Number of parts, an engine and a dimension each."""
         return len(self._tasks)
@@ -80,7 +87,10 @@ class Warming:
                 slots, mark = running[future]
                 with contextlib.suppress(BrokenProcessPool, Exception):
                     seconds = future.result()
-                    mark.write_text(json.dumps({"cpu_seconds": round(seconds, 1)}), encoding="utf-8")
+                    mark.write_text(
+                        json.dumps({"cpu_seconds": round(seconds, 1), "dimension": slots[0]["dimension"]}),
+                        encoding="utf-8",
+                    )
                 yield f"{slots[0]['engine']} {slots[0]['dimension']}-D"
 
 
@@ -117,6 +127,18 @@ def first_steps(slot: Slot) -> None:
 
 def _seconds(mark: Path) -> float:
     try:
-        return float(json.loads(mark.read_text(encoding="utf-8"))["cpu_seconds"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return float(_told(mark)["cpu_seconds"])
+    except (ValueError, KeyError, TypeError):
         return 0.0
+
+
+def _dimension(mark: Path) -> object:
+    return _told(mark).get("dimension")
+
+
+def _told(mark: Path) -> dict[str, Any]:
+    """What a mark says; nothing where it cannot be read."""
+    try:
+        return dict(json.loads(mark.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}

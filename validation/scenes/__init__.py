@@ -23,6 +23,7 @@ OURS = (
     "pinch",
     "slide",
     "conveyor",
+    "wipe",
     "wedge",
     "slide_to_roll",
     "oblique",

@@ -15,6 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
+from adapters.engine import Array
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
@@ -33,7 +36,7 @@ from validation.canonical import (
     Variation,
     halves,
 )
-from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states, upward
+from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states_and_impulses, upward
 
 RADIUS = 0.5
 #: Runs for this long after the last impact, or after a tenth more than it takes to rest [s].
@@ -70,10 +73,10 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Apex heights, ratio of apex intervals, rest time."""
+    """Apex heights, ratio of apex intervals, rest time; nothing touches the ball in flight."""
     e, height, g = scene.params["e"], scene.params["height"], scene.params["g"]
     truth = {f"apex[{n}]": e ** (2 * n) * height for n in range(1, APEXES + 1)}
-    truth |= {"apex_interval_ratio": e, "apex_growth": 0.0}
+    truth |= {"apex_interval_ratio": e, "apex_growth": 0.0, "force_in_flight": 0.0}
     if e < 1.0:
         truth["rest_time"] = rest_time(e, height, g)
     return truth
@@ -95,7 +98,25 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     measured["apex_growth"] = (metrics.largest([0.0, *growth]) / height, "")
     measured["apex_interval_ratio"] = metrics.interval_ratio(times)
     measured["rest_time"] = metrics.last_motion(trajectory.t, velocity, least)
-    return measured
+    return measured | {"force_in_flight": _force_in_flight(scene, trajectory, clearance, velocity)}
+
+
+def _force_in_flight(scene: Scene, trajectory: Trajectory, clearance: Array, velocity: Array) -> Measured:
+    """Largest force that the floor is told to exert in steps of flight, relative to the weight.
+
+    A step is one of flight if at both of its ends the floor is farther away than the ball could move in a step: what
+    finds an impact ahead of it, or late, acts nearer.
+    """
+    g, dt, contacts = scene.params["g"], trajectory.dt, trajectory.contacts
+    if contacts is None:
+        return None, metrics.NOT_RECORDED
+    is_far, end = clearance > (np.abs(velocity) + g * dt) * dt, contacts.step
+    in_flight = metrics.forces(trajectory, 1, [0])[is_far[end] & is_far[np.maximum(end - 1, 0)]]
+    if len(in_flight) == 0:
+        return None, "no step is one of flight"
+    if np.isnan(in_flight).any():
+        return None, metrics.UNAVAILABLE
+    return float(np.linalg.norm(in_flight, axis=1).max() / (scene.params["mass"] * g)), ""
 
 
 def track(scene: Scene) -> Track:
@@ -145,6 +166,9 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         found.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
     if "rest_time" in truth:
         found.append(_rest_check(e, height, g, dt, truth["rest_time"]))
+    if height > 3.0 * g * dt * dt:  # falling from rest the first step is one of flight
+        source = "forces at a distance are none of contact"
+        found.append(bounds.exact().check("force_in_flight", "1", truth["force_in_flight"], source))
     return found
 
 
@@ -248,7 +272,7 @@ SCENE = CanonicalScene(
     exact=exact,
     measure=measure,
     rule=checks,
-    sampling=states,
+    sampling=states_and_impulses,
     track=track,
     # Two phases of the first impact, for an engine may miss an apex at one of them, and the edges of restitution.
     quick=(*_from(0.8, HEIGHTS[0], HEIGHTS[3]), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),

@@ -44,8 +44,9 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Equilibrium; loads are relative to the grip and to the weight."""
-    return {"creep": 0.0, "turned": 0.0, "grip": 1.0, "carried": 1.0}
+    """Equilibrium, at every step; loads are relative to the grip and to the weight."""
+    steady = {f"{load}[{by}]": 1.0 for load in ("grip", "carried") for by in ("least", "greatest")}
+    return {"creep": 0.0, "turned": 0.0, "grip": 1.0, "carried": 1.0, **steady, "unbalanced": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
@@ -56,10 +57,14 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     measured: dict[str, Measured] = {"creep": sunk, "turned": (spin * 0.5 * SIDE, "")}
     wall, pad = (metrics.late_impulses(trajectory, *pair, WINDOW) for pair in ((1, 2), (2, 3)))
     if wall is None or pad is None:
-        return measured | dict.fromkeys(("grip", "carried"), (None, metrics.UNAVAILABLE))
+        return measured | {load: (None, metrics.UNAVAILABLE) for load in exact(scene) if load not in measured}
     weight = p["mass"] * p["g"]
     measured["grip"] = (float(wall[:, 0].mean() / (grip(p) * dt)), "")
     measured["carried"] = (float((wall[:, -1] - pad[:, -1]).mean() / (weight * dt)), "")
+    # `pad` is what the box does to the pad.
+    for load, steps in (("grip", wall[:, 0] / grip(p)), ("carried", (wall[:, -1] - pad[:, -1]) / weight)):
+        measured |= metrics.over_time(load, steps / dt, ("least", "greatest"))
+    measured["unbalanced"] = (float(np.abs(wall[:, 0] - pad[:, 0]).max() / (grip(p) * dt)), "")
     return measured
 
 
@@ -72,12 +77,18 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     turn = bounds.Bound(still, "a box whose edges are slower than v1/100 = g dt/100 does not turn")
     # What is left of v1/100 before and after the last second is momentum, towards the wall of the pad as well.
     share = bounds.carried(dt)
-    pressed = bounds.Bound(share.value * (p["mass"] + p["pad"]) * g / grip(p), share.because)
+    heavy, light = (p["mass"] + p["pad"]) * g / grip(p), p["mass"] * g / grip(p)
+    pressed = bounds.Bound(share.value * heavy, share.because)
+    # The wall and the pad push the box equally, but for what its own momentum changes by in the step.
+    balance = bounds.Bound(bounds.steady().value * light, bounds.steady().because)
     return [
         bounds.stuck(g, dt, scene.duration).check("creep", "m/s", truth["creep"], source),
         turn.check("turned", "m/s", truth["turned"], source),
         pressed.check("grip", "1", truth["grip"], source),
         share.check("carried", "1", truth["carried"], source),
+        *bounds.load("grip", dt, truth, source, share=heavy),
+        *bounds.load("carried", dt, truth, source),
+        balance.check("unbalanced", "1", truth["unbalanced"], "equilibrium of forces along the grip"),
     ]
 
 
@@ -103,7 +114,7 @@ SCENE = CanonicalScene(
     title="Box held between a wall and a pad that presses on it",
     family="grip and force",
     figure=__doc__ or "",
-    law="sticks if W <= 2 mu N: creep 0, the wall carries N, wall and pad carry W",
+    law="sticks if W <= 2 mu N: creep 0, the wall carries N, wall and pad carry W, at every step",
     dimensions=(2, 3),
     parameters=(
         Parameter("margin", 2.0, "1", "2 mu N/W: how much more the grip could hold", 1.0, 1e4),
@@ -140,5 +151,6 @@ SCENE = CanonicalScene(
         "turned": "turns the box: its edges move with {value}",
         "grip": "grips with {value} of the force that presses",
         "carried": "carries {value} of the weight it holds",
+        "unbalanced": "grips from its two sides with forces that differ by {value} of the grip",
     },
 )

@@ -2,8 +2,8 @@
 
        +---+  v
        |   | -->            stops after d = v^2/(2 mu g), t = v/(mu g),
-    ==================      straight on, without turning or hopping
-       |<------ d ------>|
+    ==================      straight on, without turning or hopping;
+       |<------ d ------>|      pressed by m g and braked by mu m g at every step
 
 In space it may head in any direction against the box's edges, which Coulomb's law does not know of: a cone that is a
 pyramid brakes less along its diagonals or turns the path.
@@ -12,8 +12,10 @@ pyramid brakes less along its diagonals or turns the path.
 from __future__ import annotations
 
 from adapters.scene import Pair, Scene
-from validation.canonical import CanonicalScene, Parameter, Params, Primary, Variation
-from validation.scenes.parts import floor, mass_of, standard_gravity, states, upward
+from adapters.trajectory import Sampling, Trajectory
+from validation import bounds, metrics
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.scenes.parts import floor, heading, mass_of, standard_gravity, upward
 from validation.truths import sliding
 
 HEIGHT = 0.5
@@ -28,13 +30,46 @@ def make(dimension: int, params: Params) -> Scene:
     return Scene("slide", 1, dimension, bodies, pairs, gravity, sliding.lasts(p), p)
 
 
+def exact(scene: Scene) -> dict[str, float]:
+    """A slide's truth, and its forces: relative to the weight and to mu times it."""
+    forces = {f"{force}[{by}]": 1.0 for force in ("normal", "friction") for by in ("mean", "least", "greatest")}
+    return sliding.exact(scene) | forces
+
+
+def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
+    """What is measured of a slide, and the floor's force over its middle half, upwards and against the heading."""
+    p, long = scene.params, sliding.stop(scene.params)
+    floor_force = metrics.forces(trajectory, 1, [0], 0.25 * long, 0.75 * long) / (p["mass"] * p["g"])
+    along_way = floor_force[:, : scene.dimension - 1] @ heading(scene)
+    return {
+        **sliding.measure(scene, trajectory),
+        **metrics.over_time("normal", floor_force[:, -1]),
+        **metrics.over_time("friction", -along_way / p["mu"]),
+    }
+
+
+def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
+    """What a slide owes, and its forces: it moves neither up nor down, and friction is mu times the normal force."""
+    window = 0.5 * sliding.stop(scene.params)
+    return [
+        *sliding.checks(scene, dt, truth),
+        *bounds.load("normal", dt, truth, "the floor carries the weight", window),
+        *bounds.load("friction", dt, truth, "Coulomb's law, kinetic: mu N", window),
+    ]
+
+
+def sampling(scene: Scene) -> Sampling:
+    """Every step; contacts from a quarter of the slide on."""
+    return Sampling(1, 0.25 * sliding.stop(scene.params))
+
+
 SCENE = CanonicalScene(
     name="slide",
     version=1,
     title="Box that slides to a stop, in any heading",
     family="friction",
     figure=__doc__ or "",
-    law="d = v^2/(2 mu g), straight on; friction does not know the heading",
+    law="d = v^2/(2 mu g), straight on; friction does not know the heading, and is mu m g at every step",
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 3.0, "m/s", "speed at the start", 0.0, 1e2, positive=True),
@@ -45,10 +80,10 @@ SCENE = CanonicalScene(
         mass_of("the box"),
     ),
     make=make,
-    exact=sliding.exact,
-    measure=sliding.measure,
-    rule=sliding.checks,
-    sampling=states,
+    exact=exact,
+    measure=measure,
+    rule=checks,
+    sampling=sampling,
     track=sliding.track,
     quick=(Variation({}), Variation({"heading": 22.5}, dimensions=(3,)), Variation({"heading": 45.0}, dimensions=(3,))),
     full=(
@@ -68,5 +103,5 @@ SCENE = CanonicalScene(
         0.25,
     ),
     smooth=("stopping_distance",),
-    words=sliding.WORDS,
+    words=sliding.WORDS | {"normal": "carries {value} of the weight", "friction": "is braked with {value} of mu N"},
 )

@@ -7,6 +7,10 @@
     another profile     all that it changes, and then fewer and fewer of them, until nothing can be left out
     the cure            mends most checks and breaks none; of equals the one that changes least, then the nearest
 
+Of a scene of the catalogue a cure is told as one of any model like it: what a change mends counts only if it does so in
+other sizes at another step as well (`ELSEWHERE`), with the values that the profile it comes from has there. What works
+at one step by the phase of a blow, or at one size by an engine's margin in metres, is none.
+
 The same cells, candidates and rule for every engine. Error and cost stand side by side: CPU time per step, the least of
 interleaved rounds in the bench's own lane, as shipped and cured. What was found stands in ``cures.csv`` of the engine's
 folder, by scene *and dimension*: a cure that was measured in the plane is not told of space.
@@ -18,7 +22,7 @@ import csv
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,6 +35,7 @@ from adapters.stepping import step_count
 from validation.bench.lane import Lane
 from validation.bench.units import Unit
 from validation.canonical import Params
+from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot, prepare, settings_of
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT, has_iterations
@@ -43,6 +48,9 @@ MOST_CELLS = 6
 ROUNDS = 7
 #: Simulated time that is clocked [s].
 CLOCKED = 0.5
+#: Sizes, beside the scene's, and the step [s] at which a cure must hold as well: bodies of centimetres, as grippers
+#: have them, in place of decimetres and metres, and the step that is customary in robotics.
+ELSEWHERE = (0.3, 1.0 / 500.0)
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
 INVISIBLE = 1e-3
 
@@ -77,6 +85,11 @@ class Cure:
     mends
         Kinds of metrics, without their index, that failed as shipped in cells that were asked and pass in all of them
         with the cure. Of no other kind anything is promised; empty in a table that was kept before it was written down.
+    dt
+        Step of the cells [s].
+    alone, alone_after
+        Where the cure has several settings: the one that does most by itself and breaks nothing, if it brings the
+        check that is told nearer, and the value with it.
     """
 
     engine: str
@@ -102,6 +115,9 @@ class Cure:
     cost_before: float | None
     cost_after: float | None
     mends: tuple[str, ...] = ()
+    dt: float = QUICK_DT
+    alone: Changes = field(default_factory=dict)
+    alone_after: float | None = None
 
     @property
     def helps(self) -> bool:
@@ -143,36 +159,79 @@ class _Found:
 
 
 class _Trials:
-    """Readings of all cells under changes; a change may have another value in each cell. Each cell runs once."""
+    """Readings of all cells under changes; a change may have another value in each cell. Each cell runs once.
 
-    def __init__(self, slots: Sequence[Slot], jobs: int) -> None:
+    With ``elsewhere`` each cell runs in other sizes at another step as well, where a change must mend the same.
+    """
+
+    def __init__(self, slots: Sequence[Slot], jobs: int, elsewhere: bool = False) -> None:
         self.slots, self.jobs = slots, jobs
         self.seen: dict[Slot, list[Reading]] = {}
-        self.tried = 0
+        self.found: list[_Found] = []
         self.own = [_own(slot) for slot in slots]
-        self.start = self._readings([{}] * len(slots))
+        size, dt = ELSEWHERE
+        self.others = [replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt) for slot in slots] if elsewhere else []
+        names = _profiles(slots[0].engine) if elsewhere else []
+        #: What each profile changes here and there, cell by cell.
+        self.profiles = [
+            [(changes_of(slot, name), changes_of(other, name)) for name in names]
+            for slot, other in zip(slots, self.others, strict=elsewhere)
+        ]
+        self._run(slots)
+        self.start = [found for slot in slots for found in self.seen[slot]]
 
-    def _readings(self, changes: Sequence[Changes]) -> list[Reading]:
-        asked = [switched(slot, own) for slot, own in zip(self.slots, changes, strict=True)]
-        self._run(asked)
-        return [found for slot in asked for found in self.seen[slot]]
+    def _readings(self, slots: Sequence[Slot]) -> list[Reading]:
+        """Readings of one slot for each cell, check by check as `start`; without a value where there is none."""
+        found = []
+        for own, asked in zip(self.slots, slots, strict=True):
+            seen = {reading.check.metric: reading for reading in self.seen[asked]}
+            for old in self.seen[own]:
+                found.append(seen.get(old.check.metric, Reading(asked, old.check, None, "was not measured")))
+        return found
+
+    def _here(self, changes: Sequence[Changes]) -> list[Slot]:
+        return [switched(slot, own) for slot, own in zip(self.slots, changes, strict=True)]
 
     def _run(self, slots: Iterable[Slot]) -> None:
         new = [slot for slot in slots if slot not in self.seen]
         self.seen |= {slot: readings(found) for slot, found in observe(new, self.jobs).items()}
 
+    def _elsewhere(self, changes: Sequence[Changes]) -> list[Slot]:
+        """The other cells under a change: what a profile sets has the value that it has there."""
+        found = []
+        for other, profiles, own in zip(self.others, self.profiles, changes, strict=bool(self.others)):
+            of_profile = (there for here, there in profiles if own.items() <= here.items())
+            there = next(of_profile, own)
+            found.append(switched(other, {name: there[name] for name in own if name in there}))
+        return found
+
     def all(self, many: Sequence[Sequence[Changes]]) -> list[_Found]:
         """Try changes, all of their cells in one go."""
         kept = [[_differing(each, own) for each, own in zip(one, self.own, strict=True)] for one in many]
         kept = [one for one in kept if any(one)]
-        self._run([switched(slot, own) for one in kept for slot, own in zip(self.slots, one, strict=True)])
-        self.tried += len(kept)
-        return [self._found(one) for one in kept]
+        self._run(slot for one in kept for slot in self._here(one))
+        helpful = [one for one in kept if self._mends(one)]
+        self._run(slot for one in helpful for slot in self._elsewhere(one))
+        self.found += (tried := [self._found(one) for one in kept])
+        return tried
+
+    def _mends(self, changes: Sequence[Changes]) -> bool:
+        """Whether a change mends anything in the scene's own size."""
+        after = self._readings(self._here(changes))
+        return any(old.badness > 1.0 >= new.badness for old, new in zip(self.start, after, strict=True))
+
+    def badness(self, changes: Sequence[Changes]) -> list[float]:
+        """Errors over tolerances with a change; of what failed as shipped the worse one of both sizes."""
+        here, elsewhere = self._readings(self._here(changes)), self._elsewhere(changes)
+        if not elsewhere or any(slot not in self.seen for slot in elsewhere):  # or it mends nothing here
+            return [found.badness for found in here]
+        worse = zip(self.start, here, self._readings(elsewhere), strict=True)
+        return [max(new.badness, other.badness) if old.badness > 1.0 else new.badness for old, new, other in worse]
 
     def _found(self, changes: Sequence[Changes]) -> _Found:
-        after = self._readings(changes)
-        broken = any(old.badness <= 1.0 < new.badness for old, new in zip(self.start, after, strict=True))
-        bad = [min(max(each.badness, INVISIBLE), 1e3) for each in after]
+        after = self.badness(changes)
+        broken = any(old.badness <= 1.0 < new for old, new in zip(self.start, after, strict=True))
+        bad = [min(max(each, INVISIBLE), 1e3) for each in after]
         failing = sum(b > 1.0 for b in bad)
         return _Found(tuple(changes), failing, broken, sum(math.log10(b / INVISIBLE) for b in bad))
 
@@ -195,28 +254,45 @@ class Unsearched:
     reason: str
 
 
-def search(engine: str, scene: str, dimension: int, jobs: int = 1) -> Cure | Unsearched:
+def search(
+    engine: str,
+    scene: str,
+    dimension: int,
+    jobs: int = 1,
+    params: Params | None = None,
+    dt: float | None = None,
+) -> Cure | Unsearched:
     """Search what mends ``engine`` as shipped, if something fails there.
+
+    Parameters
+    ----------
+    scene
+        Name in the catalogue, or a scene file.
+    params, dt
+        One case, and its step [s]: what mends that is searched, in its own size and at its own step alone. Without
+        params it is the scene's standard cells; without a step that of a model made for this engine, else `QUICK_DT`.
 
     Raises
     ------
     EngineError, SceneError
         For an unknown or missing engine, an unknown scene.
     """
-    shipped = profile_of(engine, "shipped")
-    cells = asked_of(scene, dimension)
+    brought = resolve(scene).brings.get(engine)
+    shipped = brought.profile if brought else profile_of(engine, "shipped")
+    dt = dt or (brought.dt if brought else QUICK_DT)
+    cells = asked_of(scene, dimension) if params is None else (dict(resolve(scene).minimal(params)),)
     if shipped is None:
         return Unsearched(False, f"{engine} has no profile as shipped")
     if not cells:
         return Unsearched(False, f"{scene} has no standard cell in {dimension}-D at a profile's own iterations")
-    own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, QUICK_DT) for cell in cells]
+    own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, dt) for cell in cells]
     first = observe(own, jobs)
     for found in first.values():
         if found.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED):
             return Unsearched(False, found.reason)
-    trials = _Trials(own, jobs)
+    trials = _Trials(own, jobs, elsewhere=scene in CATALOGUE and params is None and dt == QUICK_DT)
     if not trials.start:
-        return Unsearched(False, "no check of its standard cells is judged")
+        return Unsearched(False, "no check of its cells is judged")
     failing = [found for found in trials.start if found.badness > 1.0]
     if not failing:
         return Unsearched(True, f"it passes all {len(trials.start)} checks")
@@ -296,9 +372,20 @@ def _cure(
         engine, find(engine).version, told.slot.profile, told.slot.scene, told.slot.dimension,
         tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
         len(trials.start), check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value,
-        after.value, changes, _profile_of(engine, trials.slots, best), others, trials.tried, before_cost, after_cost,
-        _mended(trials, failing, best),
+        after.value, changes, _profile_of(engine, trials.slots, best), others, len(trials.found), before_cost,
+        after_cost, _mended(trials, failing, best), told.slot.dt, *_alone(trials, told, best),
     )  # fmt: skip
+
+
+def _alone(trials: _Trials, told: Reading, best: _Found | None) -> tuple[Changes, float | None]:
+    """The single setting that does most, and the value of the check that is told with it; see `Cure.alone`."""
+    singles = [each for each in trials.found if each.size == 1 and not each.broken]
+    if best is None or best.size == 1 or not singles:
+        return {}, None
+    changes = min(singles, key=_Found.rank).changes[trials.slots.index(told.slot)]
+    seen = trials.seen[switched(told.slot, changes)] if changes else []
+    after = next((each for each in seen if each.check.metric == told.check.metric), None)
+    return (changes, after.value) if after and after.badness < told.badness else ({}, None)
 
 
 def _kind(found: Reading) -> str:
@@ -309,17 +396,14 @@ def _mended(trials: _Trials, failing: Sequence[Reading], best: _Found | None) ->
     """Kinds that fail as shipped and of which nothing fails with the cure, in the order in which scenes state them."""
     if best is None:
         return ()
-    cured = [switched(slot, own) for slot, own in zip(trials.slots, best.changes, strict=True)]
-    left = {_kind(each) for slot in cured for each in trials.seen[slot] if each.badness > 1.0}
+    left = {_kind(old) for old, new in zip(trials.start, trials.badness(best.changes), strict=True) if new > 1.0}
     return tuple(kind for kind in dict.fromkeys(_kind(each) for each in failing) if kind not in left)
 
 
 def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
     """The check that stands for a cure: the first that the scene states of those it mends, where it was worst."""
-    mended = []
-    for slot, changes in zip(trials.slots, best.changes if best else (), strict=False):
-        after = {each.check.metric: each for each in trials.seen[switched(slot, changes)]}
-        mended += [each for each in failing if each.slot == slot and after[each.check.metric].badness <= 1.0]
+    after = trials.badness(best.changes) if best else []
+    mended = [old for old, new in zip(trials.start, after, strict=False) if old.badness > 1.0 >= new]
     shown = mended or failing
     first = next(each.check.metric for each in failing if each.check.metric in {one.check.metric for one in shown})
     return max((each for each in shown if each.check.metric == first), key=lambda each: each.badness)
@@ -407,7 +491,8 @@ def read(path: Path) -> list[Cure]:
 def _cure_of(row: Mapping[str, str]) -> Cure:
     values: dict[str, Any] = {name: text if name in _PLAIN else json.loads(text) for name, text in row.items()}
     others = tuple(_settings(each) for each in values["others"])
-    values |= {"cells": tuple(values["cells"]), "others": others, "changes": _settings(values["changes"])}
+    values |= {"cells": tuple(values["cells"]), "others": others}
+    values |= {name: _settings(values[name]) for name in ("changes", "alone") if name in values}
     values["mends"] = tuple(values.get("mends", ()))  # tables of before it was written down have none
     return Cure(**values)
 

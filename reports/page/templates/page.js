@@ -126,11 +126,23 @@ function button(text, label, action) {
 }
 const fileName = (text) => (text || "table").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "");
 function csvOf(table) {
-  const quoted = (cell) => {
-    const text = cell.textContent.replace(/\s+/g, " ").replace(/ copy$/, "").trim();
-    return /[",\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
-  };
-  return $$("tr", table).map((row) => [...row.cells].map(quoted).join(",")).join("\n") + "\n";
+  const textOf = (cell) => cell.textContent.replace(/\s+/g, " ").replace(/ copy$/, "").trim();
+  const quoted = (text) => /[",\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
+  // One line of names and lines of equal length, as readers of CSV want them: a cell that spans rows stands in each.
+  const heads = table.tHead ? table.tHead.rows.length : 0, grid = [];
+  $$("tr", table).forEach((row, r) => {
+    let c = 0;
+    for (const cell of row.cells) {
+      while (grid[r]?.[c] !== undefined) c += 1;
+      for (let i = 0; i < cell.rowSpan; i += 1)
+        for (let j = 0; j < cell.colSpan; j += 1) (grid[r + i] ??= [])[c + j] = j === 0 || r < heads ? textOf(cell) : "";
+      c += cell.colSpan;
+    }
+  });
+  const width = Math.max(0, ...grid.map((row) => row.length)), columns = [...Array(width).keys()];
+  const name = (c) => [...new Set(grid.slice(0, heads).map((row) => row[c] ?? ""))].filter(Boolean).join("/");
+  const lines = grid.slice(heads).map((row) => columns.map((c) => row[c] ?? ""));
+  return [...(heads ? [columns.map(name)] : []), ...lines].map((row) => row.map(quoted).join(",")).join("\n") + "\n";
 }
 for (const region of $$(".scroll")) {
   const table = region.querySelector("table"), label = region.getAttribute("aria-label");

@@ -169,3 +169,17 @@ def test_values_that_creep_within_their_floor_are_told_by_the_ends():
     found = bisect(4, [SLOT, other], "rebound_ratio", engine)
     assert isinstance(found, Found) and found.after == found.before + 1
     assert "0.4" in found.change.before and "0.4027" in found.change.after
+
+
+def test_two_ends_without_a_value_are_not_the_same():
+    class Silent(Engine):
+        def __call__(self, index, cells):
+            told = super().__call__(index, cells)
+            rows = [
+                replace(row, value=None, error=None, physics="fail", outcome="diverged", reason="no number")
+                for row in told.rows
+            ]
+            return replace(told, rows=rows)
+
+    found = bisect(4, [SLOT], "rebound_ratio", Silent([0.5, 0.5, 0.4, 0.4]))
+    assert found == Unchanged("release 0 has no value of rebound_ratio, nor has release 3 : no number")

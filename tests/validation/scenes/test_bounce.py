@@ -48,7 +48,7 @@ def test_it_runs_past_rest_and_for_six_arcs_if_it_never_rests(e, end):
 def test_what_is_exact():
     assert bounce.exact(scene()) == pytest.approx(
         {f"apex[{n}]": 0.25**n for n in range(1, 6)}
-        | {"apex_interval_ratio": 0.5, "apex_growth": 0.0, "rest_time": 1.5}
+        | {"apex_interval_ratio": 0.5, "apex_growth": 0.0, "force_in_flight": 0.0, "rest_time": 1.5}
     )
     assert "rest_time" not in bounce.exact(scene(e=1.0))
 

@@ -70,8 +70,12 @@ def test_what_a_slide_forgives_is_a_step_of_everything():
         "hop": ("m", near(fall + 2e-12)),
         "turned": ("m", near(fall + 2e-12)),
         "astray": ("m", near(fall + 2e-12)),
+        # 2 g dt/100 of momentum left over the half second, or in one step, as a share of what gravity gives in it
+        **{f"{force}[mean]": ("1", near(0.02 * DT / 0.5)) for force in ("normal", "friction")},
+        **{f"{force}[{by}]": ("1", 0.02) for force in ("normal", "friction") for by in ("least", "greatest")},
     }
-    assert {check.source for check in canonical.checks(scene, DT)} == {SOURCE}
+    of_forces = {"the floor carries the weight", "Coulomb's law, kinetic: mu N"}
+    assert {check.source for check in canonical.checks(scene, DT)} == {SOURCE} | of_forces
 
 
 def test_a_slide_of_two_steps_is_told_over_one():

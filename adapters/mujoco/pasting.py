@@ -1,0 +1,172 @@
+"""Settings of MuJoCo in its own words: MJCF to paste, with the formulas of numbers made of e, the step or gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from adapters.mujoco.pairs import pair_solref, pair_solreffriction
+from adapters.needs import needs
+from adapters.scene import HalfSpace, Scene
+
+#: Settings that are attributes of MJCF's ``<option>``, by the same name.
+OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
+#: MuJoCo's own torsional and rolling friction of a pair, which our materials do not have.
+TURNING = (0.005, 0.0001, 0.0001)
+#: Pairs of bodies that a comment names before it counts.
+NAMED = 3
+
+#: Restitution and friction of a pair.
+Material = tuple[float, float]
+#: Value of an attribute, and the formula that it is made from; an empty one for a constant.
+Told = tuple[Any, str]
+
+
+def words(settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
+    """See `adapters.engine.Engine.words`."""
+    found: dict[str, tuple[str, Any]] = {"kappa_elastic": ("", 0.0), "kappa_plastic": ("", 0.0)}
+    if "smooth_condim" in settings:
+        condim = settings["smooth_condim"]
+        found["smooth_condim"] = ("condim", "1 of pairs without friction" if condim == 1 else condim)
+    if settings.get("solref") == "reflect":
+        said = {_solref_formula(settings, e): "e > 0" if e > 0.0 else "e = 0" for e, _ in sorted(scene.materials())}
+        texts = [f"{formula} where {where}" if len(said) > 1 else formula for formula, where in said.items()]
+        found["solref"] = ("solref", ", ".join(texts) or "nothing touches")
+    if settings.get("solreffriction", ()) in (None, "stick"):
+        found["solreffriction"] = ("solreffriction", "0 -1/dt" if settings["solreffriction"] else "as solref")
+    if "margin" in settings:
+        formula = _margin_formula(settings["margin"], scene, dt)
+        found["margin"] = ("margin", formula or settings["margin"])
+    return found
+
+
+def snippet(settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
+    """See `adapters.engine.Engine.snippet`.
+
+    One ``<default>`` where all pairs of the scene need the same; else one ``<pair>`` for each material, with its
+    friction, to be written for each pair of geoms.
+    """
+    pairs: dict[Material, list[str]] = {}
+    for i, j, material in scene.contact_pairs():
+        between = f"{scene.bodies[i].name}-{scene.bodies[j].name}"
+        if not all(isinstance(scene.bodies[k].shape, HalfSpace) for k in (i, j)):
+            pairs.setdefault((material.restitution, material.friction), []).append(between)
+    option = {name: (settings[name], "") for name in OPTIONS if name in names}
+    asked = {material: _of_pair(settings, names, material, scene, dt) for material in pairs}
+    shared = len({str(told) for told in asked.values()}) == 1 and "solreffriction" not in names
+    lines: list[str] = []
+    if any(asked.values()):
+        lines = _of_all(pairs, asked, scene, dt) if shared else _of_pairs(pairs, asked, scene, dt)
+        if any(formula for told in asked.values() for _, formula in told.values()):
+            option = {"timestep": (dt, ""), **option}
+    return "\n".join([*([_element("option", option)] if option else []), *lines])
+
+
+def _of_pair(
+    settings: Mapping[str, Any], names: Collection[str], material: Material, scene: Scene, dt: float
+) -> dict[str, Told]:
+    """Attributes of a pair of this material, of those that ``names`` ask for."""
+    restitution, friction = material
+    found: dict[str, Told] = {}
+    if {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
+        formula = _solref_formula(settings, restitution) if settings["solref"] == "reflect" else ""
+        found["solref"] = (pair_solref(settings, restitution, dt), formula)
+    if "solimp" in names:
+        found["solimp"] = (settings["solimp"], "")
+    if "smooth_condim" in names and friction == 0.0:
+        found["condim"] = (settings["smooth_condim"], "")
+    if "margin" in names:
+        found["margin"] = (settings["margin"], _margin_formula(settings["margin"], scene, dt))
+    if "solreffriction" in names and friction > 0.0:
+        formula = "0 -1/dt" if settings["solreffriction"] == "stick" else ""
+        found["solreffriction"] = (pair_solreffriction(settings, dt), formula)
+    return found
+
+
+def _of_all(
+    pairs: Mapping[Material, Sequence[str]], asked: Mapping[Material, Mapping[str, Told]], scene: Scene, dt: float
+) -> list[str]:
+    """Defaults for all geoms and for explicit pairs, which take nothing from their geoms, and whom they touch."""
+    pair = next(iter(asked.values()))
+    bounces = {restitution for restitution, _ in pairs} if "solref" in pair else set()
+    said = ["every geom of the model that has no value of its own"]
+    if pair.get("condim", (3, ""))[0] == 1:
+        said.append('condim="1" takes all friction from them: leave it out of those with friction')
+    geom = dict(pair)
+    if "margin" in pair:  # a pair's is the sum of its geoms'
+        depth, _ = pair["margin"]
+        geom["margin"] = (0.5 * depth, _margin_formula(0.5 * depth, scene, dt))
+    of_geoms = _comment([*said, *_holds(geom, bounces, scene, dt)])
+    of_pairs = _comment(["the same for explicit pairs, which take nothing from geoms", *_formulas(pair, bounces)])
+    lines = (of_geoms, _element("geom", geom), of_pairs, _element("pair", pair))
+    return ["<default>", *(f"  {line}" for line in lines), "</default>"]
+
+
+def _of_pairs(
+    pairs: Mapping[Material, Sequence[str]], asked: Mapping[Material, Mapping[str, Told]], scene: Scene, dt: float
+) -> list[str]:
+    """One pair for each material, and a comment on which pairs it is for; a pair takes no friction from its geoms."""
+    lines = ["<contact>", "  <!-- a line for each pair of geoms that may touch, with their names for A and B -->"]
+    for material, told in asked.items():
+        if not told:
+            continue
+        restitution, friction = material
+        between = ", ".join(pairs[material][:NAMED])
+        rest = len(pairs[material]) - NAMED
+        said = f"e = {restitution:g}, friction {friction:g}: {between}{f' and {rest} more' if rest > 0 else ''}"
+        bounces = {restitution} if "solref" in told else set()
+        names: dict[str, Told] = {"geom1": ("A", ""), "geom2": ("B", "")}
+        names["friction"] = ((friction, friction, *TURNING), "")
+        comment = _comment([said, *_holds(told, bounces, scene, dt)])
+        lines += [f"  {comment}", f"  {_element('pair', {**names, **told})}"]
+    return [*lines, "</contact>"]
+
+
+def _solref_formula(settings: Mapping[str, Any], restitution: float) -> str:
+    """`pair_solref` of "reflect" as text."""
+    kappa = settings["kappa_elastic" if restitution > 0.0 else "kappa_plastic"]
+    return f"{f'-{kappa:g}/dt^2' if kappa else '0'} {'-(1+e)/dt' if restitution > 0.0 else '-1/dt'}"
+
+
+def _margin_formula(margin: float, scene: Scene, dt: float) -> str:
+    """The margin as a share of the way that a body falls, ``g dt^2``, where it is a round one; else empty.
+
+    Round to four digits: the profiles take a thousandth of it, and a margin that somebody sets is none to 1e-9.
+    """
+    fall = needs(scene).pull * dt**2
+    share = margin / fall if fall else 0.0
+    return f"{share:.4g}*g*dt^2" if share and abs(float(f"{share:.4g}") / share - 1.0) < 1e-9 else ""
+
+
+def _formulas(told: Mapping[str, Told], bounces: Collection[float]) -> list[str]:
+    """Attributes with their formulas in place of the numbers; nothing where all are constants."""
+    formulas = " ".join(f'{name}="{formula}"' for name, (_, formula) in told.items() if formula)
+    which = f" with e {'>' if max(bounces) > 0.0 else '='} 0" if bounces else ""
+    return [f"for others{which}: {formulas}"] if formulas else []
+
+
+def _holds(told: Mapping[str, Told], bounces: Collection[float], scene: Scene, dt: float) -> list[str]:
+    """For which e, step and gravity numbers are, and the formulas for others; nothing where all are constants."""
+    formulas = _formulas(told, bounces)
+    if not formulas:
+        return []
+    e = max(bounces, default=0.0)
+    known = {"1+e": f"e = {e:g}", "dt": f"dt = {dt:.9g} s", "g*": f"g = {needs(scene).pull:.9g} m/s^2"}
+    return [f"the numbers are for {', '.join(text for name, text in known.items() if name in formulas[0])}", *formulas]
+
+
+def _comment(said: Sequence[str]) -> str:
+    """An XML comment, a line for each thing that is said."""
+    text = ";\n       ".join(said).replace("--", "- -")
+    return f"<!-- {text} -->"
+
+
+def _element(name: str, attributes: Mapping[str, Told]) -> str:
+    """One empty MJCF element; numbers keep all digits that matter to a step."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, tuple | list):
+            return " ".join(text(item) for item in value)
+        return f"{value + 0.0:.9g}" if isinstance(value, float) else str(value)
+
+    return f"<{name} " + " ".join(f'{key}="{text(value)}"' for key, (value, _) in attributes.items()) + "/>"

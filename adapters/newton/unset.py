@@ -1,0 +1,22 @@
+"""What Newton's XPBD solver does when nothing is set, as documented; see `adapters.unset`."""
+
+from __future__ import annotations
+
+from adapters.newton.shipped import GAP, ROLLING, STOPPED, TORSIONAL
+from adapters.unset import Unset
+
+_SHAPE, _SOLVER = "ModelBuilder.ShapeConfig", "SolverXPBD"
+_PAIR = "xpbd/kernels.py, _solve_body_contact_positions"
+UNSET = (
+    Unset("friction of a pair", "1: mu", _SHAPE, 1.0),
+    Unset("friction of 0.2 and 0.9", "0.55, the mean", _PAIR, 0.55),
+    Unset("friction against rolling [m]", f"{ROLLING:g}: mu_rolling", _SHAPE, ROLLING),
+    Unset("friction about the normal [m]", f"{TORSIONAL:g}: mu_torsional", _SHAPE, TORSIONAL),
+    Unset("restitution of a pair", "0; ignored unless enable_restitution is set", f"{_SHAPE}; {_SOLVER}", 0.0),
+    Unset("no rebound below [m/s]", "twice the speed that gravity gives in a step", "xpbd/restitution_kernels.py"),
+    Unset("angular damping [1/s]", "0", _SOLVER, 0.0),
+    Unset("stopped below [m/s]", f"{STOPPED:g}, and spins below as many rad/s", "xpbd/kernels.py, apply_body_deltas"),
+    Unset("contacts from this gap on [m]", f"{GAP:g} of each shape", "ModelBuilder.rigid_gap"),
+    Unset("mass of a cubic metre [kg]", "1000: density", _SHAPE, 1000.0),
+    Unset("step [s]", "none: each call has its own", f"{_SOLVER}.step"),
+)

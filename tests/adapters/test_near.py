@@ -1,0 +1,87 @@
+"""Pairs that can touch: none is left out, few are for nothing, and the work grows as the number of bodies."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from adapters.near import near_pairs
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.shapes import reach
+
+
+def cloud(dimension, count, seed, spread, fixed=0.2):
+    """Balls and boxes of sizes over three powers of ten, some of them fixed, and a floor in the middle of the list."""
+    rng = np.random.default_rng(seed)
+    bodies = []
+    for k in range(count):
+        size = 10.0 ** rng.uniform(-2.0, 1.0)
+        round_shape = Disc(size) if dimension == 2 else Sphere(size)
+        shape = round_shape if rng.random() < 0.5 else Box((size,) * dimension)
+        turn = (0.3,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
+        place = tuple(map(float, rng.normal(0.0, spread, dimension)))
+        inertia = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)
+        motion = "fixed" if rng.random() < fixed else "free"
+        bodies.append(Body(f"b{k}", shape, 1.0, inertia, (*place, *turn), motion=motion))
+    normal = (0.0, 1.0) if dimension == 2 else (0.0, 0.0, 1.0)
+    bodies.insert(count // 2, Body("floor", HalfSpace(normal), motion="fixed"))
+    return Scene("cloud", 1, dimension, tuple(bodies), (Pair(),), (0.0,) * dimension, 1.0)
+
+
+def moving(scene, samples, seed, speed):
+    """Poses (s, n, p) of bodies that all go somewhere."""
+    rng, d = np.random.default_rng(seed), scene.dimension
+    pose = np.tile(np.array([body.pose for body in scene.bodies])[None], (samples, 1, 1))
+    pose[:, :, :d] += np.linspace(0.0, 1.0, samples)[:, None, None] * rng.normal(0.0, speed, pose[0, :, :d].shape)
+    return pose
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("seed", "spread", "samples"), [(1, 30.0, 1), (2, 1e3, 50), (3, 3.0, 7), (4, 1e18, 3)])
+def test_every_pair_whose_balls_touch_in_a_sample_is_found_once_and_in_order(dimension, seed, spread, samples):
+    scene = cloud(dimension, 60, seed, spread)
+    pose = moving(scene, samples, seed, spread)
+    found = list(near_pairs(scene, pose))
+    assert found == sorted(set(found)) and all(i < j for i, j in found)
+    for i in range(len(scene.bodies)):
+        for j in range(i + 1, len(scene.bodies)):
+            a, b = scene.bodies[i], scene.bodies[j]
+            if a.motion != "free" and b.motion != "free":
+                assert (i, j) not in found
+                continue
+            apart = np.linalg.norm(pose[:, i, :dimension] - pose[:, j, :dimension], axis=1)
+            touching = (apart <= reach(a.shape) + reach(b.shape)).any()
+            if touching or isinstance(a.shape, HalfSpace) or isinstance(b.shape, HalfSpace):
+                assert (i, j) in found
+
+
+def test_a_body_whose_place_is_no_number_may_touch_all():
+    scene = cloud(2, 6, 5, 1e6, fixed=0.0)
+    pose = moving(scene, 2, 5, 0.0)
+    pose[1, 0, 0] = math.nan
+    assert [pair for pair in near_pairs(scene, pose) if 0 in pair] == [(0, j) for j in range(1, 7)]
+
+
+def columns(count):
+    """Boxes in columns of five on a floor, as in a hall."""
+    side = math.ceil(math.sqrt(count / 5))
+    bodies = [Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")]
+    for k in range(count):
+        column, height = divmod(k, 5)
+        place = (0.5 * (column % side), 0.5 * (column // side), 0.1 + 0.2 * height)
+        bodies.append(Body(f"b{k}", Box((0.1, 0.1, 0.1)), 1.0, (1.0, 1.0, 1.0), (*place, 1.0, 0.0, 0.0, 0.0)))
+    return Scene("columns", 1, 3, tuple(bodies), (Pair(),), (0.0, 0.0, -9.81), 0.1)
+
+
+def test_columns_have_pairs_and_cost_as_their_bodies():
+    """A floor meets each, a box meets few others: as many pairs a body in a hall of 320 as in one of 5000."""
+    shares, times = [], []
+    for count in (320, 5000):
+        scene = columns(count)
+        pose = np.tile(np.array([body.pose for body in scene.bodies])[None], (24, 1, 1))
+        begun = time.process_time()
+        shares.append(len(list(near_pairs(scene, pose))) / count)
+        times.append(time.process_time() - begun)
+    assert shares[1] <= 1.1 * shares[0] < 6.0
+    assert times[1] / times[0] < 5.0 * (5000 / 320) ** 1.2  # fivefold: room for a busy machine; n^2 would be 244

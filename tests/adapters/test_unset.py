@@ -1,0 +1,157 @@
+"""What an engine does when nothing is set: experiments on a world that is known, and engines beside their documents."""
+
+import json
+import math
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from adapters import registry, unset
+from adapters.engine_folder import unset_of
+from adapters.unset import FRICTIONS, RADIUS, RESTITUTIONS, Asked, Told, Unset
+from reports import listing, tables
+from reports.command import main
+
+OURS = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
+HERE = [name for name in OURS if registry.find(name).engine is not None]
+
+
+class Known:
+    """A body by closed forms, step by step: Coulomb's friction, Newton's restitution, drag, sleep, a slop."""
+
+    dt, mu, e, least, drag, asleep, slop = 1.0 / 240.0, 0.3, 0.25, 0.5, 0.2, 0.75, 0.03
+    g = 1.6
+
+    def __init__(self, asked):
+        self.gap, self.along, self.up, self.spin = asked.gap, asked.along, asked.up, asked.spin
+        self.gravity = self.g if asked.gravity is None else asked.gravity
+        self.friction = self.mu if asked.friction is None else min(asked.friction)
+        self.restitution = self.e if asked.restitution is None else sum(asked.restitution) / 2
+        self.time = 0.0
+
+    def advance(self, steps):
+        for _ in range(steps):
+            self.time += self.dt
+            keeps = math.exp(-self.drag * self.dt)
+            self.along, self.up, self.spin = self.along * keeps, self.up * keeps, self.spin * keeps
+            if abs(self.along) < 0.01 and self.time > self.asleep:
+                self.along = 0.0
+            before, self.up = self.up, self.up - self.gravity * self.dt
+            if self.gap <= 0.0 and self.up < 0.0:
+                impact = before < -self.least
+                after = -self.restitution * before if impact else 0.0
+                taken = self.friction * (after - self.up)
+                self.along = math.copysign(max(0.0, abs(self.along) - taken), self.along)
+                self.up = after
+            self.gap += self.up * self.dt
+            if self.gap < -self.slop:
+                self.gap = min(-self.slop, self.gap + 0.01)
+
+    def told(self):
+        return Told(self.gap, self.along, self.up, self.spin)
+
+
+def test_the_experiments_find_the_numbers_of_a_world_that_is_known():
+    # Drag falls on the way, by what friction takes of the speed: half of that is missed.
+    missed = 0.5 * Known.drag * unset.SLIDE_TIME
+    assert unset.friction(Known) == pytest.approx(0.3, rel=1.1 * missed)
+    assert unset.friction(Known, FRICTIONS) == pytest.approx(0.2, rel=1.1 * missed)
+    assert unset.restitution(Known) == pytest.approx(0.25, rel=5e-3)
+    assert unset.restitution(Known, RESTITUTIONS) == pytest.approx(0.65, rel=5e-3)
+    # One part of 2^11 of a ratio of 1e4, and what drag takes of the way.
+    assert unset.least_rebound(Known) == pytest.approx(0.5, rel=5e-3 + Known.drag * Known.dt)
+    assert unset.damping(Known, "along") == pytest.approx(0.2) == pytest.approx(unset.damping(Known, "spin"))
+    assert unset.sleep(Known) == pytest.approx(0.75, abs=2 * Known.dt)
+    assert unset.gravity(Known) == pytest.approx(-1.6)
+    assert abs(unset.rest(Known)) < 1e-9 and unset.left(Known) == pytest.approx(0.03)
+    assert unset.reach(lambda gap: gap < 0.02) == pytest.approx(0.02, abs=RADIUS / 2**11)
+    assert unset.reach(lambda gap: False) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "measure", "expected"),
+    [({"least": 0.0}, unset.least_rebound, 0.0), ({"asleep": math.inf}, unset.sleep, math.inf),
+     ({"drag": 0.0}, lambda make: unset.damping(make, "along"), 0.0), ({"e": 0.0}, unset.restitution, 0.0),
+     ({"mu": 0.0}, unset.friction, 0.0)],
+)  # fmt: skip
+def test_what_there_is_none_of_measures_as_none(changed, measure, expected):
+    assert measure(type("Other", (Known,), changed)) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", OURS)
+def test_every_engine_says_what_it_does_with_nothing_set_and_where_that_is_documented(engine):
+    rows = unset_of(engine)
+    assert len({row.what for row in rows}) == len(rows) >= 5
+    assert all(row.documented and row.source for row in rows)
+    for row in rows:  # a number in words is the number that is compared
+        first = row.documented.split()[0].rstrip(",:")
+        if row.value is not None and first.lstrip("-").replace(".", "", 1).replace("e-", "", 1).isdigit():
+            assert float(first) == pytest.approx(row.value, abs=5e-4), row.what
+    assert any("friction of" in row.what for row in rows) and any("restitution of" in row.what for row in rows)
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_what_is_measured_with_nothing_set_is_what_is_documented(engine):
+    """A release that does otherwise, or a document that is misread, fails here."""
+    measured = [row for row in unset_of(engine) if row.measure is not None]
+    for row in measured:
+        found = row.measure()
+        assert not math.isnan(found), row.what
+        if row.value is not None:
+            assert found == row.value or abs(found - row.value) <= row.within, (row.what, found, row.value)
+    assert measured or engine in ("physx", "drake", "newton")
+
+
+def test_the_table_says_what_was_measured_and_what_differs(monkeypatch):
+    rows = (
+        Unset("friction of a pair", "0.5", "book, page 1", 0.5, lambda: 0.500001),
+        Unset("restitution of a pair", "0", "book, page 2", 0.0, lambda: 0.25),
+        Unset("asleep after [s]", "never", "book, page 3", math.inf, lambda: math.inf),
+        Unset("step [s]", "none", "book, page 4"),
+        Unset("gap [m]", "not documented", "book", None, lambda: 1 / 0),
+    )
+    monkeypatch.setattr(listing, "unset_of", lambda name: rows)
+    monkeypatch.setattr(listing, "_why_unmeasured", lambda name: "")
+    told = [listing._unset(row, "") for row in rows]
+    assert [row["agrees"] for row in told] == [True, False, True, None, None]
+    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    tables._unset({"unset": told}, console)
+    text = console.export_text()
+    assert "0.25, differs" in text and "never" in text and "ZeroDivisionError" in text
+    assert all(len(line.rstrip()) <= 80 for line in text.splitlines())
+
+
+def test_an_engine_that_is_not_here_shows_what_is_documented_and_that_nothing_was_measured(monkeypatch):
+    missing = next((name for name in OURS if name not in HERE), None)
+    if missing is None:
+        pytest.skip("all engines are installed")
+    done = CliRunner().invoke(main, ["describe", missing, "--json"])
+    told = json.loads(done.output)
+    assert told["status"] == "not installed" and told["unset"]
+    for row in told["unset"]:
+        assert row["measured"] is None and row["reason"] == f"{missing} is not installed here"
+    text = CliRunner().invoke(main, ["describe", missing]).output
+    assert "When nothing is set" in text and f"not measured: {missing} is not installed here" in text
+
+
+@pytest.mark.parametrize("engine", [name for name in HERE if registry.load(name).kernels() is None])
+def test_describe_measures_when_it_is_asked_and_lists_what_can_be_set(engine):
+    told = json.loads(CliRunner().invoke(main, ["describe", engine, "--json"]).output)
+    assert {row["what"]: row["agrees"] for row in told["unset"]}
+    assert all(row["agrees"] is not False for row in told["unset"])
+    if registry.load(engine).name not in ("physx", "drake", "newton"):
+        assert sum(row["measured"] is not None for row in told["unset"]) >= 5
+    assert {each["name"] for each in told["settable"]} == set(registry.load(engine).settable())
+
+
+def test_kernels_that_are_not_compiled_are_not_compiled_to_describe_an_engine(monkeypatch, tmp_path):
+    engine = registry.load("reference")
+    monkeypatch.setattr(type(engine), "kernels", lambda self: tmp_path)
+    assert listing._why_unmeasured("reference").endswith("crosscheck compile --engine reference")
+    (tmp_path / "warm-1.json").write_text("{}")
+    assert listing._why_unmeasured("reference") == ""
+
+
+def test_a_body_stands_where_it_was_asked():
+    assert Asked("ball", 0.25).height == 0.75 and Asked("box", 0.25).height == 0.35
