@@ -1,4 +1,4 @@
-"""Pairs of bodies that can touch at all, found without a look at every pair.
+"""Pairs of bodies that can touch at all, found without a look at every pair, and how deep they start in each other.
 
 Each body is held by a box along the axes, over a block of samples. Boxes of about one size (within a factor of two) are
 sorted into cells of a grid that none of them exceeds, so that each lies in two cells an axis at most; what shares a
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array
-from adapters.scene import HalfSpace, Scene
-from adapters.shapes import reach
+from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Scene, Sphere
+from adapters.shapes import Shape, reach
 
 #: Samples that a box holds a body for: what moves little in them keeps its box small, and a short run is one block.
 BLOCK = 32
@@ -89,3 +89,57 @@ def _sharing(low: Array, high: Array, cell: float) -> Pairs:
         found.append(np.stack([owner[begin], owner[begin + ahead]], 1))
         ahead += 1
     return np.concatenate(found) if found else np.empty((0, 2), np.int64)
+
+
+def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:
+    """How deep pairs start in each other at most, by body indices [m]; pairs that some direction parts are left out.
+
+    Moved by their overlap along any direction two bodies are apart, so that the least of several directions is a bound
+    from above: the face of a half-space; otherwise the line of centres and the axes of both. It is exact for balls, and
+    for boxes that meet with a face.
+    """
+    poses = np.array([body.pose for body in scene.bodies])
+    found = {}
+    for i, j in near_pairs(scene, poses[None]):
+        depth = min(_depths(scene.bodies[i].shape, poses[i], scene.bodies[j].shape, poses[j]), default=0.0)
+        if depth > 0.0:
+            found[i, j] = depth
+    return found
+
+
+def _depths(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Iterator[float]:
+    """Yield how far A and B reach over each other along some directions [m]; below 0 they are apart."""
+    if isinstance(b, HalfSpace):
+        a, pose_a, b, pose_b = b, pose_b, a, pose_a
+    d = 2 if len(pose_b) == 3 else 3
+    if isinstance(a, HalfSpace):
+        normal = np.array(a.normal)
+        yield a.offset - float(normal @ pose_b[:d]) + _reach_along(b, pose_b, -normal)
+        return
+    between = pose_b[:d] - pose_a[:d]
+    far = float(np.linalg.norm(between))
+    for line in (*([between / far] if far else []), *rotation(pose_a[d:]).T, *rotation(pose_b[d:]).T):
+        to = line if line @ between >= 0.0 else -line
+        yield _reach_along(a, pose_a, to) + _reach_along(b, pose_b, -to) - float(to @ between)
+
+
+def _reach_along(shape: Shape, pose: Array, direction: Array) -> float:
+    """How far a shape reaches from its centre along a unit vector [m]."""
+    if isinstance(shape, Disc | Sphere):
+        return shape.radius
+    along = rotation(pose[len(direction) :]).T @ direction
+    if isinstance(shape, Box):
+        return float(np.abs(along) @ np.array(shape.half_extents))
+    if isinstance(shape, Capsule | Cylinder):
+        rim = 1.0 if isinstance(shape, Capsule) else float(np.linalg.norm(along[1:]))
+        return abs(float(along[0])) * shape.half_length + rim * shape.radius
+    return reach(shape) if isinstance(shape, HalfSpace) else float((np.array(shape.vertices) @ along).max())
+
+
+def rotation(turn: Array) -> Array:
+    """Rotation matrix, columns are the body axes: of an angle (1,) [rad] or of a unit quaternion (w, x, y, z)."""
+    if len(turn) == 1:
+        return np.array([[np.cos(turn[0]), -np.sin(turn[0])], [np.sin(turn[0]), np.cos(turn[0])]])
+    w, u = turn[0], turn[1:]
+    cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+    return np.asarray((w * w - u @ u) * np.eye(3) + 2.0 * np.outer(u, u) + 2.0 * w * cross)

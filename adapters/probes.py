@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adapters.lift import lift, lower_pose, lower_twist
+from adapters.near import rotation
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.trajectory import Sampling, Trajectory
 
@@ -172,7 +173,7 @@ def _planar_load(case: Case) -> list[Body]:
 def _spatial_load(case: Case) -> list[Body]:
     """Boxes in a turned pose, each with a torque about one of its principal axes, so that none precesses."""
     turn = (0.5, 0.1, 0.7, 0.5)  # a unit quaternion with four different components
-    axes, moments = _rotation(np.array(turn)), (1.0, 1.2, 1.5)
+    axes, moments = rotation(np.array(turn)), (1.0, 1.2, 1.5)
     ball = replace(_ball(case, "ball", 2.0, 0.5), torque=tuple(0.2 * LOAD_SPIN_UP * c for c in (0.6, 0.0, 0.8)))
     bodies = [ball]
     for axis in range(3):
@@ -181,13 +182,6 @@ def _spatial_load(case: Case) -> list[Body]:
         bodies.append(replace(box, inertia=moments, pose=(10.0 * (axis + 1), 0.0, 0.0, *turn), torque=torque))
     push = (0.48, 0.36, -0.8)
     return [replace(b, force=tuple(LOAD_ACCELERATION * b.mass * c for c in push)) for b in bodies]
-
-
-def _rotation(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a unit quaternion (w, x, y, z)."""
-    w, u = q[0], q[1:]
-    cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-    return np.asarray((w * w - u @ u) * np.eye(3) + 2.0 * np.outer(u, u) + 2.0 * w * cross)
 
 
 def read_load(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
@@ -215,7 +209,7 @@ def _turned(case: Case, trajectory: Trajectory, i: int) -> np.ndarray:
     first, last = trajectory.pose[0, i], trajectory.pose[-1, i]
     if case.dimension == 2:
         return np.array([last[2] - first[2]])
-    r = _rotation(last[3:]) @ _rotation(first[3:]).T
+    r = rotation(last[3:]) @ rotation(first[3:]).T
     return 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
 
 

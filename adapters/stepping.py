@@ -20,11 +20,10 @@ import numpy as np
 from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
-from adapters.near import near_pairs
-from adapters.scene import Body, Cylinder, Hull, Scene, Sphere
+from adapters.near import start_overlap
+from adapters.scene import Body, Scene
 from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
-from reference_solver.certification.geometry import gap
 
 #: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
 #: still be a wrong answer worth measuring; a thousand times is none.
@@ -287,17 +286,6 @@ def _fastest(scene: Scene) -> float:
     initial = max(top_speed(b) + reach(b.shape) * math.hypot(*b.twist[d:]) for b in scene.bodies)
     pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
     return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
-
-
-def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:
-    """Overlap of each pair that starts in one, by body indices [m]; a step that undoes it makes it, over dt, a speed.
-
-    Shapes that the certificate's geometry does not measure are taken as balls that hold them.
-    """
-    shapes = [Sphere(reach(b.shape)) if isinstance(b.shape, Cylinder | Hull) else b.shape for b in scene.bodies]
-    poses = [body.pose for body in scene.bodies]
-    gaps = {(i, j): gap(shapes[i], poses[i], shapes[j], poses[j]) for i, j in near_pairs(scene, np.array([poses]))}
-    return {pair: -float(found) for pair, found in gaps.items() if found < 0.0}
 
 
 def _pull(body: Body) -> float:

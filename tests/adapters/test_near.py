@@ -6,9 +6,10 @@ import time
 import numpy as np
 import pytest
 
-from adapters.near import near_pairs
-from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.near import near_pairs, start_overlap
+from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Pair, Polygon, Scene, Sphere
 from adapters.shapes import reach
+from reference_solver.certification.geometry import gap
 
 
 def cloud(dimension, count, seed, spread, fixed=0.2):
@@ -85,3 +86,57 @@ def test_columns_have_pairs_and_cost_as_their_bodies():
         times.append(time.process_time() - begun)
     assert shares[1] <= 1.1 * shares[0] < 6.0
     assert times[1] / times[0] < 5.0 * (5000 / 320) ** 1.2  # fivefold: room for a busy machine; n^2 would be 244
+
+
+# ---- how deep bodies start in each other ----
+
+PLANAR = (Disc(0.3), Box((0.4, 0.2)), Capsule(0.3, 0.1), Polygon(((-0.3, -0.2), (0.3, -0.2), (0.0, 0.4))))
+SPATIAL = (Sphere(0.3), Box((0.4, 0.2, 0.3)), Capsule(0.3, 0.1))
+
+
+def two(shapes, poses, floor=None):
+    """Two free bodies, one of them a floor if ``floor`` is its normal."""
+    d = 2 if len(poses[0]) == 3 else 3
+    inertia = 1.0 if d == 2 else (1.0, 1.0, 1.0)
+    bodies = [
+        Body(f"b{k}", shape, 1.0, inertia, pose) for k, (shape, pose) in enumerate(zip(shapes, poses, strict=True))
+    ]
+    if floor is not None:
+        bodies[1] = Body("floor", HalfSpace(floor), motion="fixed")
+    return Scene("two", 1, d, tuple(bodies), (Pair(),), (0.0,) * d, 1.0)
+
+
+def pose_of(rng, dimension, size):
+    """Draw a place within ``size`` and a turn."""
+    turn = rng.normal(size=1 if dimension == 2 else 4)
+    turn = turn if dimension == 2 else turn / np.linalg.norm(turn)
+    return tuple(map(float, (*rng.uniform(-size, size, dimension), *turn)))
+
+
+@pytest.mark.parametrize(("dimension", "shapes"), [(2, PLANAR), (3, SPATIAL)])
+def test_the_overlap_at_the_start_is_no_less_than_the_true_one(dimension, shapes):
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        chosen = [shapes[k] for k in rng.integers(len(shapes), size=2)]
+        poses = [pose_of(rng, dimension, 0.4) for _ in chosen]
+        depth = -gap(chosen[0], poses[0], chosen[1], poses[1])
+        found = start_overlap(two(chosen, poses)).get((0, 1), 0.0)
+        assert found >= depth - 1e-14
+        if all(isinstance(shape, Disc | Sphere) for shape in chosen):
+            assert found == pytest.approx(max(depth, 0.0), abs=1e-14)
+        floor = (0.6, 0.8) if dimension == 2 else (0.6, 0.0, 0.8)
+        scene = two(chosen, poses, floor)
+        depth = -gap(chosen[0], poses[0], scene.bodies[1].shape, scene.bodies[1].pose)
+        assert start_overlap(scene).get((0, 1), 0.0) == pytest.approx(max(depth, 0.0), abs=1e-14)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 2.0])
+def test_the_overlap_of_boxes_that_meet_with_a_face_and_of_solids_is_the_true_one(turn):
+    along, across = np.array([math.cos(turn), math.sin(turn)]), np.array([-math.sin(turn), math.cos(turn)])
+    for depth in (1e-6, 0.01, -0.01):
+        place = tuple(map(float, 0.1 * along + (0.5 - depth) * across))
+        scene = two((Box((0.4, 0.2)), Box((0.3, 0.3))), ((0.0, 0.0, turn), (*place, turn)))
+        assert start_overlap(scene).get((0, 1), 0.0) == pytest.approx(max(depth, 0.0), abs=1e-14)
+    corners = tuple((x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1))
+    poses = ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.13, 0.0, 1.0, 0.0, 0.0, 0.0))
+    assert start_overlap(two((Cylinder(0.3, 0.04), Hull(corners)), poses)) == {(0, 1): pytest.approx(0.01)}

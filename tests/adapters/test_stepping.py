@@ -17,8 +17,8 @@ import pytest
 
 from adapters.conformance.worlds import one_by_one
 from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Recorded, Scheme, Setting, Simulation
-from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Scene, Sphere
-from adapters.stepping import _alike, advances, posed_for, run, start_overlap, step_count
+from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
+from adapters.stepping import _alike, advances, posed_for, run, step_count
 from adapters.trajectory import ContactRecord, Sampling, load_trajectory
 
 
@@ -637,11 +637,3 @@ def test_what_is_no_answer_stays_none_and_a_long_run_is_granted_its_overlap_over
     assert diverged.finish == "diverged" and "nothing in the scene explains it" in diverged.reason
     apart = run(Toy({3}, parting_at(0.9 * fast)), two_cubes(-0.02, duration=100.0), 1 / 240, {}, Sampling(24000))
     assert apart.finish == "diverged"
-
-
-def test_the_overlap_at_the_start_is_that_of_its_deepest_pair_and_of_shapes_that_are_not_measured_a_bound():
-    assert start_overlap(two_cubes(0.01)) == {(0, 1): pytest.approx(0.01)}
-    assert start_overlap(two_cubes(-0.01)) == {}
-    lying = replace(two_cubes(0.0).bodies[1], name="c", shape=Cylinder(0.03, 0.04))
-    scene = replace(two_cubes(-0.01), bodies=(two_cubes(-0.01).bodies[0], lying))
-    assert start_overlap(scene)[0, 1] == pytest.approx(0.05 - 0.0355, abs=1e-3)

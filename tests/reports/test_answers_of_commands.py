@@ -329,16 +329,17 @@ def test_options_become_a_request_field_by_field_and_its_words():
     options = {
         "scenes": ("stack", "imp*", "stack"), "engine": ("chipmunk",), "profile": ("tuned", "default"), "dim": (3, 2),
         "dt": ("1/60", "0.01"), "iterations": (4, 7), "param": ("n=2",), "ulp": (), "quick": False, "standard": False,
-        "full": True,
+        "full": True, "set": ("damping=0.5",),
     }  # fmt: skip
     found = selection.request_from(options)
     assert found == Request(
         scenes=["stack", "impact"], engines=["chipmunk"], profiles=["tuned", "default"], dimensions=[3, 2],
         dts=[1 / 60, 0.01], iterations=[4, 7], params={"n": 2.0}, suite="full", ulps=(0,), floors=True,
+        sets=(("damping", 0.5),),
     )  # fmt: skip
     assert selection.asked(found, options) == (
-        "stack impact --param n=2 --engine chipmunk --profile tuned --profile default --dim 3 --dim 2 --dt 1/60 "
-        "--dt 0.01 --iterations 4 --iterations 7"
+        "stack impact --param n=2 --engine chipmunk --profile tuned --profile default --set damping=0.5 --dim 3 "
+        "--dim 2 --dt 1/60 --dt 0.01 --iterations 4 --iterations 7"
     )
     moved = selection.request_from(options | {"ulp": (1, -2), "engine": (), "param": (), "full": True, "scenes": ()})
     assert (moved.ulps, moved.floors, moved.engines, moved.params) == ((1, -2), False, registry.usual(), None)

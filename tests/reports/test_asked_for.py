@@ -12,7 +12,7 @@ from rich.console import Console
 from adapters.scene import SceneError
 from reports import speed, tables
 from reports.command import main
-from reports.command.selection import _scene_names
+from reports.command.selection import scene_names_of
 from validation.catalogue import CATALOGUE
 from validation.records.store import Store
 
@@ -23,12 +23,12 @@ def test_scenes_of_several_words_add_up_and_stand_once(tmp_path, monkeypatch):
         'name = "drop"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'
         'bodies = [{ name = "b", shape = { type = "disc", radius = 0.5 }, pose = [0.0, 1.0, 0.0] }]\n'
     )
-    assert _scene_names(["bounce", "imp*", "bounce"]) == ["bounce", "impact"]
-    first, last = _scene_names(["bounce", "drop.toml"])
+    assert scene_names_of(["bounce", "imp*", "bounce"]) == ["bounce", "impact"]
+    first, last = scene_names_of(["bounce", "drop.toml"])
     assert first == "bounce" and last.startswith("drop.toml@")
-    assert _scene_names([]) == list(CATALOGUE)
+    assert scene_names_of([]) == list(CATALOGUE)
     with pytest.raises(SceneError):
-        _scene_names(["no-such-scene"])
+        scene_names_of(["no-such-scene"])
 
 
 def shown(data):

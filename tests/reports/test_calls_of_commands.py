@@ -50,7 +50,9 @@ def ran(monkeypatch):
     monkeypatch.setattr(running, "spreads", lambda *given: found.apart.append(given) or [])
     monkeypatch.setattr(running, "with_skill", lambda rows: rows)
     monkeypatch.setattr(running, "null_rows", lambda rows: [])
-    monkeypatch.setattr(running, "show", lambda rows, console, files: console.print(f"{len(rows)} rows, {len(files)}"))
+    monkeypatch.setattr(
+        running, "show", lambda rows, console, files, out: console.print(f"{len(rows)} rows, {len(files)}")
+    )
     return found
 
 

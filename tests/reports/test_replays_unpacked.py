@@ -93,6 +93,8 @@ def test_what_should_stay_stands_still_wherever_it_is_and_what_should_move_along
 
 def test_a_bar_goes_on_by_one_for_each_part_that_is_compiled(monkeypatch):
     class Warming:
+        begun = False
+
         def __init__(self, slots):
             self.parts = ["a 2-D", "a 3-D", "b 2-D"]
 

@@ -50,6 +50,7 @@ class Warming:
     """What is left to compile: two parts, of a minute each."""
 
     parts = ("reference 2-D", "reference 3-D")
+    begun = False
 
     def __init__(self, slots):
         assert slots == ["slots"]
@@ -88,6 +89,14 @@ def test_without_a_number_of_jobs_every_core_compiles(console, monkeypatch):
     monkeypatch.setattr(Warming, "run", lambda self, jobs: asked.append(jobs) or iter(()))
     stages.warm_up(["slots"], 0, console)
     assert asked == [3] and "about 40 s" in said(console)
+
+
+def test_who_waits_for_little_is_not_told_of_a_minute(console, monkeypatch):
+    monkeypatch.setattr(stages, "Warming", Warming)
+    monkeypatch.setattr(Warming, "begun", True)
+    stages.warm_up(["slots"], 2, console)
+    first = "kernels are compiled; what these cells call besides is looked for"
+    assert said(console).splitlines() == [first, "compiled: 0 s"]
 
 
 def test_a_terminal_sees_each_part_as_it_is_done(monkeypatch):
