@@ -341,7 +341,7 @@ def test_options_become_a_request_field_by_field_and_its_words():
         "stack impact --param n=2 --engine chipmunk --profile tuned --profile default --set damping=0.5 --dim 3 "
         "--dim 2 --dt 1/60 --dt 0.01 --iterations 4 --iterations 7"
     )
-    moved = selection.request_from(options | {"ulp": (1, -2), "engine": (), "param": (), "full": True, "scenes": ()})
+    moved = selection.request_from(options | {"ulp": (1, -2), "engine": (), "param": (), "set": (), "scenes": ()})
     assert (moved.ulps, moved.floors, moved.engines, moved.params) == ((1, -2), False, registry.usual(), None)
     assert moved.scenes == list(CATALOGUE)
     assert not selection.request_from(options | {"full": False, "quick": True}).floors

@@ -129,12 +129,19 @@ def test_the_same_command_resumes_and_another_value_is_another_run(ran, tmp_path
 def test_a_scene_file_runs_with_settings(tmp_path):
     path = tmp_path / "falling.toml"
     path.write_text(FALLING)
-    done = call("run", path, "--set", "damping=0.5", "--json", "--out", tmp_path / "out", status=0)
+    # The file states a number, which the setting makes wrong: an alarm, and the row says what the setting realises.
+    done = call("run", path, "--set", "damping=0.5", "--json", "--out", tmp_path / "out", status=1)
     rows = json.loads(done.stdout[done.stdout.index("[") :])
     assert {(row["engine"], row["profile"]) for row in rows} == {("chipmunk", "default+damping=0.5")}
     # Half of the speed is lost in a second: v = -g (1 - 2^-t)/ln 2.
-    (speed,) = [row["value"] for row in rows if "ball.vy" in row["check"]]
+    (stated,) = [row for row in rows if "ball.vy" in row["check"]]
+    assert (stated["physics"], stated["standing"]) == ("fail", "new")
+    assert "linear_damping asked 0, measured 0.5" in stated["reason"]
+    speed = stated["value"]
     assert speed == pytest.approx(-10.0 * (1.0 - 0.5**0.25) / math.log(2.0), abs=10.0 / 240.0)
+    # Without the number nothing is listed that could be new: shown, and no alarm.
+    path.write_text(FALLING.partition("[[checks]]")[0])
+    call("run", path, "--set", "damping=0.5", "--out", tmp_path / "out", status=0)
 
 
 @pytest.mark.parametrize(

@@ -200,10 +200,11 @@ def _verdict(
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
-    if check.source == STATED:  # its author knows the number: no list excuses an engine
-        return Known(None, True)
+    off = _not_as_asked(observation) if slot.is_own else []
+    if check.source == STATED:  # its author knows the number: neither a list nor settings of one's own excuse an engine
+        return Known(None, True, "; ".join(off))
     if slot.is_own:
-        return Known(None, False, "; ".join([OWN_SETTINGS, *_not_as_asked(observation)]))
+        return Known(None, False, "; ".join([OWN_SETTINGS, *off]))
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
         return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
     if is_model(slot.scene):  # nothing can be listed of it
