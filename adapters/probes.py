@@ -40,6 +40,9 @@ REBOUND_LEAD = 3
 REBOUND_TIME = 0.2
 #: Sliding: least speed at the start [m/s] and time [s].
 SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5
+#: Friction up to which it brakes by no more than a weight. A larger one is left to the probes that read friction: what
+#: an engine does with it (MuJoCo's box sinks and is thrown up) must not pass for a wrong size or sign.
+MOST_FRICTION = 1.0
 #: Speed of the landing bodies [m/s]: low, since the step of motion limits what their size can be told to.
 LANDING_SPEED = 0.25
 LANDING_LEAD = 5.5
@@ -66,7 +69,7 @@ class Probe:
     """A scene, the quantities it shows, and how they are read from its trajectory.
 
     ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``rubs``: they have
-    the friction of the judged scene; without, what friction does in an engine cannot pass for a wrong size or sign.
+    the friction of the judged scene however large it is; others have `MOST_FRICTION` at most.
     ``contacts``: contact impulses are read, of every step.
     """
 
@@ -322,11 +325,11 @@ def read_rebound(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 def slide_load(friction: float) -> float:
-    """Gravity of the slide [m/s^2]: less above a friction of 1, so that it brakes by one weight at most.
+    """Gravity of the slide [m/s^2]: less above `MOST_FRICTION`, so that it brakes by one weight at most.
 
     Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured.
     """
-    return GRAVITY / max(1.0, friction)
+    return GRAVITY / max(MOST_FRICTION, friction)
 
 
 def slide_speed(friction: float) -> float:

@@ -25,12 +25,12 @@ from adapters.mujoco.pasting import snippet, words
 from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
-from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD
+from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD, SMALLEST_FRICTION
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import LANDING_LEAD, LANDING_SPEED, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, MOST_FRICTION, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
 from adapters.settings import Check
@@ -158,7 +158,7 @@ class MujocoEngine(Engine):
         """Rebound as shipped, over all phases of a step; friction of a box that hops; sums of forces; RK4's fall."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
         own_laws = "rounds" not in settings  # the matched profile has Newton's and Coulomb's
-        declared = {"impulse": _impulses(settings, dt)}
+        declared = {"impulse": _impulses(settings, needs.friction, dt)}
         if settings["integrator"] == "RK4":
             declared |= _second_order_fall()
         elif own_laws and needs.friction > 0.0 and not BROUGHT & set(settings):
@@ -182,19 +182,29 @@ class MujocoEngine(Engine):
         return words(settings, scene, dt)
 
 
-def _impulses(settings: Mapping[str, Any], dt: float) -> Declared:
-    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance.
+def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declared:
+    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance and to round-off.
 
     Newton stops when a step gains less than ``tolerance`` of its cost, which counts in units of the mean inertia times
     the unknowns, 6 for each of the four bodies. Short of its minimum by that, the gradient (what forces and momentum
     differ by) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance /
     (1 - d)) m/s^2 in each step of the probe.
+
+    A force is stiffness times acceleration, and an acceleration of six components is known to six roundings: of all
+    impulses together ``6 epsilon H/m``. H is larger in a pyramid, whose edges have ``d/((1 - d) 2 mu^2)`` of a unit
+    mass each (documentation, computation: contact), four of them at each of the box's four corners; at mu = 1e-5,
+    which a pair without friction keeps, that is 1.5e12.
     """
     deep = min(float(settings["solimp"][1]), IMPEDANCE_RANGE[1])
     gradient = math.sqrt(2.0 * 24.0 * float(settings["tolerance"]) / (1.0 - deep))
     steps = math.ceil(2.0 * LANDING_LEAD + 1.0)
+    band = IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED
     because = "forces are solved to a tolerance: so much may they and the momentum differ in each step of the landing"
-    return Declared(1.0, IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED, because)
+    if settings["cone"] == "pyramidal" and (friction > 0.0 or settings["smooth_condim"] == 3):
+        mu = max(min(friction, MOST_FRICTION), SMALLEST_FRICTION) / math.sqrt(float(settings["impratio"]))
+        band += 6.0 * 2.0**-52 * 16.0 * deep / ((1.0 - deep) * 2.0 * mu * mu)
+        because += "; and to the round-off of stiff edges of friction pyramids"
+    return Declared(1.0, band, because)
 
 
 def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:

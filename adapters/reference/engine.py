@@ -135,10 +135,13 @@ class ReferenceEngine(Engine):
         reasons = list(found.reasons)
         free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]  # the audit knows where others are
         same = np.array_equal(found.pose[-1][free], final_pose[free])
+        light = found.light["converged"] and not found.light["reasons"]
+        broken = {finding.name for finding in found.findings if not finding.holds}
         if not same:
             reasons.append("the run that was certified does not end where the run that is judged does")
         return {
             "holds": found.holds and same,
+            "lawful": bool(same and light and broken <= {"shared"}),  # one of the motions that obey the laws
             "reasons": reasons,
             "error": json_ready(found.error[-1]),
             "growth": json_ready(found.growth[-1]),

@@ -434,6 +434,10 @@ def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(toy_class)
     receipts(engine, "default", IMPACT, DT)
     builds.clear()
     receipts(engine, "default", replace(IMPACT, friction=0.25), DT)
+    assert builds == ["probe_landing", "probe_rebound", "probe_slide", "probe_corner"]
+    receipts(engine, "default", replace(IMPACT, friction=3.0), DT)
+    builds.clear()  # above `MOST_FRICTION` only what reads friction has more of it
+    receipts(engine, "default", replace(IMPACT, friction=8.0), DT)
     assert builds == ["probe_rebound", "probe_slide"]
 
 
@@ -483,6 +487,15 @@ def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, prof
         pytest.skip("bullet refuses it")
     asked = replace(REST, dimension=3, friction=friction)
     assert [slip.quantity for slip in receipts(found.engine, profile, asked, dt) if not slip.holds] == []
+
+
+@pytest.mark.parametrize("friction", [0.0, 1e-5, 0.3])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 2000, 1 / 10000])
+def test_forces_of_stiff_friction_pyramids_are_told_to_their_round_off_at_any_step(friction, dt):
+    """As shipped a pair without friction has edges of mu = 1e-5: 1e12 times as stiff as its bodies are heavy."""
+    pytest.importorskip("mujoco")
+    told = by_quantity(receipts(find("mujoco").engine, "default", replace(REST, dimension=3, friction=friction), dt))
+    assert told["impulse"].holds and told["impulse"].band <= 0.01
 
 
 def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):

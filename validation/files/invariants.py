@@ -25,6 +25,9 @@ from validation import metrics
 from validation.bounds import ROUND_OFF
 from validation.canonical import Check, Measured
 
+#: What is judged of any motion that obeys the laws, be it the only one or not.
+LAWS = ("energy_growth", "penetration")
+
 
 def checks(scene: Scene, dt: float) -> list[Check]:
     """Both checks; energy is shown without a truth where a prescribed body or the impact law may feed it in."""
