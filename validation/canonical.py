@@ -76,7 +76,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Check:
-    """One judged number: PASS if |value - truth| <= bound; shown but not judged if there is no truth."""
+    """One judged number: PASS if |value - truth| <= bound; shown but not judged if there is no truth.
+
+    ``at`` is the instant that it is about [s], where it knows nothing of what comes later.
+    """
 
     metric: str
     unit: str
@@ -84,6 +87,7 @@ class Check:
     bound: float | None
     because: str
     source: str
+    at: float | None = None
 
     @property
     def is_finite(self) -> bool:

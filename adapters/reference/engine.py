@@ -137,15 +137,19 @@ class ReferenceEngine(Engine):
         same = np.array_equal(found.pose[-1][free], final_pose[free])
         light = found.light["converged"] and not found.light["reasons"]
         broken = {finding.name for finding in found.findings if not finding.holds}
+        determined = math.isinf(found.determined)
+        if not determined and "shared" not in broken:  # beyond the horizon
+            reasons.insert(0, next(finding.meaning for finding in found.findings if finding.name == "shared"))
         if not same:
             reasons.append("the run that was certified does not end where the run that is judged does")
         return {
-            "holds": found.holds and same,
+            "holds": found.holds and same and determined,
             "lawful": bool(same and light and broken <= {"shared"}),  # one of the motions that obey the laws
             "reasons": reasons,
             "error": json_ready(found.error[-1]),
             "growth": json_ready(found.growth[-1]),
             "horizon": json_ready(found.horizon),
+            "determined": json_ready(found.determined),
             "findings": {finding.name: json_ready(finding.value) for finding in found.findings},
         }
 

@@ -82,6 +82,9 @@ class Certificate:
         (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
     horizon
         First time at which ``growth`` reaches `GROWTH` [s]; infinite if it does not.
+    determined
+        Time until which the laws know one motion only [s]: none of how loads are shared shows in it. Infinite if at no
+        time of the run, be it beyond the horizon, two motions that obey them are visibly apart.
     light
         What the solver says of itself (`Simulation.certificate`).
     pose
@@ -95,6 +98,7 @@ class Certificate:
     error: Array
     growth: Array
     horizon: float
+    determined: float
     light: dict[str, Any]
     pose: Array
 
@@ -144,7 +148,17 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         reasons.append(
             f"beyond {horizon:.3g} s a last-place disturbance has grown {GROWTH:.0g}-fold: only laws hold there"
         )
-    return Certificate(holds, tuple(reasons), tuple(findings), record.t, error, growth, horizon, light, record.pose)
+    until = _determined(model, record.t, apart, shared.limit)
+    made = (error, growth, horizon, until, light, record.pose)
+    return Certificate(holds, tuple(reasons), tuple(findings), record.t, *made)
+
+
+def _determined(model: Model, t: Array, apart: Array, limit: float) -> float:
+    """Last time at which motions are not ``apart`` at all (s,), where they are by ``limit`` of a half width later."""
+    least = min(smallest_extent(body.shape) for body in model.bodies)
+    if not (apart > limit * (least if np.isfinite(least) else 1.0)).any():
+        return float("inf")
+    return float(t[apart <= 0.0].max(initial=0.0))
 
 
 def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:

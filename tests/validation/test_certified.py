@@ -74,3 +74,65 @@ def test_eight_blocks_that_fall_off_each_other_are_located_throughout_and_certif
     found = execute(slot)
     assert found.outcome is Outcome.OK, found.certificate["reasons"]
     assert found.certificate["held_steps"] == 0
+
+
+ICE = """
+name = "ice to asphalt"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = {duration}
+pairs = [{{ friction = 0.0 }}, {{ a = "asphalt", b = "box", friction = 0.5 }}]
+[[bodies]]
+name = "ice"
+shape = {{ type = "box", half_extents = [2.0, 0.5] }}
+motion = "fixed"
+pose = [-2.0, -0.5, 0.0]
+[[bodies]]
+name = "asphalt"
+shape = {{ type = "box", half_extents = [2.0, 0.5] }}
+motion = "fixed"
+pose = [2.0, -0.5, 0.0]
+[[bodies]]
+name = "box"
+shape = {{ type = "box", half_extents = [0.5, 0.1] }}
+mass = 1.0
+pose = [{x}, 0.1, 0.0]
+twist = [3.0, 0.0, 0.0]
+[[checks]]
+quantity = "box.x"
+at = 0.05
+value = "{x} + 3 * t"
+tolerance = 1e-6
+[[checks]]
+quantity = "box.x"
+value = "{x} + 3 * t"
+tolerance = 0.8
+"""
+
+
+def on_ice(tmp_path, x, duration):
+    """Physics of each row of a box that slides from ``x`` [m], its front half a metre ahead, on to asphalt at 0."""
+    path = tmp_path / "ice.toml"
+    path.write_text(ICE.format(x=x, duration=duration))
+    rows = rows_of("run", [execute(Slot(str(path), (), 2, "reference", "reference", 1 / 240))])
+    return {row.metric: (row.physics, row.reason) for row in rows}
+
+
+@pytest.mark.parametrize(("x", "duration"), [(-0.7, 0.5), (-0.8, 0.2)])
+def test_of_a_motion_that_is_not_determined_only_what_comes_before_and_what_any_obeys_is_judged(tmp_path, x, duration):
+    """While the box is on both, each may carry all of it or nothing: it ends anywhere within decimetres."""
+    found = on_ice(tmp_path, x, duration)
+    assert [found[metric][0] for metric in ("energy_growth", "penetration", "at[0.05 s][box.x]")] == ["pass"] * 3
+    physics, why = found["final[box.x]"]
+    assert physics is None and why.startswith("certificate: the motion is not determined: bodies 0, 1 and 2 can share")
+
+
+def test_before_it_meets_the_asphalt_all_of_it_is_judged(tmp_path):
+    assert {physics for physics, _ in on_ice(tmp_path, -0.7, 0.06).values()} == {"pass", None}
+    assert on_ice(tmp_path, -0.7, 0.06)["final[box.x]"] == ("pass", "")
+
+
+def test_what_is_told_at_an_instant_after_loads_are_shared_is_not_judged(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "ICE", ICE.replace("at = 0.05", "at = 0.15"))
+    found = on_ice(tmp_path, -0.7, 0.5)
+    assert found["at[0.15 s][box.x]"][0] is None and found["energy_growth"][0] == "pass"

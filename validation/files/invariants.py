@@ -26,7 +26,7 @@ from validation.bounds import ROUND_OFF
 from validation.canonical import Check, Measured
 
 #: What is judged of any motion that obeys the laws, be it the only one or not.
-LAWS = ("energy_growth", "penetration")
+LAWS = ("energy_growth", "penetration", "deepest_overlap")
 
 
 def checks(scene: Scene, dt: float) -> list[Check]:

@@ -141,8 +141,15 @@ def _checks(read: Stated, dt: float) -> list[Check]:
     names = {_metric(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
     depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
-    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
+    return [
+        *invariants.checks(read.scene, dt),
+        *(_stated_check(read, m, c, dt) for m, c in told.items()),
+        depth,
+        *shown,
+    ]
 
 
-def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
-    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED)
+def _stated_check(read: Stated, metric: str, check: StatedCheck, dt: float) -> Check:
+    what = parts_of(check.quantity, [body.name for body in read.scene.bodies])[2]
+    at = None if is_over_time(what) else check.at  # steps around an instant
+    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED, at)

@@ -238,11 +238,14 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
     """Whether a certificate refuses a motion that is not determined, and the check is about any that obeys the laws.
 
     Where contacts can share a load in more than one way there are many such motions, and the run is one of them: no
-    truth for where bodies go, but its energy and its overlaps are judged as those of any engine.
+    truth for where bodies go, but its energy and its overlaps are judged as those of any engine. Until then it is the
+    only one, for checks that know nothing of what comes later.
     """
-    is_one = observation.certificate.get("full", {}).get("lawful") and all(s["holds"] for s in observation.receipts)
-    refused = observation.outcome is Outcome.INVALID and is_one
-    return bool(refused and check.metric in LAWS and is_file(observation.slot.scene))
+    full = observation.certificate.get("full", {})
+    is_one = full.get("lawful") and all(slip["holds"] for slip in observation.receipts)
+    if observation.outcome is not Outcome.INVALID or not is_one or not is_file(observation.slot.scene):
+        return False
+    return check.metric in LAWS or (check.at is not None and check.at <= (full.get("determined") or 0.0))
 
 
 def _doubt(observation: Observation, check: Check) -> str:
