@@ -26,7 +26,15 @@ if TYPE_CHECKING:
 #: What a scene may ask for beyond discs, balls, boxes, fixed half-spaces, constant twists and passive contacts. An
 #: adapter names what it honours (`adapters.engine.EngineFacts.abilities`); the rest is refused before it sees it.
 Ability = Literal[
-    "surface velocity", "moving half-space", "course", "capsule", "polygon", "cylinder", "hull", "restitution above 1"
+    "surface velocity",
+    "moving half-space",
+    "turning half-space",
+    "course",
+    "capsule",
+    "polygon",
+    "cylinder",
+    "hull",
+    "restitution above 1",
 ]
 
 
@@ -107,8 +115,15 @@ def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:
             yield f"{body.name}.course", "course"
         if isinstance(body.shape, HalfSpace) and body.motion == "prescribed":
             yield f"{body.name}.motion", "moving half-space"
+        if turns(body):
+            yield f"{body.name}.twist", "turning half-space"
     if scene.gaining and any(restitution > 1.0 for restitution, _ in scene.materials()):
         yield "pairs", "restitution above 1"
+
+
+def turns(body: Body) -> bool:
+    """Whether a half-space turns, about what was the origin at the start."""
+    return isinstance(body.shape, HalfSpace) and any(body.twist[len(body.force) :])
 
 
 def as_moving(scene: Scene) -> Scene:

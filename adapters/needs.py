@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from adapters.drives import top_speed
+from adapters.drives import top_speed, turns
 from adapters.scene import Box, HalfSpace, Hull, Polygon, Scene
 from adapters.shapes import ROUND
 
@@ -104,7 +104,7 @@ def _tangential(scene: Scene) -> bool:
     So it is where a surface runs, or a course moves what others lie on.
     """
     d = scene.dimension
-    if any(any(body.surface_velocity) or body.course for body in scene.bodies):
+    if any(any(body.surface_velocity) or body.course or turns(body) for body in scene.bodies):
         return True
     motions = [body.twist[:d] for body in scene.bodies]
     loads = [scene.gravity] + [body.force for body in scene.bodies]

@@ -41,7 +41,7 @@ REBOUND_TIME = 0.2
 #: Sliding: least speed at the start [m/s] and time [s].
 SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5
 #: Friction up to which it brakes by no more than a weight. A larger one is left to the probes that read friction: what
-#: an engine does with it (MuJoCo's box sinks and is thrown up) must not pass for a wrong size or sign.
+#: an engine does with it (a box sinks, or is thrown up) must not pass for a wrong size or sign.
 MOST_FRICTION = 1.0
 #: Speed of the landing bodies [m/s]: low, since the step of motion limits what their size can be told to.
 LANDING_SPEED = 0.25

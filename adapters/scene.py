@@ -95,7 +95,7 @@ class Body:
         As in the module's conventions. An empty pose or twist stands for the origin and for rest.
     motion
         ``free``; ``fixed``; or ``prescribed`` (moves with its constant twist whatever hits it). A half-space is not
-        free, and does not turn.
+        free; it turns about the origin, which moves with it.
     force, torque
         Constant external load in world axes [N], [N m]; torque is a 1-tuple in the plane.
     surface_velocity
@@ -339,8 +339,6 @@ def _validate_body(body: Body, dimension: int) -> None:
         raise SceneError(f"{body.name}.pose: the quaternion {body.pose[3:]!r} must have length 1")
     if body.motion == "fixed" and any(body.twist):
         raise SceneError(f"{body.name}.twist: a fixed body cannot move")
-    if isinstance(body.shape, HalfSpace) and any(body.twist[dimension:]):
-        raise SceneError(f"{body.name}.twist: a half-space does not turn")
     check_drive(body, dimension)
 
 

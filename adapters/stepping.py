@@ -21,7 +21,7 @@ from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
 from adapters.near import start_overlap
-from adapters.scene import Body, Scene
+from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
@@ -283,7 +283,9 @@ def _alike(sampling: Sampling, dt: float, done: int, most: int) -> tuple[int, bo
 def _fastest(scene: Scene) -> float:
     """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add."""
     d = scene.dimension
-    initial = max(top_speed(b) + reach(b.shape) * math.hypot(*b.twist[d:]) for b in scene.bodies)
+    farthest = max(math.hypot(*b.pose[:d]) + reach(b.shape) for b in scene.bodies)  # where a face that turns is met
+    sizes = [farthest if isinstance(b.shape, HalfSpace) else reach(b.shape) for b in scene.bodies]
+    initial = max(top_speed(b) + size * math.hypot(*b.twist[d:]) for b, size in zip(scene.bodies, sizes, strict=True))
     pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
     return initial + (math.hypot(*scene.gravity) + pull) * scene.duration + 1e-9
 

@@ -49,7 +49,7 @@ class ReferenceEngine(Engine):
         customary_dt=1.0 / 60.0,
         roles=MappingProxyType({"classical": "textbook", "reference": "solution"}),
         colour="#3568ad",
-        abilities=frozenset({"moving half-space", "capsule", "polygon"}),
+        abilities=frozenset({"moving half-space", "turning half-space", "capsule", "polygon"}),
         profile_schemes=MappingProxyType({"reference": LOCATED}),
         quirks=(
             Quirk(

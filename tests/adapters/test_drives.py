@@ -12,7 +12,7 @@ from adapters.lift import lift, lowered
 from adapters.needs import needs
 from adapters.registry import load
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, SceneError, Sphere, scene_from_dict
-from adapters.stepping import posed_for, run
+from adapters.stepping import _fastest, posed_for, run
 from adapters.trajectory import Sampling
 
 G, DT = 9.81, 1.0 / 240.0
@@ -165,7 +165,6 @@ def test_scene_keeps_its_hash_and_its_form_where_nothing_drives():
         (floor(surface_velocity=(1.0, 0.1)), "leaves the face"),
         (floor(surface_velocity=(1.0,)), "has 1 components"),
         (floor(surface_velocity=(math.nan, 0.0)), "not a finite number"),
-        (floor(motion="prescribed", twist=(0.0, 0.0, 1.0)), "does not turn"),
         (floor(motion="free"), "fixed or prescribed"),
         (floor(course=Harmonic((0.1, 0.0), 2.0)), "only a prescribed body"),
         (floor(motion="prescribed", course=Harmonic((0.1,), 2.0)), "belt.course.amplitude"),
@@ -222,3 +221,13 @@ def test_lift_takes_drives_along_and_a_course_is_not_lowered():
         0
     ] == floor(pose=(0.0, 0.0, 0.0), twist=(0.0,) * 3, force=(0.0, 0.0), torque=(0.0,), surface_velocity=(0.0, 0.0))
     assert [ability for _, ability in asked_abilities(raised)] == ["surface velocity"]
+
+
+def test_a_face_that_turns_is_asked_of_the_adapter_and_explains_the_speed_of_what_it_meets():
+    door = floor(motion="prescribed", twist=(0.0, 0.0, 1e3))
+    far = Body("far", Disc(0.1), 1.0, 1.0, (5.0, 0.1, 0.0))
+    scene = Scene("door", 1, 2, (door, far), (Pair(),), (0.0, 0.0), 1.0)
+    assert ("belt.twist", "turning half-space") in list(asked_abilities(scene))
+    assert _fastest(scene) >= 5e3  # at five metres from where it turns about
+    still = replace(scene, bodies=(floor(motion="prescribed", twist=(0.0, 1.0, 0.0)), far))
+    assert "turning half-space" not in dict(asked_abilities(still)).values()

@@ -8,6 +8,7 @@ from reference_solver import Settings
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
+from validation.questions.invariance import compare
 from validation.running.execution import execute
 
 COLUMN = Slot("stack", (("n", 10.0),), 2, "reference", "reference", 1 / 60)
@@ -136,3 +137,53 @@ def test_what_is_told_at_an_instant_after_loads_are_shared_is_not_judged(tmp_pat
     monkeypatch.setitem(globals(), "ICE", ICE.replace("at = 0.05", "at = 0.15"))
     found = on_ice(tmp_path, -0.7, 0.5)
     assert found["at[0.15 s][box.x]"][0] is None and found["energy_growth"][0] == "pass"
+
+
+DOOR = """
+name = "a puck on a door that swings"
+dimension = {dimension}
+gravity = {none}
+duration = 1.0
+pairs = [{{ restitution = 0.0, friction = 0.0 }}]
+[[bodies]]
+name = "door"
+shape = {{ type = "half_space", normal = {normal} }}
+motion = "prescribed"
+twist = {swing}
+[[bodies]]
+name = "puck"
+shape = {{ type = "{shape}", radius = 0.1 }}
+mass = 2.0
+pose = {pose}
+twist = {twist}
+[[checks]]
+quantity = "puck.x"
+value = "(0.75 * exp(1) + 0.25 * exp(-1)) * cos(1) - 0.1 * sin(1)"
+tolerance = 1e-9
+[[checks]]
+quantity = "puck.{up}"
+value = "(0.75 * exp(1) + 0.25 * exp(-1)) * sin(1) + 0.1 * cos(1)"
+tolerance = 1e-9
+"""
+PLANAR = {
+    "dimension": 2, "none": [0.0] * 2, "normal": [0.0, 1.0], "swing": [0.0, 0.0, 1.0], "shape": "disc",
+    "pose": [1.0, 0.1, 0.0], "twist": [0.4, 1.0, 0.0], "up": "y",
+}  # fmt: skip
+SPATIAL = {
+    "dimension": 3, "none": [0.0] * 3, "normal": [0.0, 0.0, 1.0], "swing": [0.0, 0.0, 0.0, 0.0, -1.0, 0.0],
+    "shape": "sphere", "pose": [1.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0], "twist": [0.4, 0.0, 1.0, 0.0, 0.0, 0.0], "up": "z",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("world", [PLANAR, SPATIAL], ids=["plane", "space"])
+def test_a_puck_slides_outwards_on_a_face_that_turns(tmp_path, world):
+    """Without friction s'' = omega^2 s along the face: s = s0 cosh(omega t) + v0/omega sinh(omega t)."""
+    path = tmp_path / "door.toml"
+    path.write_text(DOOR.format(**world))
+    slot = Slot(str(path), (), world["dimension"], "reference", "reference", 1 / 240)
+    found = {row.metric: (row.physics, row.reason) for row in rows_of("run", [execute(slot)])}
+    judged = {metric: said for metric, said in found.items() if said[0] is not None or said[1]}
+    assert judged == dict.fromkeys(("penetration", "final[puck.x]", f"final[puck.{world['up']}]"), ("pass", ""))
+    assert [change.refused for change in compare(slot, ["mirrored"]) if not change.holds or change.refused] == []
+    (moved,) = compare(slot, ["moved"])
+    assert moved.refused.startswith("a face turns about the origin")

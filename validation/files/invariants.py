@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from adapters.drives import turns
 from adapters.engine import Array
 from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import ROUND, reach
@@ -198,14 +199,20 @@ def _granted(overlap: Array, step: Array) -> Array:
 def approach(scene: Scene, trajectory: Trajectory, i: int, j: int) -> Array:
     """Upper bound of the speed with which two bodies' surfaces may close, (s,) [m/s]: centres and spin.
 
-    Against a half-space only motion along its normal closes; round bodies turn within their own outline.
+    Against a half-space only motion along its normal closes, unless it turns: then it is met as far from the place that
+    it turns about as the other body reaches. Round bodies turn within their own outline.
     """
     d = scene.dimension
     linear = trajectory.twist[:, j, :d] - trajectory.twist[:, i, :d]
     faces = [b.shape for b in (scene.bodies[i], scene.bodies[j]) if isinstance(b.shape, HalfSpace)]
-    speed = np.abs(linear @ np.array(faces[0].normal)) if faces else np.linalg.norm(linear, axis=1)
-    for k in (i, j):
+    is_still = faces and not any(turns(scene.bodies[k]) for k in (i, j))
+    speed = np.abs(linear @ np.array(faces[0].normal)) if is_still else np.linalg.norm(linear, axis=1)
+    for k, other in ((i, j), (j, i)):
         shape = scene.bodies[k].shape
+        if turns(scene.bodies[k]):
+            away = np.linalg.norm(trajectory.pose[:, other, :d] - trajectory.pose[:, k, :d], axis=1)
+            spin = np.linalg.norm(trajectory.twist[:, k, d:], axis=1)
+            speed = speed + (away + reach(scene.bodies[other].shape)) * spin
         if not isinstance(shape, (*ROUND, HalfSpace)):
             speed = speed + reach(shape) * np.linalg.norm(trajectory.twist[:, k, d:], axis=1)
     return np.asarray(speed)
@@ -220,4 +227,6 @@ def overlap_bound(scene: Scene, dt: float) -> float:
             turning = 0.0 if isinstance(body.shape, ROUND) else reach(body.shape) / _least_moment(body)
             pulls.append(load / body.mass + torque * turning)
     place = max(math.hypot(*body.pose[: scene.dimension]) + reach(body.shape) for body in scene.bodies)
+    # A face that turns curves away from the speed that its points have, by as much as they are pulled to its centre.
+    pulls += [math.hypot(*body.twist[scene.dimension :]) ** 2 * place for body in scene.bodies if turns(body)]
     return sum(sorted(pulls)[-2:]) * dt * dt + ROUND_OFF * place

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.drives import turns
 from adapters.engine import Array, Contacts
 from adapters.foreign import checked_refusal, said_by
 from adapters.registry import load
@@ -179,6 +180,8 @@ def _mirrored(shape: Shape) -> Shape:
 
 def moved_away(scene: Scene) -> Posed | str:
     """A thousand of its sizes to the side."""
+    if any(map(turns, scene.bodies)):
+        return "a face turns about the origin, which stays where it is"
     shift = np.zeros(scene.dimension)
     shift[0] = FAR * size_of(scene)
 
@@ -302,7 +305,7 @@ def _posed(
         pose, twist, shape = np.array(body.pose), np.array(body.twist), body.shape
         if isinstance(shape, HalfSpace):
             face = HalfSpace(_plain(place(np.array(shape.normal))), shape.offset)
-            twist = np.concatenate([place(twist[:d]), 0.0 * twist[d:]])
+            twist = np.concatenate([place(twist[:d]), spin(twist[d:])])
             bodies.append(replace(_driven(body, place), shape=face, twist=_plain(twist)))
             continue
         bodies.append(
