@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reports.wording import markdown, number, plural
+from reports.wording import at, markdown, number, plural
 from validation.judging.comparison import Change, Kind
 from validation.judging.verdicts import Physics
 from validation.releases.bisection import Found
@@ -42,8 +43,11 @@ def _first(releases: Sequence[Told]) -> Told:
     return next((told for told in releases if told.times), releases[0])
 
 
-def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console) -> None:
-    """A line per release, then what moved in each: its families of changes, the most serious first."""
+def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, out: Path | None = None) -> None:
+    """A line per release, then what moved in each: its families of changes, the most serious first.
+
+    ``out`` is the folder in which the commands below find the results; None for the usual one.
+    """
     rows, first = max((len(told.rows) for told in releases), default=0), _first(releases)
     head = f"{first.engine}: {plural(len(releases), 'release')}, {plural(rows, 'row')} each"
     console.print(Text(head, style="bold"))
@@ -71,7 +75,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console) -
         if len(own) > SHOWN:
             console.print(Text(f"  ... and {len(own) - SHOWN} more kinds of rows", style="dim"))
         name = releases[0].engine
-        console.print(Text(f"  crosscheck compare {name}=={own[0].before} {name}=={version}", style="dim"))
+        console.print(Text(f"  crosscheck compare {name}=={own[0].before} {name}=={version}{at(out)}", style="dim"))
 
 
 def mark(change: Change) -> str:

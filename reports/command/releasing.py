@@ -101,7 +101,7 @@ def releases(
     elif markdown:
         click.echo(rendering.as_markdown(told, moved), nl=False)
     else:
-        rendering.as_text(told, moved, terminal())
+        rendering.as_text(told, moved, terminal(), out)
     sys.exit(statuses.INCOMPLETE if any(each.reason for each in told) else statuses.FINE)
 
 

@@ -76,6 +76,12 @@ def test_every_release_is_asked_the_same_cells_and_each_is_told_in_a_line(monkey
     assert "1.1" in call("releases", "chipmunk", "1.0..2.0", "impact", "--out", str(tmp_path)).stdout
 
 
+def test_the_command_below_what_moved_finds_the_results_in_their_folder(monkeypatch, tmp_path):
+    Asked(monkeypatch, lambda version, slot: 0.9 if version == "2.0" else 0.5)
+    said = " ".join(call("releases", "chipmunk", "1.0..2.0", "impact", "--out", str(tmp_path)).stdout.split())
+    assert f"crosscheck compare chipmunk==1.1 chipmunk==2.0 --out {tmp_path}" in said
+
+
 def test_options_of_effort_reach_the_releases_and_times_are_taken_where_they_are_asked_for(monkeypatch, tmp_path):
     asked = Asked(monkeypatch, lambda version, slot: 0.5)
     more = ("--times", "--fresh", "--try", "--timeout", "7", "--out", str(tmp_path))
