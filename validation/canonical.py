@@ -76,10 +76,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Check:
-    """One judged number: PASS if |value - truth| <= bound; shown but not judged if there is no truth.
-
-    ``at`` is the instant that it is about [s], where it knows nothing of what comes later.
-    """
+    """One judged number: PASS if |value - truth| <= bound; shown but not judged if there is no truth."""
 
     metric: str
     unit: str
@@ -87,7 +84,6 @@ class Check:
     bound: float | None
     because: str
     source: str
-    at: float | None = None
 
     @property
     def is_finite(self) -> bool:

@@ -7,6 +7,7 @@ import pytest
 from reference_solver import Settings
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
+from validation.files.stated import instant_of
 from validation.judging.rows import rows_of
 from validation.questions.invariance import compare
 from validation.running.execution import execute
@@ -126,6 +127,15 @@ def test_of_a_motion_that_is_not_determined_only_what_comes_before_and_what_any_
     assert [found[metric][0] for metric in ("energy_growth", "penetration", "at[0.05 s][box.x]")] == ["pass"] * 3
     physics, why = found["final[box.x]"]
     assert physics is None and why.startswith("certificate: the motion is not determined: bodies 0, 1 and 2 can share")
+
+
+@pytest.mark.parametrize(
+    ("metric", "at"),
+    [("at[0.05 s][box.x]", 0.05), ("at[1e-05 s][a.b.omega]", 1e-5), ("final[box.x]", None), ("energy_growth", None),
+     ("at[0.5 s][box.fx]", None), ("at[0.5 s][floor/box.fz]", None), ("least at[0.5 s][box.fz]", None)],
+)  # fmt: skip
+def test_only_a_state_at_an_instant_knows_nothing_of_what_comes_later(metric, at):
+    assert instant_of(metric) == at
 
 
 def test_before_it_meets_the_asphalt_all_of_it_is_judged(tmp_path):

@@ -7,6 +7,7 @@ files, so that a scene can be handed as plain data (`Stated.as_dict`) to where n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -116,6 +117,12 @@ def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
     return f"{over}[{name}]" if at is None else f"{over} {when}[{name}]"
 
 
+def instant_of(metric: str) -> float | None:
+    """Time [s] of a metric that knows the motion until then only; None of others, and of forces of steps around it."""
+    found = re.match(r"at\[([^ ]+) s\]\[.*\.(\w+)\]$", metric)
+    return float(found[1]) if found and not is_over_time(found[2]) else None
+
+
 def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
     overlaps: invariants.Overlaps = {}
     try:
@@ -143,13 +150,11 @@ def _checks(read: Stated, dt: float) -> list[Check]:
     depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
     return [
         *invariants.checks(read.scene, dt),
-        *(_stated_check(read, m, c, dt) for m, c in told.items()),
+        *(_stated_check(m, c, dt) for m, c in told.items()),
         depth,
         *shown,
     ]
 
 
-def _stated_check(read: Stated, metric: str, check: StatedCheck, dt: float) -> Check:
-    what = parts_of(check.quantity, [body.name for body in read.scene.bodies])[2]
-    at = None if is_over_time(what) else check.at  # steps around an instant
-    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED, at)
+def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:
+    return Check(metric, unit(check.quantity), check.value, check.bound(dt), check.because, STATED)

@@ -15,7 +15,7 @@ from adapters.scene import Scene
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
 from validation.files.invariants import LAWS
-from validation.files.stated import STATED
+from validation.files.stated import STATED, instant_of
 from validation.findings import Findings, FindingsError, Known, known_of
 from validation.findings.files import brought_by_ours, findings_of
 from validation.judging.predicting import Asked, foretold, predictions
@@ -245,7 +245,8 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
     is_one = full.get("lawful") and all(slip["holds"] for slip in observation.receipts)
     if observation.outcome is not Outcome.INVALID or not is_one or not is_file(observation.slot.scene):
         return False
-    return check.metric in LAWS or (check.at is not None and check.at <= (full.get("determined") or 0.0))
+    at = instant_of(check.metric)
+    return check.metric in LAWS or (at is not None and at <= (full.get("determined") or 0.0))
 
 
 def _doubt(observation: Observation, check: Check) -> str:
