@@ -241,9 +241,10 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
     truth for where bodies go, but its energy and its overlaps are judged as those of any engine. Until then it is the
     only one, for checks that know nothing of what comes later.
     """
+    if observation.outcome is not Outcome.INVALID or not is_file(observation.slot.scene):
+        return False
     full = observation.certificate.get("full", {})
-    is_one = full.get("lawful") and all(slip["holds"] for slip in observation.receipts)
-    if observation.outcome is not Outcome.INVALID or not is_one or not is_file(observation.slot.scene):
+    if not full.get("lawful") or not all(slip["holds"] for slip in observation.receipts):
         return False
     at = instant_of(check.metric)
     return check.metric in LAWS or (at is not None and at <= (full.get("determined") or 0.0))
