@@ -8,8 +8,8 @@
     slide     friction, friction_impulse    a box slides on a floor; its weight is an impulse as well
     corner    turn                          boxes land on a corner
 
-A probe has the pair values of the scene that is judged, its friction where friction is read (`Probe.rubs`), and is
-stepped by the same loop. A reader gives samples of a
+A probe has the pair values of the scene that is judged, a friction above `MOST_FRICTION` only where friction is read
+(`Probe.rubs`), and is stepped by the same loop. A reader gives samples of a
 quantity (one per component, body or phase); `adapters.receipts` looks at the one farthest from what is declared.
 """
 
@@ -30,6 +30,9 @@ Samples = dict[str, tuple[float, ...]]
 #: Steps of the short probes: enough to see one step more or less, too few for anything to build up.
 STEPS = 8
 GRAVITY = 9.81
+#: Up to this friction probes have that of the judged scene. Above, the slide has less load, and probes that read no
+#: friction have this: no less, since MuJoCo settles the forces of a pair without friction to 1e-4 only.
+MOST_FRICTION = 1.0
 #: Rebound: speed [m/s], radius [m] and mass [kg] of the balls, and the part of a step after which they touch. They
 #: start 3 steps of motion higher than that.
 REBOUND_SPEED, REBOUND_RADIUS, REBOUND_MASS = 2.0, 0.5, 1.0
@@ -65,8 +68,8 @@ class Probe:
     """A scene, the quantities it shows, and how they are read from its trajectory.
 
     ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``rubs``: they have
-    the friction of the judged scene; without, what friction does in an engine cannot pass for a wrong size or sign.
-    ``contacts``: contact impulses are read, of every step.
+    the friction of the judged scene, however large; else what a large one does in an engine could pass for a wrong size
+    or sign. ``contacts``: contact impulses are read, of every step.
     """
 
     quantities: tuple[str, ...]
@@ -332,7 +335,7 @@ def slide_load(friction: float) -> float:
 
     Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured.
     """
-    return GRAVITY / max(1.0, friction)
+    return GRAVITY / max(MOST_FRICTION, friction)
 
 
 def slide_speed(friction: float) -> float:

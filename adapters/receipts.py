@@ -23,6 +23,7 @@ from adapters.probes import (
     HALF_EXTENTS,
     LANDING_LEAD,
     LANDING_SPEED,
+    MOST_FRICTION,
     PROBES,
     SLIDE_TIME,
     STEPS,
@@ -150,9 +151,9 @@ def _measured(
         # Bodies that meet nothing do not depend on what a pair does: measured once for all pairs.
         probe, own = PROBES[name], case
         if not probe.rubs:
-            own = replace(own, friction=0.0)
+            own = replace(own, friction=min(own.friction, MOST_FRICTION))
         if not probe.touches:
-            own = replace(own, restitution=0.0)
+            own = replace(own, restitution=0.0, friction=0.0)
         found = _probe(engine, profile, values, own, name)
         if isinstance(found, dict):
             for quantity, numbers in found.items():

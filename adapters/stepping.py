@@ -24,7 +24,6 @@ from adapters.near import near_pairs
 from adapters.scene import Body, Cylinder, Hull, Scene, Sphere
 from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
-from reference_solver.certification.geometry import gap
 
 #: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
 #: still be a wrong answer worth measuring; a thousand times is none.
@@ -294,6 +293,9 @@ def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:
 
     Shapes that the certificate's geometry does not measure are taken as balls that hold them.
     """
+    # Only here: who imports adapters imports no solver.
+    from reference_solver.certification.geometry import gap
+
     shapes = [Sphere(reach(b.shape)) if isinstance(b.shape, Cylinder | Hull) else b.shape for b in scene.bodies]
     poses = [body.pose for body in scene.bodies]
     gaps = {(i, j): gap(shapes[i], poses[i], shapes[j], poses[j]) for i, j in near_pairs(scene, np.array([poses]))}

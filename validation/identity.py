@@ -50,12 +50,14 @@ def adapter_hash(engine: str) -> str:
     own = _closure(entry.module, {entry.module.partition(".")[0]}, {SOLVER})
     shared = [path for path in _sources("adapters") if path.parent.name == "adapters"]
     inside = _sources(SOLVER)
-    solver = inside if set(inside) & set(own) else []
+    solver = inside if set(inside) & set(own) - {located(MEASURING)} else []
     return _hash_files(sorted({*shared, *own, *solver}))
 
 
 #: The solver of ours, which an adapter of it answers with.
 SOLVER = "reference_solver"
+#: Its geometry, which shares no code with it and measures overlaps of all engines.
+MEASURING = "reference_solver.certification.geometry"
 #: What runs and measures a cell of any scene.
 RUNNING = ("validation.running.execution", "validation.running.certification")
 

@@ -10,8 +10,8 @@ from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
-from adapters.receipts import QUANTITIES, _receipt, _starved, receipts
-from adapters.registry import find
+from adapters.receipts import IMPULSE_SHARE, QUANTITIES, _receipt, _starved, receipts
+from adapters.registry import find, load
 
 DT = 1 / 60
 IMPACT = Needs(2, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
@@ -434,7 +434,7 @@ def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(toy_class)
     receipts(engine, "default", IMPACT, DT)
     builds.clear()
     receipts(engine, "default", replace(IMPACT, friction=0.25), DT)
-    assert builds == ["probe_rebound", "probe_slide"]
+    assert builds == ["probe_landing", "probe_rebound", "probe_slide", "probe_corner"]
 
 
 class Yielding(ToyEngine):
@@ -540,3 +540,11 @@ def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
         assert slips[damping].band == told[damping].band
     finer = by_quantity(receipts(declaring(**told), "default", IMPACT, 1 / 960))
     assert finer["gravity"].band == pytest.approx(rate(0.05) * 8 / 960 + 1e-12)  # slower than 1 m/s: not less than 1
+
+
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 2000, 1 / 5000])
+def test_impulses_are_receipted_with_the_friction_of_the_pair_at_any_step(dt):
+    """MuJoCo settles forces of a pair without friction to 1e-4 only: a pair that has friction is not probed with it."""
+    pytest.importorskip("mujoco")
+    slip = by_quantity(receipts(load("mujoco"), "default", replace(IMPACT, friction=0.5), dt))["impulse"]
+    assert slip.holds and abs(slip.measured - 1.0) < IMPULSE_SHARE
