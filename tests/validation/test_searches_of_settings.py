@@ -181,8 +181,8 @@ def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monk
     assert bound == pytest.approx(4.0875e-4, rel=1e-6)  # of `turned` at this step, as the scene states it
     assert found == Cure(
         "toy", "toy 2.1", "default", "pinch", 2, ({}, {"margin": 1.05}, {"margin": 100.0}), failing=3, left=1,
-        judged=JUDGED, metric="turned", unit="m/s", params={"margin": 1.05}, truth=0.0, tolerance=bound, before=2.1 * bound,
-        after=0.25 * bound, changes={"a": 1}, profile="tuned", others=(), tried=8, cost_before=2e-3,
+        judged=JUDGED, metric="turned", unit="m/s", params={"margin": 1.05}, truth=0.0, tolerance=bound,
+        before=2.1 * bound, after=0.25 * bound, changes={"a": 1}, profile="tuned", others=(), tried=8, cost_before=2e-3,
         cost_after=3e-3,
     )  # fmt: skip
     # Alone: a, d and b; then a with itself, with d and with b; then all of either profile.
