@@ -31,7 +31,7 @@ Samples = dict[str, tuple[float, ...]]
 STEPS = 8
 GRAVITY = 9.81
 #: Up to this friction probes have that of the judged scene. Above, the slide has less load, and probes that read no
-#: friction have this: no less, since MuJoCo settles the forces of a pair without friction to 1e-4 only.
+#: friction have this: no less, since forces of a pair without friction may be settled to a tolerance only.
 MOST_FRICTION = 1.0
 #: Rebound: speed [m/s], radius [m] and mass [kg] of the balls, and the part of a step after which they touch. They
 #: start 3 steps of motion higher than that.
