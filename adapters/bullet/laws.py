@@ -201,7 +201,13 @@ def _bounding_radius(box: Box) -> float:
 
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
-    "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
+    "bounce": (
+        *(f"apex[{n}]" for n in range(1, 6)),
+        "apex_interval_ratio",
+        "apex_growth",
+        "rest_time",
+        "force_in_flight",
+    ),
 }
 _BECAUSE = {
     "default": "speculative contact takes gap/dt off a rebound, Baumgarte adds 8 % of an overlap over dt, restitution "

@@ -20,12 +20,12 @@ import numpy as np
 
 from adapters.chipmunk.profiles import PROFILES
 from adapters.chipmunk.shipped import CHECKED_ON
-from adapters.engine import Array
+from adapters.engine import Array, Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
 from adapters.scene import Disc, Scene
 from adapters.stepping import step_count
-from adapters.trajectory import Trajectory
+from adapters.trajectory import ContactRecord, Trajectory
 from adapters.unswept import Push, passing_law, shoved_law
 
 #: Rounding of the recurrence against the engine: two thousand steps of a few roundings of numbers up to 10
@@ -77,7 +77,13 @@ def predicted_bounce(scene: Scene, profile: str, dt: float) -> Trajectory | None
     pose, twist = np.zeros((steps + 1, 2, 3)), np.zeros((steps + 1, 2, 3))
     pose[:, 1, 1] = heights + ball.shape.radius
     twist[:, 1, 1] = velocities
-    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")
+    # What a step changes the velocity by beside gravity is the floor's impulse, exactly 0 where the ball flies.
+    impulse = np.zeros((steps + 1, 2))
+    impulse[1:, 1] = ball.mass * (velocities[1:] - (velocities[:-1] + scene.gravity[1] * dt))
+    first, unknown = np.zeros(steps + 1, np.int64), np.full((steps + 1, 2), np.nan)
+    rows = Contacts(first, first + 1, unknown, unknown, impulse, unknown[:, 0])
+    contacts = ContactRecord(np.arange(steps + 1), np.arange(steps + 2), rows)
+    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, contacts, dt, "completed")
 
 
 def bounce_law(profile: str, metric: str) -> Law:
@@ -124,7 +130,12 @@ def _pushed(profile: str) -> Push:
 
 
 def _bounce_laws() -> tuple[Deviation, ...]:
-    metrics = [f"apex[{n}]" for n in range(1, 6)] + ["apex_interval_ratio", "apex_growth", "rest_time"]
+    metrics = [f"apex[{n}]" for n in range(1, 6)] + [
+        "apex_interval_ratio",
+        "apex_growth",
+        "rest_time",
+        "force_in_flight",
+    ]
     return tuple(
         _deviation(
             (profile,),

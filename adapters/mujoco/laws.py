@@ -17,7 +17,13 @@ from adapters.unswept import passing_law, shoved_law
 SOFT = ("default", "tuned")
 _BALL_METRICS = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
-    "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
+    "bounce": (
+        *(f"apex[{n}]" for n in range(1, 6)),
+        "apex_interval_ratio",
+        "apex_growth",
+        "rest_time",
+        "force_in_flight",
+    ),
 }
 _BECAUSE = {
     ("default", "ball"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",

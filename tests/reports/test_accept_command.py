@@ -20,7 +20,8 @@ FAMILY = """
 id = "starved"
 profiles = ["default"]
 scene = "stack"
-metrics = ["drift", "penetration", "settle_time", "kinetic_energy", "impulse_scatter", "interface_impulse"]
+metrics = ["drift", "penetration", "settle_time", "kinetic_energy", "impulse_scatter", "interface_impulse",
+           "load", "unbalanced"]
 reason = "four sweeps do not solve a column of ten"
 source = "its manual"
 releases = ">=7.3,<7.4"

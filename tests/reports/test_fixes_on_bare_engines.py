@@ -72,7 +72,7 @@ def test_a_listed_cure_mends_a_bare_model_of_its_scene_in_both_sizes(key):
 
 def pastes(page):
     """Engine, scene, check, parameters and lines of every fix on a page."""
-    pattern = r"<summary>(\w+) on (\w+): (\S+?)(?: at ([^<]*?))? \S+(?: [^<]*)?</summary>(.*?)"
+    pattern = r"<summary>(\w+) on (\w+): (\S+?)(?: at (\w+=\S+(?: \w+=\S+)*))? \S+(?: [^<]*)?</summary>(.*?)"
     pattern += r"(?=<details class=[\"']?cure|\Z)"
     for engine, scene, metric, at, rest in re.findall(pattern, page, re.DOTALL):
         lines = re.search(r'aria-label="Cure of [^"]*">(.*?)</pre>', rest, re.DOTALL)
@@ -83,7 +83,10 @@ def pastes(page):
 
 def check_page(engine, scene, metric, params, paste):
     pytest.importorskip(PACKAGES[engine])
-    dimension = resolve(scene).dimensions[0]
+    canonical = resolve(scene)
+    stating = (d for d in canonical.dimensions for c in canonical.checks(canonical.scene(d, params), QUICK_DT)
+               if c.metric == metric)  # fmt: skip
+    dimension = next(stating, 2)  # the plane of a lifted scene is no check of the scene itself
     for size in (SAME, OTHER):
         before, after = (judged(engine, scene, dimension, params, lines, size)[metric] for lines in ("", paste))
         assert not fails(after) or (before is None or after < before), (size, before, after)

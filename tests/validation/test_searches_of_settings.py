@@ -143,6 +143,9 @@ def test_an_engine_without_a_profile_as_shipped_has_nothing_needless(monkeypatch
 
 # ---- a cure is searched ----
 
+#: Three cells of a pinch; each states creep, turn, two mean loads, the least and greatest of both, and their balance.
+JUDGED = 3 * (1 + 1 + 2 + 4 + 1)
+
 
 def cured(monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("default", "tuned", "other"), **more):
     """A search on the standard cells of a box in a pinch; `clocked` is told twice and three times a millisecond."""
@@ -178,8 +181,8 @@ def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monk
     assert bound == pytest.approx(4.0875e-4, rel=1e-6)  # of `turned` at this step, as the scene states it
     assert found == Cure(
         "toy", "toy 2.1", "default", "pinch", 2, ({}, {"margin": 1.05}, {"margin": 100.0}), failing=3, left=1,
-        judged=12, metric="turned", unit="m/s", params={"margin": 1.05}, truth=0.0, tolerance=bound, before=2.1 * bound,
-        after=0.25 * bound, changes={"a": 1}, profile="tuned", others=(), tried=8, cost_before=2e-3,
+        judged=JUDGED, metric="turned", unit="m/s", params={"margin": 1.05}, truth=0.0, tolerance=bound,
+        before=2.1 * bound, after=0.25 * bound, changes={"a": 1}, profile="tuned", others=(), tried=8, cost_before=2e-3,
         cost_after=3e-3,
     )  # fmt: skip
     # Alone: a, d and b; then a with itself, with d and with b; then all of either profile.
@@ -187,12 +190,12 @@ def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monk
     shipped, with_it = clocks[0]
     assert (shipped.params, shipped.switched) == ((("margin", 1.05),), ()) and shipped.engine == "toy"
     assert (with_it.params, with_it.switched) == (shipped.params, (("a", 1),)) and len(clocks) == 1
-    assert {jobs for _, jobs in asked.calls} == {2} and {slot.dt for slot in asked.slots} == {DT}
+    assert {jobs for _, jobs in asked.calls} == {2} and {slot.dt for slot in asked.slots} == {DT, cures.ELSEWHERE[1]}
 
 
 def test_what_mends_nothing_is_told_with_the_worst_of_what_fails_first_and_is_not_clocked(monkeypatch):
     found, _, clocks = cured(monkeypatch, lambda slot: (0.5, 2.0 * dict(slot.params).get("margin", 1.0)), {"a": (1, 2)})
-    assert not found.helps and (found.failing, found.left, found.judged, found.changes) == (3, 3, 12, {})
+    assert not found.helps and (found.failing, found.left, found.judged, found.changes) == (3, 3, JUDGED, {})
     assert (found.metric, found.params, found.profile, found.others) == ("turned", {"margin": 100.0}, "", ())
     assert found.before == found.after == pytest.approx(200.0 * found.tolerance)
     assert (found.cost_before, found.cost_after, found.mends, found.tried) == (None, None, (), 2) and not clocks
@@ -215,7 +218,7 @@ def test_settings_that_do_as_well_alone_are_named_and_a_profile_only_if_it_has_a
 @pytest.mark.parametrize(
     ("unmeasured", "off", "answer"),
     [
-        ((), 0.5, Unsearched(True, "it passes all 12 checks")),
+        ((), 0.5, Unsearched(True, f"it passes all {JUDGED} checks")),
         (("creep",), 0.5, None),
     ],
 )
@@ -356,7 +359,7 @@ def test_a_cure_that_changes_nothing_in_the_cell_that_is_told_says_what_it_chang
     found, _, _ = cured(monkeypatch, off, {"b": (3,)})
     assert (found.failing, found.helps) == (1, False)  # it breaks what passed
     monkeypatch.setattr(cures, "readings", lambda found: [])
-    assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its standard cells is judged")
+    assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its cells is judged")
 
 
 def test_what_is_left_a_little_above_its_tolerance_is_not_mended(monkeypatch):
