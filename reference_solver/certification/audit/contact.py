@@ -15,6 +15,9 @@ from reference_solver.shapes import Disc, Sphere
 
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
+#: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part or lie: the
+#: law's own share is a millionth. And share of the speeds that meet which is round-off of a solve.
+PARTS, LIES = 1e-5, 1e-9
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
 #: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
@@ -24,7 +27,7 @@ UNITS = 4.0
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts."""
-    names = ("pull", "cone", "normal", "friction", "moment", "scale", "held", "unknown")
+    names = ("pull", "cone", "normal", "friction", "moment", "scale", "unknown")
     if not len(run.pieces.body_a):
         yield from ((name, 0.0) for name in names)
         return
@@ -46,7 +49,7 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
     )
     approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
-    held = run.is_impact[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
+    held = (run.is_impact & ~run.is_chain)[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
     return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
 
 
@@ -117,7 +120,7 @@ def _laws(run: Run) -> Iterator[float]:
     # What corrects impulses at the end of a piece of the impulse-level scheme may be of any sign; the piece itself
     # closes gaps with rows of mid-drift. Runs that hold one are no truth anyway (see `fallback`).
     correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
-    impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
+    impact, chain, frozen = run.is_impact[owner], run.is_chain[owner], run.is_frozen[owner]
 
     # Impulses of one solve are known to some units in the last place of the largest of them, not of each.
     largest = np.zeros(len(pieces))
@@ -129,8 +132,8 @@ def _laws(run: Run) -> Iterator[float]:
     yield _worst(np.where(correction, 0.0, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
-    # allowed after an impact is -e u-; a soft rebound may be held instead, and is then counted.
-    rebound = np.where(impact, np.maximum(-restitution * approach, 0.0), 0.0)
+    # allowed after an impact is -e u-, after a chain of them none; a soft rebound may be held instead.
+    rebound = np.where(impact & ~chain, np.maximum(-restitution * approach, 0.0), 0.0)
     soft = rebound <= SOFT_STEPS * run.pull * run.dt
     # Where rows turn within a piece, the velocity at its start must be none: that of a later piece tells of its end.
     ends = np.where(frozen, leaves, approach)
@@ -138,12 +141,20 @@ def _laws(run: Run) -> Iterator[float]:
     stopped = np.abs(pressed - np.maximum(pressed - mass * ends, 0.0))
     held = impact & soft & (rebound > 0.0) & (stopped < defect)
     defect = np.where(held, stopped, defect)
-    # Rebounds that are released leave with what was held in their step at most; and what is not pressed and is not an
-    # impact may part, or come closer: a gap is a matter of geometry.
+    # What parts as an impact begins has no part in it, but in a chain, and comes closer only to be struck next.
+    # All points of a pair that meets answer together.
+    _, pair = np.unique((owner * len(run.free) + a) * len(run.free) + b, return_inverse=True)
+    met = np.bincount(pair, approach < -LIES * speed) > 0.0
+    parts = impact & (approach > 0.0) & ~(chain & (pressed > 0.0)) & ~met[pair]
+    alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
+    fastest = np.zeros(len(pieces))
+    np.maximum.at(fastest, owner, -approach)
+    certain = PARTS * fastest[owner] + LIES * speed + 2.0 * np.minimum(run.still[a], run.still[b])
+    alone = np.where(approach > certain, alone, np.minimum(alone, defect))
+    defect = np.where(parts, alone, defect)
+    # What is not pressed and is not an impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
-    defect = np.where(parting | coarse, 0.0, defect)
-    defect = np.where(release, mass * np.maximum(leaves - _held_back(run, rebound), 0.0), defect)
-    yield _worst(defect, scale)
+    yield _worst(np.where(parting | coarse, 0.0, defect), scale)
 
     # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
     # the mean of those at both ends, each at its own point and normal.
@@ -179,19 +190,8 @@ def _laws(run: Run) -> Iterator[float]:
     yield _worst(np.where(coarse & ~frozen, 0.0, off), arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
-    yield float(held.sum() + (release & (pressed > 0.0)).sum())
     movable = (run.free[a] & (row_a < 0)) | (run.free[b] & (row_b < 0))
     yield float(movable.sum())
-
-
-def _held_back(run: Run, rebound: Array) -> Array:
-    """Fastest rebound (c,) that impacts of the same pair in the same step called for [m/s]."""
-    pieces, n = run.pieces, len(run.free)
-    keys = (pieces.step[run.contact_owner] * n + pieces.body_a) * n + pieces.body_b
-    _, which = np.unique(keys, return_inverse=True)
-    most = np.zeros(which.max() + 1)
-    np.maximum.at(most, which, rebound)
-    return np.asarray(most[which])
 
 
 def reduced_mass(run: Run) -> Array:
