@@ -98,9 +98,6 @@ def reasons(tally: Array) -> tuple[str, ...]:
     if tally[entries.CONTRADICTED_A] > 0.0:
         pair = [int(tally[entry]) - 1 for entry in (entries.CONTRADICTED_A, entries.CONTRADICTED_B)]
         found.append(f"no impulses keep bodies {pair[0]} and {pair[1]} apart: the run ended there")
-    if tally[entries.UNORDERED_A] > 0.0:
-        pair = [int(tally[entry]) - 1 for entry in (entries.UNORDERED_A, entries.UNORDERED_B)]
-        found.append(f"which of several impacts on bodies {pair[0]} and {pair[1]} comes first hangs on round-off")
     if tally[entries.ENDLESS_A] > 0.0:
         pair = [int(tally[entry]) - 1 for entry in (entries.ENDLESS_A, entries.ENDLESS_B)]
         found.append(f"impacts of bodies {pair[0]} and {pair[1]} accumulate at one instant, to no limit that is proven")

@@ -57,14 +57,13 @@ RESOLUTION = 27
 EXHAUSTED = 28
 #: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
 CONTRADICTED_A, CONTRADICTED_B = 29, 30
-#: Bodies A and B, one more than their numbers, of impacts that follow each other in an instant: in an order that
-#: hangs on gaps below round-off; without end, and to no limit that is proven (E22). 0 where there are none.
-UNORDERED_A, UNORDERED_B = 31, 32
-ENDLESS_A, ENDLESS_B = 33, 34
+#: Bodies A and B, one more than their numbers, of impacts that follow each other in an instant without end, and to no
+#: limit that is proven (E22). 0 where there are none.
+ENDLESS_A, ENDLESS_B = 31, 32
 #: Parts of steps that are cut at events (E19).
-SUB_STEPS = 35
+SUB_STEPS = 33
 
-SIZE = 36
+SIZE = 34
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (

@@ -22,7 +22,8 @@ is made twice more far from the origin: what differs there, beyond X and what co
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
-afterwards no run at this precision can, and only its laws are certified.
+afterwards no run at this precision can, and only its laws are certified. So it is where several pairs of bodies that
+touch each other meet in one instant and round-off decides which of them comes first (E21).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
 from reference_solver.model import Array, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT, UNORDERED
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import smallest_extent
@@ -159,6 +160,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     run = Simulation(model, settings)
     record = run.record(steps, stride, pieces=True)
     growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
+    beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
+    unordered, several = _without_order(record)
+    if unordered < horizon:
+        horizon, beyond = unordered, f"round-off decides which of the impacts on bodies {several} comes first"
     apart, shared = shared_loads(model, record, settings.dt, horizon)
     findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
@@ -179,9 +184,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons
     if horizon < record.t[-1]:
-        reasons.append(
-            f"beyond {horizon:.3g} s a last-place disturbance has grown {GROWTH:.0g}-fold: only laws hold there"
-        )
+        reasons.append(f"beyond {horizon:.3g} s {beyond}: only laws hold there")
     return replace(found, holds=holds, reasons=tuple(reasons))
 
 
@@ -192,6 +195,19 @@ def _first_chain(record: Record) -> float:
     at_once = np.append((pieces.begin[1:] == pieces.begin[:-1]) & (pieces.kind[1:] == IMPACT), False)
     found = np.flatnonzero((pieces.kind == IMPACT) & (at_once | (pieces.scheme == CHAIN)))
     return float(pieces.begin[found[0]]) if len(found) else float("inf")
+
+
+def _without_order(record: Record) -> tuple[float, str]:
+    """First sample after round-off decides the order of impacts on several bodies (E21) [s], and their numbers."""
+    pieces = record.pieces
+    assert pieces is not None
+    found = np.flatnonzero((pieces.kind == IMPACT) & (pieces.scheme == UNORDERED))
+    after = np.flatnonzero(record.t > pieces.begin[found[0]]) if len(found) else found
+    if not len(after):
+        return float("inf"), ""
+    of_piece = slice(*pieces.first_contact[found[0] : found[0] + 2])
+    bodies = sorted({*pieces.body_a[of_piece].tolist(), *pieces.body_b[of_piece].tolist()})
+    return float(record.t[after[0]]), ", ".join(map(str, bodies))
 
 
 def away(model: Model, far: float) -> Change:

@@ -15,6 +15,7 @@ from reference_solver.pieces import (
     IMPACT,
     IMPULSE_LEVEL,
     ROCKING,
+    UNORDERED,
     Journal,
 )
 from reference_solver.planar.columns import ARM_B, ENDING, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
@@ -23,6 +24,7 @@ from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
 from reference_solver.planar.state import Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.clock import ROCKING as COMES_TO_REST
+from reference_solver.stepping.clock import UNORDERED as HAS_NO_ORDER
 from reference_solver.stepping.impacts import CHAIN_ENDS
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
@@ -87,7 +89,7 @@ def enter_impact(bodies: Bodies, rows: Rows, sub: SubStep, pose: Array, options:
     """Enter the impact that a located sub-step begins with, at ``pose``, where it changed a velocity."""
     if not is_kept(sub.journal) or not differ(sub.before, sub.start):
         return
-    scheme = FROZEN
+    scheme = UNORDERED if sub.clock[HAS_NO_ORDER] > 0.0 else FROZEN
     for c in range(rows.counts[ROW_CONTACTS]):
         scheme = CHAIN if rows.integer[c, ENDING] == CHAIN_ENDS else scheme
     keep_state(sub.journal, pose, sub.before)

@@ -42,7 +42,7 @@ from reference_solver.planar.lasting import edge_along, write_rows
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses, still_speed
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, is_patient
+from reference_solver.stepping.clock import HELD, LEFT, MEETING, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     CREEP,
     LANDED,
@@ -334,6 +334,10 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             lowest = is_lowest(leaves, pull, gap_noise(bodies, rows, c), e)
             if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub.clock):
                 continue
+            if is_patient(sub.clock):
+                if lasts > sub.clock[MEETING]:
+                    continue
+                sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             rows.integer[c, ENDING] = SERIES_ENDS
             new = True
     return new

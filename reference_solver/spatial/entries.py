@@ -13,12 +13,14 @@ from reference_solver.pieces import (
     FROZEN,
     IMPACT,
     IMPULSE_LEVEL,
+    UNORDERED,
     Journal,
 )
 from reference_solver.spatial.midpoint import exchange_levers
 from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import add, cross, row, times_transposed
 from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.clock import UNORDERED as HAS_NO_ORDER
 from reference_solver.stepping.impacts import CHAIN_ENDS
 from reference_solver.stepping.lasting import CONTACTS as LASTING
 from reference_solver.stepping.lasting import Lasting
@@ -74,7 +76,7 @@ def enter_impact(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Op
     """Enter the impact that a located sub-step begins with, at the poses kept, where it changed a velocity."""
     if not is_kept(sub.journal) or not struck(bodies):
         return
-    scheme = FROZEN
+    scheme = UNORDERED if sub.clock[HAS_NO_ORDER] > 0.0 else FROZEN
     for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
             scheme = CHAIN if manifolds.ending[m, p] == CHAIN_ENDS else scheme

@@ -14,7 +14,7 @@ from reference_solver.spatial.prepare import measure_speed, still_speed
 from reference_solver.spatial.separation import radius_of
 from reference_solver.spatial.state import BOX, HALF_SPACE, POINTS, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
-from reference_solver.stepping.clock import BLOWS, LEFT, is_patient
+from reference_solver.stepping.clock import BLOWS, LEFT, MEETING, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     CREEP,
     LANDED,
@@ -266,6 +266,10 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 lowest = is_lowest(leaves, pull, gap_noise(bodies, manifolds, m, p), e)
                 if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub_step.clock):
                     continue
+                if is_patient(sub_step.clock):
+                    if lasts > sub_step.clock[MEETING]:
+                        continue
+                    sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 manifolds.ending[m, p] = SERIES_ENDS
                 new = True
     return new

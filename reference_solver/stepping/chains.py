@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.stepping.clock import BLOWS, HELD, SOON
+from reference_solver.stepping.clock import BLOWS, HELD, SOON, UNORDERED
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
 from reference_solver.stepping.noise import DRIFT, NOISE
 from reference_solver.stepping.operations import Island, ending_of, is_free, mark_contact, note_touching, number_of
-from reference_solver.tally import ENDLESS_A, UNORDERED_A
+from reference_solver.tally import ENDLESS_A, ENDLESS_B
 
 #: Values of `Lasting.mode` of contacts that are noted for an impact.
 MEETS, LIES, LEAVES = 0, 1, 2
@@ -42,6 +42,7 @@ def open_instant(island: Island) -> None:
     By clusters of contacts that share free bodies. At impulse level all take part (E28).
     """
     lasting, clock = island.sub.lasting, island.sub.clock
+    clock[UNORDERED] = 0.0
     count = note_touching(island) if clock[HELD] == 0.0 else 0
     meets, parts = 0, 0
     for k in range(count):
@@ -76,10 +77,10 @@ def open_instant(island: Island) -> None:
         if met < 0 or parts == 0:
             continue
         if pairs > 1 and clock[SOON] > 0.0:
-            name_bodies(island, met, UNORDERED_A)
+            clock[UNORDERED] = 1.0
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:
-            name_bodies(island, met, ENDLESS_A)
+            name_bodies(island, met)
         endless = not broken_off and pairs == 1 and not rubs and accumulates(lasting, members)
         for m in range(members):
             k = lasting.order[m]
@@ -101,16 +102,16 @@ def strikes_again(island: Island) -> bool:
         if ending == PARTS and lasting.speed[k, 0] < -lasting.speeds[k]:
             found = k
     if found >= 0 and ended:  # it would have been struck before the chain had ended
-        name_bodies(island, found, UNORDERED_A)
+        name_bodies(island, found)
     return found >= 0
 
 
 @inner_kernel
-def name_bodies(island: Island, k: int, entry: int) -> None:
-    """Enter the bodies of noted contact k in the tally from ``entry`` on, unless others are named there."""
+def name_bodies(island: Island, k: int) -> None:
+    """Enter the bodies of noted contact k in the tally, unless others are named there."""
     tally, body = island.tally, island.sub.lasting.body
-    if tally[entry] == 0.0:
-        tally[entry], tally[entry + 1] = 1.0 + number_of(island, body[k, 0]), 1.0 + number_of(island, body[k, 1])
+    if tally[ENDLESS_A] == 0.0:
+        tally[ENDLESS_A], tally[ENDLESS_B] = 1.0 + number_of(island, body[k, 0]), 1.0 + number_of(island, body[k, 1])
 
 
 @inner_kernel

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import kernel
 from reference_solver.model import Array
 from reference_solver.stepping.noise import EVENT_BUDGET
@@ -27,9 +29,12 @@ BRIEF, LONGER_BRIEF = 13, 14
 #: What events count that follow each other within a thousandth of a step, where each is dear.
 CHAIN = 15
 #: Impacts of the present instant that have been made; 1 where the instant came within a thousandth of a step of the
-#: event before.
-BLOWS, SOON = 16, 17
-CLOCK_SIZE = 18
+#: event before; 1 where round-off decides which of its impacts comes first (E21).
+BLOWS, SOON, UNORDERED = 16, 17, 18
+#: When the last series of rebounds that is taken to end in the sub-step does, and when bodies meet, so that one that
+#: lasts until then is followed (E22); counted from the start of the sub-step [s].
+SERIES, MEETING = 19, 20
+CLOCK_SIZE = 21
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -72,6 +77,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
     clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = clock[SOON] = 0.0
+    clock[MEETING] = math.inf
     clock[LONGER_BRIEF] = INSTANT
 
 

@@ -24,10 +24,12 @@ from reference_solver.stepping.clock import (
     INSTANT,
     LEFT,
     LONGER_BRIEF,
+    MEETING,
     OUTCOME,
     REBOUND,
     ROCKING,
     ROCKS,
+    SERIES,
     UNSETTLED,
     UNTIL_REST,
     count_blow,
@@ -129,6 +131,7 @@ def make_sub_step(island: Island) -> bool:
     if length == 0.0:
         end_blow(island)
         count_blow(clock, tally)
+        clock[MEETING] = math.inf
         return True
     island.sub.lasting.lenient[0] = 1.0 if clock[LONGER_BRIEF] > INSTANT else 0.0
     phase = enter_path(island, length)
@@ -150,6 +153,11 @@ def make_sub_step(island: Island) -> bool:
         return_to_start(island)
         clock[ESCAPED], clock[HELD], clock[ROCKS] = 1.0, held, rocks
         return True
+    if end < min(length, clock[SERIES]):  # what has not ended by then is followed
+        go_back(tally, island.sub.opened)
+        return_to_start(island)
+        clock[MEETING], clock[HELD], clock[ROCKS] = end, held, rocks
+        return True
     end = follow_path(island, length, end, phase > 0.0)
     tally[SUB_STEPS] += 1.0
     tally[OPENED] = max(tally[OPENED], 1.0)  # a phase opens no solve, and what is solved after it is not the start
@@ -160,7 +168,7 @@ def make_sub_step(island: Island) -> bool:
     if end < left and (haste or not shortened):
         count_event(clock, tally, haste, shortened, price_of_creeping(island))
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
-    clock[BLOWS] = 0.0
+    clock[BLOWS], clock[MEETING] = 0.0, math.inf
     return True
 
 
@@ -172,7 +180,7 @@ def solve_sub_step(island: Island) -> float:
     attempt that is made again leaves its sweeps in the tally and nothing else.
     """
     clock, tally = island.sub.clock, island.tally
-    clock[ROCKING] = 0.0
+    clock[ROCKING] = clock[SERIES] = 0.0
     begin_solve(island)
     open_instant(island)
     keep(tally, island.sub.opened)

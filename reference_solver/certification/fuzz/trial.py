@@ -15,7 +15,6 @@ from reference_solver.settings import Settings
 
 #: What a reason without a number of its own says, and its name.
 TOLD = {
-    "comes first hangs on round-off": "order of impacts",
     "to no limit that is proven": "endless impacts",
     "it comes out otherwise": "far from the origin",
 }
