@@ -156,8 +156,10 @@ def test_a_flush_start_is_certified_beyond_its_first_step(d, scene):
 def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
     """What is off by less than is seen, or by little more, moves as what is flush.
 
-    In space friction that acts aside of a centre by 1e-7 m turns a body of .15 m by 1e-5 rad/s^2: 1e-10 m in two steps.
+    But for what slides obliquely in space: loads that stand aside of a centre by s turn the lower book by friction,
+    (.4 - .1) m g .6 s at most on its inertia of .0076 m, which is 4e-3 s of a quaternion's component in two steps.
     """
+    turned = 4e-3 if d == 3 and scene is books else 0.0
     model, accelerations = scene(d, "box", 0.0)
     for off in (1e-13, 1e-11, 1e-9, 3e-9, 1e-7):
         for sign in (-1.0, 1.0):
@@ -168,7 +170,7 @@ def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
             simulation = Simulation(replace(model, bodies=bodies), Settings.reference(DT))
             simulation.advance(2)
             expected = truth(simulation.model, accelerations, 2 * DT)
-            assert np.abs(simulation.pose - expected).max() <= 2e-12 + 1e-3 * off
+            assert np.abs(simulation.pose - expected).max() <= 2e-12 + turned * off
 
 
 @pytest.mark.parametrize("d", [2, 3])
