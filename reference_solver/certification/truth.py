@@ -15,7 +15,8 @@ What all of these are off alike, since phases end by the solver's judgement of t
 tells that is made to a hundredth of the accuracy.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
 far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
-(`audit.sharing`). Where that distance is visible before the horizon, the run is refused.
+(`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
+at once meet, or do not, as round-off has it: what that moves comes to it as well (`audit.contact`).
 
 *Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
 is made twice more far from the origin: what differs there, beyond X and what coarser coordinates explain, refuses.
@@ -30,12 +31,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import count
-from math import gcd
+from math import gcd, sqrt
 from typing import Any
 
 import numpy as np
 
-from reference_solver.certification.audit import Finding, audit, ends_of_series, shared_loads
+from reference_solver.certification.audit import Finding, audit, ends_of_series, grazes, shared_loads
 from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
@@ -98,6 +99,8 @@ class Certificate:
         Step [s].
     gap
         Largest gap that counts as none near the origin [m].
+    grazed
+        (s,) way of bodies that meet or pass each other as such a gap decides [m].
     light
         What the solver says of itself (`Simulation.certificate`).
     pose
@@ -114,6 +117,7 @@ class Certificate:
     disturbed: Array
     dt: float
     gap: float
+    grazed: Array
     light: dict[str, Any]
     pose: Array
 
@@ -131,7 +135,9 @@ class Certificate:
         wherever they are.
         """
         steps = COORDINATE_UNITS * np.spacing(place) * (1.0 + OTHER_SIGNS * self.disturbed / self.dt)
-        return np.maximum.accumulate(steps + self.gap * (1.0 + self.growth))
+        gap = self.gap + COORDINATE_UNITS * np.spacing(place)
+        apart = self.gap + sqrt(gap / self.gap) * self.grazed
+        return np.maximum.accumulate(steps + apart * (1.0 + np.minimum(self.growth, GROWTH)))
 
 
 #: Gaps below this share of a half width, or these units in the last place of a coordinate, are closed (E8).
@@ -165,6 +171,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     if unordered < horizon:
         horizon, beyond = unordered, f"round-off decides which of the impacts on bodies {several} comes first"
     apart, shared = shared_loads(model, record, settings.dt, horizon)
+    gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
+    grazed = grazes(model, record, settings.dt, gap)
     findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
@@ -172,14 +180,25 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         reasons.append("solves were used that had not converged")
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = _error(model, run, record, steps, stride) + round_off
-    gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
         reasons.append("the run at half the step is no numbers")
     # A difference of two motions that obey the laws grows as that disturbance does.
-    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart)
-    made = (tuple(findings), record.t, error, growth, horizon, moved / size, settings.dt, gap, light, record.pose)
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + grazed))
+    made = (
+        tuple(findings),
+        record.t,
+        error,
+        growth,
+        horizon,
+        moved / size,
+        settings.dt,
+        gap,
+        grazed,
+        light,
+        record.pose,
+    )
     found = Certificate(not reasons, tuple(reasons), *made)
     reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
@@ -42,7 +44,7 @@ from reference_solver.planar.lasting import edge_along, write_rows
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses, still_speed
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, MEETING, SERIES, is_patient
+from reference_solver.stepping.clock import BLOWS, HELD, LEFT, MEETING, SERIES, is_patient
 from reference_solver.stepping.impacts import (
     CREEP,
     LANDED,
@@ -58,7 +60,6 @@ from reference_solver.stepping.impacts import (
     turns_aside,
 )
 from reference_solver.stepping.iteration import solve_velocities
-from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.noise import (
     COORDINATE_NOISE,
     LATE,
@@ -200,9 +201,12 @@ def least_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
 
 
 @inner_kernel
-def note_touching(bodies: Bodies, rows: Rows, lasting: Lasting, options: Options) -> int:
-    """Note the rows that touch in the room of a phase (`operations.note_touching`)."""
-    k = 0
+def note_touching(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> int:
+    """Note the rows that touch in the room of a phase (`operations.note_touching`).
+
+    One that carried load does not part in the first impact of an instant: its normal has turned.
+    """
+    k, lasting, first = 0, sub.lasting, sub.clock[BLOWS] == 0.0
     for c in range(rows.counts[CONTACTS]):
         if rows.integer[c, MEETS] == 0:
             continue
@@ -213,7 +217,8 @@ def note_touching(bodies: Bodies, rows: Rows, lasting: Lasting, options: Options
         arms = (rows.real[c, ARM_A], rows.real[c, ARM_A + 1], rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
         write_rows(bodies, lasting, k, (rows.real[c, NX], rows.real[c, NY]), arms)
         measure_speed(bodies, rows, c, options.dt)
-        lasting.speeds[k] = least_speed(bodies, rows, c, options.dt)
+        lasts = first and rows.real[c, FORCE_N] > 0.0 and rows.real[c, APPROACH] > 0.0
+        lasting.speeds[k] = math.inf if lasts else least_speed(bodies, rows, c, options.dt)
         lasting.friction[k] = rows.real[c, FRICTION] if options.friction else 0.0
         lasting.usual[k, 0] = rows.real[c, RESTITUTION] if options.restitution else 0.0
         k += 1

@@ -244,7 +244,7 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
 @inner_kernel
 def note_touching(island: Island) -> int:
     """Of all rows that touch."""
-    return int(impact.note_touching(island.bodies, island.rows, island.sub.lasting, island.options))
+    return int(impact.note_touching(island.bodies, island.rows, island.sub, island.options))
 
 
 @inner_kernel
@@ -442,6 +442,7 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         meeting.vector,
         meeting.corner,
         meeting.watched,
+        meeting.sunk,
     )
     return SubStep(
         sub.clock,

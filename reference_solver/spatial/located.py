@@ -505,6 +505,7 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         meeting.vector,
         meeting.corner,
         meeting.watched,
+        meeting.sunk,
     )
     return SubStep(
         sub.clock,

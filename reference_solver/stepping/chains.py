@@ -1,7 +1,7 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
-A pair of bodies that parts has no part in an impact; one with e = 0 that drifts apart, slower than a millionth of the
-impact, lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is
+A pair of bodies that parts has no part in an impact, but where it carried load until now: then its normal has turned,
+and it lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is
 the time until it is closed. Where one pair of bodies meets and all others that touch them part, the order of impacts is
 forced. Without friction each then changes the normal velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj``
 with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see whether it ends. It does not if the
@@ -16,7 +16,7 @@ from reference_solver.stepping.clock import BLOWS, HELD, SOON, UNORDERED
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
-from reference_solver.stepping.noise import DRIFT, NOISE
+from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.operations import Island, ending_of, is_free, mark_contact, note_touching, number_of
 from reference_solver.tally import ENDLESS_A, ENDLESS_B
 
@@ -69,9 +69,8 @@ def open_instant(island: Island) -> None:
                 met = k
         for m in range(members):
             k = lasting.order[m]
-            # What does not rebound parts only as it turns, or drifts; what a chain has left of a speed is none.
-            drifts = lasting.speed[k, 0] <= (DRIFT if lasting.usual[k, 0] == 0.0 else NOISE) * fastest
-            if lasting.mode[k] == LEAVES and drifts:
+            # What a chain has left of a speed is none.
+            if lasting.mode[k] == LEAVES and lasting.speed[k, 0] <= NOISE * fastest:
                 lasting.mode[k] = LIES
             parts += 1 if lasting.mode[k] == LEAVES else 0
         if met < 0 or parts == 0:

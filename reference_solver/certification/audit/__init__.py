@@ -149,6 +149,15 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
+def grazes(model: Model, record: Record, dt: float, noise: float) -> np.ndarray:
+    """Return how far (s,) impacts move bodies of which round-off decides whether they are [m] (`contact.grazes`).
+
+    Gaps below ``noise`` [m] count as none. Raises ValueError if the record has no pieces.
+    """
+    begin, speed = contact.grazes(_run_of(model, record, dt), record.t, record.pose, noise)
+    return np.maximum(record.t - begin[:, None], 0.0).T @ speed
+
+
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
     """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,17 +10,20 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.audit.turning import SOLVED, turned_contacts, turns_beside
+from reference_solver.certification.geometry import nearest
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 from reference_solver.shapes import Disc, Sphere
 
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
-#: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part or lie: the
-#: law's own share is a millionth. And share of the speeds that meet which is round-off of a solve.
+#: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part, or lie and
+#: have turned. And share of the speeds that meet which is round-off of a solve.
 PARTS, LIES = 1e-5, 1e-9
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
+#: How many times as fast as until the next sample bodies may go apart at first.
+APART = 4.0
 #: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
 #: the contacts of a body is rounded at that size.
 UNITS = 4.0
@@ -74,6 +78,43 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
     return rubs * way / (1.0 + e), np.maximum(*spins) * way
+
+
+def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]:
+    """When (k,) bodies meet or do not as round-off has it [s], and what (k,) speed of any of their points that changes.
+
+    Bodies that go apart with the acceleration a after they came near each other with the speed u were nearer by
+    ``u^2/(2 a)`` then. Where gaps below ``noise`` [m] count as none, they meet with any u up to ``sqrt(2 a noise)``, or
+    pass each other. The acceleration is that of the gap until the first sample (``t``, ``pose``) after the impact, if
+    the pair has no impulse before it; it may have been `APART` times as large when they met.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    approach = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+    pushed = np.linalg.norm(pieces.impulse, axis=1) > 0.0
+    rows = np.flatnonzero(pushed)
+    pair, begin = (pieces.body_a * len(run.free) + pieces.body_b)[rows], pieces.begin[owner[rows]]
+    until = np.full(len(pushed), np.inf)
+    order = np.lexsort((begin, pair))
+    same = pair[order[1:]] == pair[order[:-1]]
+    until[rows[order[:-1]]] = np.where(same, begin[order[1:]], np.inf)
+    sample = np.minimum(np.searchsorted(t, pieces.begin[owner], side="right"), len(t) - 1)
+    alone = run.is_impact[owner] & pushed & (approach < 0.0) & (until >= t[sample]) & (t[sample] > pieces.begin[owner])
+    times, speed, mass = [], [], reduced_mass(run)
+    for j in np.flatnonzero(alone):
+        both, at = (int(pieces.body_a[j]), int(pieces.body_b[j])), pose[sample[j]]
+        first, second = (run.model.bodies[i].shape for i in both)
+        gap = max(float(nearest(first, at[both[0]], second, at[both[1]]).gap), 0.0)
+        met = math.sqrt(2.0 * APART * noise * 2.0 * gap) / (t[sample[j]] - pieces.begin[owner[j]])
+        if -approach[j] <= met:
+            impulse = (1.0 + run.model.restitution[both]) * met * mass[j]
+            far = [
+                (1.0 + run.mass[i] * run.reach[i] ** 2 / run.moments[i].min()) / run.mass[i]
+                for i in both
+                if run.free[i]
+            ]
+            times.append(float(pieces.begin[owner[j]]))
+            speed.append(impulse * max(far))
+    return np.array(times), np.array(speed)
 
 
 def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
