@@ -169,7 +169,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
     unordered, several = _without_order(record)
     if unordered < horizon:
-        horizon, beyond = unordered, f"round-off decides which of the impacts on bodies {several} comes first"
+        horizon, beyond = (
+            unordered,
+            f"round-off decides whether bodies {several} are struck together or one after the other",
+        )
     apart, shared = shared_loads(model, record, settings.dt, horizon)
     gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
     grazed = grazes(model, record, settings.dt, gap)

@@ -1,11 +1,13 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
-A pair of bodies that parts has no part in an impact, but where it carried load until now: then its normal has turned,
-and it lies. What the impact drives together again is struck next, in the same instant: its gap is round-off, and so is
-the time until it is closed. Where one pair of bodies meets and all others that touch them part, the order of impacts is
-forced. Without friction each then changes the normal velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj``
-with ``W = J M^-1 J^T``, which needs no bodies: a chain is followed here to see whether it ends. It does not if the
-order repeats, with all u a factor below one smaller each time.
+A pair of bodies that parts has no part in an impact. One lies that carried load until now: its normal has turned. So
+does one with e = 0 that drifts apart, slower than a millionth of the impact; it has hardly opened, and whether it is
+struck together with the others or after them is for round-off to say. What the impact drives together again is struck
+next, in the same instant: its gap is round-off, and so is the time until it is closed. Where one pair of bodies meets
+and all others that touch them part, the order of impacts is forced. Without friction each then changes the normal
+velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj`` with ``W = J M^-1 J^T``, which needs no bodies: a
+chain is followed here to see whether it ends. It does not if the order repeats, with all u a factor below one smaller
+each time.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from reference_solver.stepping.clock import BLOWS, HELD, SOON, UNORDERED
 from reference_solver.stepping.impacts import CHAIN_ENDS, PARTS
 from reference_solver.stepping.islands import first_of
 from reference_solver.stepping.lasting import VELOCITIES, Lasting
-from reference_solver.stepping.noise import NOISE
+from reference_solver.stepping.noise import DRIFT, NOISE
 from reference_solver.stepping.operations import Island, ending_of, is_free, mark_contact, note_touching, number_of
 from reference_solver.tally import ENDLESS_A, ENDLESS_B
 
@@ -59,7 +61,7 @@ def open_instant(island: Island) -> None:
     join_contacts(island, count)
     for i in range(len(lasting.label)):
         members = list_cluster(island, i, count)
-        met, pairs, parts, rubs, fastest = -1, 0, 0, False, 0.0
+        met, pairs, parts, rubs, drifts, fastest = -1, 0, 0, False, False, 0.0
         for m in range(members):
             k = lasting.order[m]
             rubs = rubs or lasting.friction[k] > 0.0
@@ -68,15 +70,16 @@ def open_instant(island: Island) -> None:
                 pairs += 1 if met < 0 or not same_pair(lasting, met, k) else 0
                 met = k
         for m in range(members):
-            k = lasting.order[m]
-            # What a chain has left of a speed is none.
-            if lasting.mode[k] == LEAVES and lasting.speed[k, 0] <= NOISE * fastest:
+            k, u = lasting.order[m], lasting.speed[lasting.order[m], 0]
+            # What does not rebound parts only as it turns, or drifts; what a chain has left of a speed is none.
+            if lasting.mode[k] == LEAVES and u <= (DRIFT if lasting.usual[k, 0] == 0.0 else NOISE) * fastest:
                 lasting.mode[k] = LIES
+                drifts = drifts or u > NOISE * fastest
             parts += 1 if lasting.mode[k] == LEAVES else 0
+        if met >= 0 and (drifts or (pairs > 1 and parts > 0 and clock[SOON] > 0.0)):
+            clock[UNORDERED] = 1.0
         if met < 0 or parts == 0:
             continue
-        if pairs > 1 and clock[SOON] > 0.0:
-            clock[UNORDERED] = 1.0
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:
             name_bodies(island, met)

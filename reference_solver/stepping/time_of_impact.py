@@ -485,7 +485,9 @@ def advance(meeting: Any, now: float, until: float) -> float:
     """Advance from safe time to safe time until the separation is round-off (E26); inf if that is after ``until``.
 
     What overlaps now touches when it overlaps more: of a plane, each corner by itself, for bodies that rock come down
-    on one corner while another is still in the plane by round-off. A pair that touches now has to part before it can meet. While it is within noise, and no corner parts for certain,
+    on one corner while another is still in the plane by round-off.
+
+    A pair that touches now has to part before it can meet. While it is within noise, and no corner parts for certain,
     steps are as long as a fall by that noise takes.
     """
     stand(meeting, now)
