@@ -1,10 +1,9 @@
 """Impacts that follow each other in one instant, and chains of them that have no end (E21, E22).
 
 A pair of bodies that parts has no part in an impact. One lies that carried load until now: its normal has turned. So
-does one with e = 0 that drifts apart, slower than a millionth of the impact; it has hardly opened, and whether it is
-struck together with the others or after them is for round-off to say. What the impact drives together again is struck
-next, in the same instant: its gap is round-off, and so is the time until it is closed. Where one pair of bodies meets
-and all others that touch them part, the order of impacts is forced. Without friction each then changes the normal
+does one with e = 0 that drifts apart, slower than a millionth of the impact. What the impact drives together again is
+struck next, in the same instant: its gap is round-off, and so is the time until it is closed. Where one pair of bodies
+meets and all others that touch them part, the order of impacts is forced. Without friction each then changes the normal
 velocities u by a linear map, ``u -> u - (1 + e_j) u_j W_j/W_jj`` with ``W = J M^-1 J^T``, which needs no bodies: a
 chain is followed here to see whether it ends. It does not if the order repeats, with all u a factor below one smaller
 each time.
@@ -33,6 +32,8 @@ CYCLES, GROWS = 1000, 1e3
 #: Share by which velocities may miss a multiple of those of the cycle before; and share of the largest velocity that
 #: each must have, so that what is missed leaves the order as it is.
 SAME, CLEAR = 1e-10, 1e-6
+#: How many times a speed may differ from `DRIFT` for it to hang on that number whether a contact drifts or parts.
+UNSURE = 10.0
 #: Sweeps over the contacts of one pair that are struck together, and the share of the largest velocity that they leave.
 SWEEPS, SOLVED = 200, 1e-14
 
@@ -61,7 +62,7 @@ def open_instant(island: Island) -> None:
     join_contacts(island, count)
     for i in range(len(lasting.label)):
         members = list_cluster(island, i, count)
-        met, pairs, parts, rubs, drifts, fastest = -1, 0, 0, False, False, 0.0
+        met, pairs, parts, rubs, unsure, fastest = -1, 0, 0, False, False, 0.0
         for m in range(members):
             k = lasting.order[m]
             rubs = rubs or lasting.friction[k] > 0.0
@@ -72,11 +73,13 @@ def open_instant(island: Island) -> None:
         for m in range(members):
             k, u = lasting.order[m], lasting.speed[lasting.order[m], 0]
             # What does not rebound parts only as it turns, or drifts; what a chain has left of a speed is none.
-            if lasting.mode[k] == LEAVES and u <= (DRIFT if lasting.usual[k, 0] == 0.0 else NOISE) * fastest:
+            if lasting.mode[k] == LEAVES and lasting.usual[k, 0] == 0.0:
+                unsure = unsure or DRIFT / UNSURE * fastest < u < DRIFT * UNSURE * fastest
+                lasting.mode[k] = LIES if u <= DRIFT * fastest else LEAVES
+            elif lasting.mode[k] == LEAVES and u <= NOISE * fastest:
                 lasting.mode[k] = LIES
-                drifts = drifts or u > NOISE * fastest
             parts += 1 if lasting.mode[k] == LEAVES else 0
-        if met >= 0 and (drifts or (pairs > 1 and parts > 0 and clock[SOON] > 0.0)):
+        if met >= 0 and (unsure or (pairs > 1 and parts > 0 and clock[SOON] > 0.0)):
             clock[UNORDERED] = 1.0
         if met < 0 or parts == 0:
             continue
