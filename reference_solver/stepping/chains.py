@@ -32,8 +32,6 @@ CYCLES, GROWS = 1000, 1e3
 #: Share by which velocities may miss a multiple of those of the cycle before; and share of the largest velocity that
 #: each must have, so that what is missed leaves the order as it is.
 SAME, CLEAR = 1e-10, 1e-6
-#: How many times a speed may differ from `DRIFT` for it to hang on that number whether a contact drifts or parts.
-UNSURE = 10.0
 #: Sweeps over the contacts of one pair that are struck together, and the share of the largest velocity that they leave.
 SWEEPS, SOLVED = 200, 1e-14
 
@@ -62,7 +60,7 @@ def open_instant(island: Island) -> None:
     join_contacts(island, count)
     for i in range(len(lasting.label)):
         members = list_cluster(island, i, count)
-        met, pairs, parts, rubs, unsure, fastest = -1, 0, 0, False, False, 0.0
+        met, pairs, parts, rubs, fastest = -1, 0, 0, False, 0.0
         for m in range(members):
             k = lasting.order[m]
             rubs = rubs or lasting.friction[k] > 0.0
@@ -73,16 +71,13 @@ def open_instant(island: Island) -> None:
         for m in range(members):
             k, u = lasting.order[m], lasting.speed[lasting.order[m], 0]
             # What does not rebound parts only as it turns, or drifts; what a chain has left of a speed is none.
-            if lasting.mode[k] == LEAVES and lasting.usual[k, 0] == 0.0:
-                unsure = unsure or DRIFT / UNSURE * fastest < u < DRIFT * UNSURE * fastest
-                lasting.mode[k] = LIES if u <= DRIFT * fastest else LEAVES
-            elif lasting.mode[k] == LEAVES and u <= NOISE * fastest:
+            if lasting.mode[k] == LEAVES and u <= (DRIFT if lasting.usual[k, 0] == 0.0 else NOISE) * fastest:
                 lasting.mode[k] = LIES
             parts += 1 if lasting.mode[k] == LEAVES else 0
-        if met >= 0 and (unsure or (pairs > 1 and parts > 0 and clock[SOON] > 0.0)):
-            clock[UNORDERED] = 1.0
         if met < 0 or parts == 0:
             continue
+        if pairs > 1 and clock[SOON] > 0.0:
+            clock[UNORDERED] = 1.0
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:
             name_bodies(island, met)
